@@ -1,0 +1,68 @@
+"""Rigid motion: rotations, rotation vectors, and the best rigid fit between two shapes. All float64 numpy."""
+
+import numpy as np
+
+from odeform.types import Floats
+
+__all__ = ["best_rigid", "rotation_from_vector", "rotation_z", "unwrapped_vectors", "vector_from_rotation"]
+
+
+def rotation_z(angle: float) -> Floats:
+    """(3, 3) rotation by `angle` radians about the vertical axis."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_from_vector(vector: Floats) -> Floats:
+    """(..., 3) rotation vectors in radians of any length -> (..., 3, 3) (Rodrigues)."""
+    vector = np.asarray(vector, dtype=float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    o = np.zeros_like(x)
+    skew = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(*vector.shape[:-1], 3, 3)
+    # sinc keeps both coefficients exact at a vanishing angle
+    half = np.sinc(angle / (2 * np.pi))
+    return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
+
+
+def vector_from_rotation(rotation: Floats) -> Floats:
+    """(..., 3, 3) -> (..., 3) rotation vector of angle at most pi, through a unit quaternion for accuracy near pi."""
+    from scipy.spatial.transform import Rotation
+
+    flat = Rotation.from_matrix(np.asarray(rotation, dtype=float).reshape(-1, 3, 3)).as_rotvec()
+    return flat.reshape(*rotation.shape[:-2], 3)
+
+
+def unwrapped_vectors(rotations: Floats) -> Floats:
+    """(T, 3, 3) -> (T, 3) rotation vectors without jumps: each frame takes the turn count nearest to the last one.
+
+    A ball that rolls makes several turns; its rotation vector then grows past pi instead of flipping back.
+    """
+    vectors = vector_from_rotation(rotations)
+    for index in range(1, len(vectors)):
+        angle = np.linalg.norm(vectors[index])
+        if angle < 1e-9:
+            # whole turns about any axis: keep the last one's
+            last = np.linalg.norm(vectors[index - 1])
+            axis = vectors[index - 1] / last if last > 1e-9 else np.zeros(3)
+            vectors[index] = axis * 2 * np.pi * round(last / (2 * np.pi))
+            continue
+        axis = vectors[index] / angle
+        turns = np.round((vectors[index - 1] @ axis - angle) / (2 * np.pi))
+        vectors[index] = axis * (angle + 2 * np.pi * turns)
+    return vectors
+
+
+def best_rigid(rest: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Floats]:
+    """Weighted best-fit rigid motion of `rest` (N, 3) onto `moved` (..., N, 3) (Kabsch 1976).
+
+    Returns rotations R (..., 3, 3) and shifts p (..., 3) of the weighted centroid c:
+    moved ~ R (rest - c) + c + p. `weights` (N,) sum to 1.
+    """
+    rest, moved = np.asarray(rest, dtype=float), np.asarray(moved, dtype=float)
+    centre, centres = weights @ rest, np.einsum("n,...ni->...i", weights, moved)
+    cross = np.einsum("n,...ni,nj->...ij", weights, moved - centres[..., None, :], rest - centre)
+    u, _, vt = np.linalg.svd(cross)
+    sign = np.ones(u.shape[:-1])
+    sign[..., 2] = np.linalg.det(u @ vt)
+    return (u * sign[..., None, :]) @ vt, centres - centre

@@ -1,0 +1,136 @@
+"""What a scene varies and shows: parameters, time window, and the parts of its motion."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odeform.errors import InputError
+
+__all__ = ["Parameter", "Parameters", "Schema", "Window"]
+
+Parameters = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One physical quantity that a scene varies.
+
+    `scale` is "log" where ratios matter rather than differences (mass, stiffness), else "linear".
+    `role` is "azimuth" for an angle about the vertical axis under which the scene is symmetric: models
+    rotate coordinates by it and never learn it.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    default: float
+    scale: str = "linear"
+    role: str = "physical"
+    description: str = ""
+    shape: tuple[int, ...] = ()
+
+    def normalise(self, value: float) -> float:
+        """The trained range maps to [-1, 1]; values beyond it map beyond."""
+        if self.scale == "log":
+            low, high, value = math.log(self.low), math.log(self.high), math.log(value)
+        else:
+            low, high = self.low, self.high
+        return 2.0 * (value - low) / (high - low) - 1.0
+
+    def denormalise(self, unit: float) -> float:
+        if self.scale == "log":
+            return self.low * (self.high / self.low) ** ((unit + 1.0) / 2.0)
+        return self.low + (self.high - self.low) * (unit + 1.0) / 2.0
+
+    def inside(self, value: float) -> bool:
+        slack = 1e-6 * (self.high - self.low)
+        return self.low - slack <= value <= self.high + slack
+
+    def check(self, value: Any) -> float:
+        """The value as a float. Values outside the trained range pass; what no motion can have does not."""
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            raise InputError(f"{self.name}: expected a number in {self.unit}, got {value!r}") from None
+        if not math.isfinite(number):
+            raise InputError(f"{self.name}: expected a finite number in {self.unit}, got {number}")
+        if self.scale == "log" and number <= 0.0:
+            raise InputError(f"{self.name}: expected a positive number in {self.unit}, got {number:g}")
+        return number
+
+
+@dataclass(frozen=True)
+class Window:
+    """The trained span of time in seconds, and the rate of its frames in Hz."""
+
+    start: float
+    stop: float
+    rate: float
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """(T,) frame times in seconds, both ends included."""
+        count = round((self.stop - self.start) * self.rate)
+        return self.start + np.arange(count + 1) / self.rate
+
+
+@dataclass(frozen=True)
+class Schema:
+    """Everything a viewer, a trainer or a table needs to know of a scene."""
+
+    scene: str
+    parameters: tuple[Parameter, ...]
+    window: Window
+    parts: tuple[str, ...] = ("rigid", "local")
+    needs_observations: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def learned(self) -> tuple[Parameter, ...]:
+        """The parameters that a model has to learn: all but a symmetry's angle."""
+        return tuple(p for p in self.parameters if p.role != "azimuth")
+
+    def azimuth(self, parameters: Parameters) -> float:
+        """The scene's angle about the vertical axis in radians; 0 for a scene without one."""
+        return next((parameters[p.name] for p in self.parameters if p.role == "azimuth"), 0.0)
+
+    def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, float]:
+        """All parameters, checked, in schema order, with defaults where none was given."""
+        given = dict(parameters or {})
+        known = [p.name for p in self.parameters]
+        for name in given:
+            if name not in known:
+                raise InputError(f"unknown parameter {name!r}: scene {self.scene} has {', '.join(known)}")
+        return {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
+
+    def outside(self, parameters: Parameters) -> tuple[str, ...]:
+        """Names of the parameters beyond their trained range."""
+        return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
+
+    def vector(self, parameters: Parameters) -> NDArray[np.float64]:
+        """(P,) the learned parameters, each with its trained range mapped to [-1, 1]."""
+        return np.array([p.normalise(parameters[p.name]) for p in self.learned])
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "Schema":
+        try:
+            return cls(
+                scene=str(data["scene"]),
+                parameters=tuple(
+                    Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]
+                ),
+                window=Window(**data["window"]),
+                parts=tuple(data["parts"]),
+                needs_observations=bool(data.get("needs_observations", False)),
+                notes=tuple(data.get("notes", ())),
+            )
+        except (KeyError, TypeError) as error:
+            raise InputError(f"schema: expected the fields of an ODeform scene, missing or wrong: {error}") from None

@@ -1,0 +1,67 @@
+"""Many motions of one scene: in parallel, resumable, the same data whatever the number of workers."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from joblib import Parallel, delayed
+
+from odeform.dataset.store import Dataset, Entry, assign_splits, open_dataset, save_sequence, write_index
+from odeform.errors import InputError
+from odeform.progress import Progress
+from odeform.simulation.scene import Scene, get_scene
+from odeform.simulation.shell import SimulationError
+
+__all__ = ["simulate_dataset"]
+
+
+def _one(scene_name: str, entry: Entry, root: Path, rate: float | None) -> Entry:
+    try:
+        sequence = get_scene(scene_name).simulate(entry.parameters, rate=rate)
+    except SimulationError as error:
+        return replace(entry, status=str(error))
+    return replace(entry, sha256=save_sequence(root, entry.name, sequence))
+
+
+def _finished(root: Path, plan: list[Entry], provenance: dict[str, object]) -> dict[str, Entry]:
+    """Entries that an earlier, interrupted run of the same plan has completed."""
+    if not (root / "dataset.json").exists():
+        return {}
+    old = open_dataset(root)
+    if old.provenance != provenance:
+        raise InputError(f"{root}: holds another data set ({old.provenance}); expected {provenance} or an empty folder")
+    wanted = {entry.name: entry for entry in plan}
+    return {e.name: e for e in old.entries if e.name in wanted and e.parameters == wanted[e.name].parameters}
+
+
+def simulate_dataset(
+    scene_name: str, out: str | Path, count: int, seed: int = 0, workers: int = 1, rate: float | None = None
+) -> Dataset:
+    """Simulate `count` sequences of a scene into the folder `out`; continues where an earlier run stopped."""
+    scene: Scene = get_scene(scene_name)
+    root = Path(out)
+    rate = rate or scene.schema.window.rate
+    provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate}
+    plan = [
+        Entry(f"{scene_name}_{index:05d}", split, parameters)
+        for index, (parameters, split) in enumerate(
+            zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
+        )
+    ]
+    done = _finished(root, plan, provenance)
+    todo = [entry for entry in plan if entry.name not in done]
+    progress = Progress(f"simulate {scene_name}", len(plan), done=len(done))
+
+    def index() -> Dataset:
+        entries = tuple(done[e.name] for e in plan if e.name in done)
+        dataset = Dataset(root, scene.schema, entries, scene.fixed, provenance)
+        write_index(dataset)
+        return dataset
+
+    root.mkdir(parents=True, exist_ok=True)
+    jobs = (delayed(_one)(scene_name, entry, root, rate) for entry in todo)
+    for entry in Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+        done[entry.name] = entry
+        index()
+        progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
+    progress.close()
+    return index()

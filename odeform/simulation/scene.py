@@ -1,0 +1,52 @@
+"""A scene: what is varied, what is fixed, and how one motion of it comes about."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import qmc
+
+from odeform.errors import InputError
+from odeform.schema import Parameters, Schema
+from odeform.types import Mesh, Sequence
+
+__all__ = ["Scene", "get_scene"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A family of motions.
+
+    `simulate(parameters, rate, **numerics)` runs one motion over the schema's window; `rest_mesh()` is a fine
+    mesh of the undeformed body, for display. `fixed` are the physical quantities that do not vary, with units in
+    their names, kept with every data set.
+    """
+
+    schema: Schema
+    simulate: Callable[..., Sequence]
+    rest_mesh: Callable[[], Mesh]
+    fixed: dict[str, float] = field(default_factory=dict)
+
+    def sample(self, count: int, seed: int) -> list[dict[str, float]]:
+        """`count` parameter sets, space-filling over the trained box (scrambled Sobol points).
+
+        A longer list with the same seed starts with the shorter one.
+        """
+        parameters = self.schema.parameters
+        sobol = qmc.Sobol(len(parameters), scramble=True, rng=np.random.default_rng(seed))
+        points = sobol.random(1 << max(count - 1, 0).bit_length())[:count]
+        return [
+            {p.name: p.denormalise(2.0 * float(u) - 1.0) for p, u in zip(parameters, row, strict=True)}
+            for row in points
+        ]
+
+
+
+def get_scene(name: str) -> Scene:
+    """The scene of that name."""
+    from odeform.simulation import kick
+
+    scenes = {"kick": kick.SCENE}
+    if name not in scenes:
+        raise InputError(f"unknown scene {name!r}: expected one of {', '.join(scenes)}")
+    return scenes[name]
