@@ -1,0 +1,105 @@
+"""Checkpoints: one safetensors file of arrays, with everything else as JSON in its metadata. Nothing is unpickled."""
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from odeform.dataset.store import write_aside
+from odeform.errors import InputError
+from odeform.schema import Schema
+from odeform.types import Floats
+
+__all__ = ["Checkpoint", "bundled_checkpoints", "read_checkpoint", "resolve_checkpoint", "write_checkpoint"]
+
+FORMAT = "1"
+LIMIT = 1 << 30  # bytes; a larger file is not one of ours
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """`model` names the class that reads `arrays` and `config`; `provenance` says where they come from.
+
+    `scores` are those on the test split, as `odeform evaluate` prints them.
+    """
+
+    model: str
+    schema: Schema
+    config: dict[str, Any]
+    arrays: dict[str, Floats]
+    provenance: dict[str, Any] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
+    sha256: str = ""
+    size_bytes: int = 0
+
+
+def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
+    meta = {
+        "schema": checkpoint.schema.to_json(),
+        "config": checkpoint.config,
+        "provenance": checkpoint.provenance,
+        "scores": checkpoint.scores,
+    }
+    metadata = {"odeform": FORMAT, "model": checkpoint.model, "meta": json.dumps(meta)}
+    data = save({name: np.ascontiguousarray(array) for name, array in checkpoint.arrays.items()}, metadata)
+    write_aside(Path(path), data)
+
+
+def read_checkpoint(path: str | Path) -> Checkpoint:
+    """Read and validate a checkpoint file; `InputError` in one line for anything that is not one."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > LIMIT:
+            raise InputError(f"{path}: expected a checkpoint of at most {LIMIT >> 20} MiB")
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"checkpoint {path}: {error.strerror}") from None
+    try:
+        arrays = load(data)
+        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+    except (SafetensorError, ValueError):
+        raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
+    metadata = header.get("__metadata__", {})
+    if metadata.get("odeform") != FORMAT:
+        raise InputError(f"checkpoint {path}: a safetensors file, but not of ODeform (format {FORMAT})")
+    try:
+        meta = json.loads(metadata["meta"])
+        return Checkpoint(
+            model=metadata["model"],
+            schema=Schema.from_json(meta["schema"]),
+            config=meta["config"],
+            arrays=arrays,
+            provenance=meta["provenance"],
+            scores=meta["scores"],
+            sha256=hashlib.sha256(data).hexdigest(),
+            size_bytes=len(data),
+        )
+    except (KeyError, ValueError) as error:
+        raise InputError(f"checkpoint {path}: damaged metadata: {error}") from None
+
+
+def _bundle() -> Path:
+    here = Path(__file__).resolve().parent
+    installed = here / "assets" / "checkpoints"
+    return installed if installed.is_dir() else here.parent / "assets" / "checkpoints"
+
+
+def bundled_checkpoints() -> dict[str, Path]:
+    """The checkpoints that travel with the package, by name SCENE/MODEL."""
+    return {f"{path.parent.name}/{path.stem}": path for path in sorted(_bundle().glob("*/*.safetensors"))}
+
+
+def resolve_checkpoint(name: str) -> Path:
+    """A path as it is; SCENE or SCENE/MODEL as the bundled checkpoint of that name."""
+    bundled = bundled_checkpoints()
+    for key in (name, f"{name}/odeform"):
+        if key in bundled:
+            return bundled[key]
+    if not Path(name).exists():
+        raise InputError(f"checkpoint {name!r}: neither a file nor bundled; bundled are {', '.join(bundled) or 'none'}")
+    return Path(name)

@@ -1,0 +1,46 @@
+"""Shapes: how much of a body each point stands for, and how a foreign shape comes to lie where a model expects one."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh
+
+__all__ = ["Fit", "fit_to", "surface_shares"]
+
+
+def surface_shares(geometry: Geometry) -> Floats:
+    """(N,) share of the surface at each point, summing to 1: a third of the adjacent faces; equal for bare points."""
+    count = len(geometry.points)
+    if not isinstance(geometry, Mesh):
+        return np.full(count, 1.0 / count)
+    corners = np.asarray(geometry.points, dtype=float)[geometry.faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    shares = np.bincount(geometry.faces.ravel(), np.repeat(area, 3), minlength=count)
+    total = shares.sum()
+    return shares / total if total > 0.0 else np.full(count, 1.0 / count)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A shape brought to the place and size of another: x -> factor * x + shift."""
+
+    geometry: Geometry
+    factor: float
+    shift: Floats
+
+
+def fit_to(geometry: Geometry, reference: Mesh) -> Fit:
+    """Scale and shift a shape to the largest extent of `reference` and its footprint, standing on the same floor."""
+    points, target = np.asarray(geometry.points, dtype=float), np.asarray(reference.points, dtype=float)
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = float((high - low).max())
+    factor = float(np.ptp(target, axis=0).max()) / extent if extent > 0.0 else 1.0
+    foot = np.array([*(0.5 * (low + high))[:2], low[2]]) * factor
+    goal = np.array([*(0.5 * (target.min(axis=0) + target.max(axis=0)))[:2], target[:, 2].min()])
+    moved = (points * factor + (goal - foot)).astype(np.float32)
+    if isinstance(geometry, GaussianSplats):
+        fitted: Geometry = replace(geometry, points=moved, covariances=geometry.covariances * factor**2)
+    else:
+        fitted = replace(geometry, points=moved)
+    return Fit(fitted, factor, goal - foot)

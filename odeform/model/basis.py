@@ -1,0 +1,67 @@
+"""The displacement basis phi_k(x): a coordinate field, evaluated once per geometry.
+
+A deformation is d(x, t) = sum_k c_k(t) phi_k(x). Each phi_k is a radial-basis network over the training surface,
+sum_j w_jk |x - x_j|^3 + a_k + B_k x: exact at the training vertices, the smoothest field between them (it minimises
+bending energy; Duchon 1977), with a closed-form gradient.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from odeform.types import Floats
+
+__all__ = ["DisplacementBasis", "fit_basis"]
+
+CHUNK = 8192  # points evaluated at once: bounds memory at a million points
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementBasis:
+    """`centers` (M, 3) in units of `scale` metres about the anchor; `weights` (M + 4, K * 3)."""
+
+    centers: Floats
+    weights: Floats
+    scale: float
+
+    @property
+    def modes(self) -> int:
+        return self.weights.shape[1] // 3
+
+    def values(self, points: Floats) -> Floats:
+        """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32, so that a frame is values @ c."""
+        out = np.empty((len(points), 3, self.modes), dtype=np.float32)
+        for at in range(0, len(points), CHUNK):
+            chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
+            features = np.concatenate([_distances(chunk, self.centers) ** 3, np.ones((len(chunk), 1)), chunk], axis=1)
+            value = features @ self.weights
+            out[at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
+        return out
+
+    def gradients(self, points: Floats) -> Floats:
+        """d phi / dx at `points` (N, 3) -> (N, 3, 3, K) float32, [n, i, j, k] = d(phi_k)_i / dx_j, per metre/metre."""
+        out = np.empty((len(points), 3, 3, self.modes), dtype=np.float32)
+        count = len(self.centers)
+        for at in range(0, len(points), CHUNK):
+            chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
+            distance = _distances(chunk, self.centers)
+            for axis in range(3):
+                slope = 3.0 * distance * (chunk[:, None, axis] - self.centers[None, :, axis])
+                value = slope @ self.weights[:count] + self.weights[count + 1 + axis]
+                out[at : at + CHUNK, :, axis] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
+        return out / np.float32(self.scale)
+
+
+def _distances(points: Floats, centers: Floats) -> Floats:
+    return np.sqrt(((points[:, None, :] - centers[None, :, :]) ** 2).sum(axis=-1))
+
+
+def fit_basis(points: Floats, modes: Floats, scale: float) -> DisplacementBasis:
+    """The basis that takes the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
+    centers = np.asarray(points, dtype=float) / scale
+    tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
+    system = np.block([[_distances(centers, centers) ** 3, tail], [tail.T, np.zeros((4, 4))]])
+    values = np.asarray(modes, dtype=float).swapaxes(1, 2).reshape(len(centers), -1)
+    # least squares rather than a solve: coplanar points leave part of the linear tail undetermined
+    weights = np.linalg.lstsq(system, np.concatenate([values, np.zeros((4, values.shape[1]))]), rcond=None)[0]
+    return DisplacementBasis(centers, weights, scale)

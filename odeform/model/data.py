@@ -1,0 +1,80 @@
+"""From sequences to what the models learn from: one reduced trajectory for each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from odeform.dataset.store import Dataset
+from odeform.errors import InputError
+from odeform.model.reduced import ReducedSpace, decompose, fit_space, to_canonical
+from odeform.schema import Schema, Window
+from odeform.types import Floats
+
+__all__ = ["TrainingData", "prepare"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """`theta` (S, P) in [-1, 1], `reduced` (S, T, 6 + K) in metres and radians, for train and val."""
+
+    schema: Schema
+    space: ReducedSpace
+    times: Floats
+    rest: Floats
+    """(N, 3) canonical rest points of the training mesh, metres."""
+    weights: Floats
+    theta: dict[str, Floats]
+    reduced: dict[str, Floats]
+    truncation_mm: dict[str, float]
+    """RMS of the deformation that the modes leave out, for each split."""
+
+
+def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None, every: int = 1) -> TrainingData:
+    """Decompose all training and validation sequences; fit the deformation basis on the training ones alone."""
+    schema = dataset.schema
+    poses, locals_, theta = {}, {}, {}
+    rest = weights = anchor = times = None
+    for split in ("train", "val"):
+        poses[split], locals_[split], vectors = [], [], []
+        for sequence in dataset.sequences(split):
+            if anchor is None:
+                anchor = sequence.weights @ sequence.vertices[0].astype(float)
+                weights, times = sequence.weights, sequence.times
+                rest = to_canonical(sequence.vertices[0], anchor, schema.azimuth(sequence.parameters))
+            assert rest is not None
+            if sequence.vertices.shape[1] != len(rest):
+                raise InputError(f"{sequence.name}: expected {len(rest)} vertices as in the others, got another mesh")
+            pose, local = decompose(sequence, anchor, schema.azimuth(sequence.parameters))
+            poses[split].append(pose)
+            locals_[split].append(local)
+            vectors.append(schema.vector(sequence.parameters))
+        if not vectors:
+            raise InputError(f"{dataset.root}: no sequence in split {split}")
+        theta[split] = np.stack(vectors)
+    assert rest is not None and weights is not None and anchor is not None and times is not None
+    space, train = fit_space(rest, locals_["train"], weights, anchor, modes)
+    shapes = space.basis.values(rest)
+    root = weights[:, None]
+    coefficients = {"train": train, "val": [np.einsum("tni,nik->tk", local * root, shapes) for local in locals_["val"]]}
+    reduced, truncation = {}, {}
+    begin, end = window or (0, len(times))
+    for split in ("train", "val"):
+        reduced[split] = np.stack(
+            [np.concatenate(pair, axis=1)[begin:end:every] for pair in zip(poses[split], coefficients[split], strict=True)]
+        )
+        total = np.mean([(root * local**2).sum(axis=(1, 2)).mean() for local in locals_[split]])
+        kept = np.mean([(c**2).sum(axis=1).mean() for c in coefficients[split]])
+        truncation[split] = float(1e3 * np.sqrt(max(total - kept, 0.0)))
+    times = times[begin:end:every]
+    rate = 1.0 / float(times[1] - times[0])
+    schema = Schema(
+        schema.scene,
+        schema.parameters,
+        Window(float(times[0]), float(times[-1]), rate),
+        schema.parts,
+        schema.needs_observations,
+        schema.notes,
+    )
+    return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation)
+
+

@@ -1,0 +1,135 @@
+"""A motion: any time in, poses and points out."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from odeform.model.reduced import ReducedSpace, rotation_of, to_canonical
+from odeform.schema import Parameters, Schema
+from odeform.types import Floats, GaussianSplats, Geometry
+
+__all__ = ["Motion", "PlacedBasis", "SolveStats", "Trajectory", "place"]
+
+
+@dataclass(frozen=True)
+class SolveStats:
+    """How a trajectory came about. `solver_error_mm` is the error of the integration alone, not of the model."""
+
+    solver: str
+    steps: int
+    evaluations: int
+    rejected: int
+    status: str
+    wall_ms: float
+    solver_error_mm: float | None
+
+
+class Trajectory(Protocol):
+    """Reduced coordinates over time. What it says of a time never depends on what was asked before."""
+
+    @property
+    def stats(self) -> SolveStats: ...
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which the trajectory is sound; later times show the state of that moment."""
+        ...
+
+    def reduced(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, 6 + K)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBasis:
+    """A geometry seen through a basis: canonical rest points (N, 3) and basis values (3 N, K), float32."""
+
+    rest: Floats
+    values: Floats
+
+
+def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasis:
+    """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
+    rest = to_canonical(geometry.points, space.anchor, azimuth)
+    values = space.basis.values(rest)
+    return PlacedBasis(rest.astype(np.float32), values.reshape(-1, space.basis.modes))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """P(t) = T(t) o D(t)(P0) of one geometry under one set of parameters (paper eq. 4).
+
+    `placed` is the geometry on its way into the basis; `outside` names the parameters beyond their trained range.
+    """
+
+    schema: Schema
+    parameters: Parameters
+    geometry: Geometry
+    space: ReducedSpace
+    placed: PlacedBasis
+    trajectory: Trajectory
+
+    @property
+    def stats(self) -> SolveStats:
+        return self.trajectory.stats
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        return self.schema.outside(self.parameters)
+
+    def extrapolates(self, time: float) -> bool:
+        """Whether `time` lies beyond the trained window."""
+        return not self.schema.window.start <= time <= self.schema.window.stop + 1e-9
+
+    def _reduced(self, times: Floats) -> Floats:
+        return self.trajectory.reduced(np.atleast_1d(np.asarray(times, dtype=float)))
+
+    def vertices(self, t: float | Floats) -> Floats:
+        """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
+        y = self._reduced(np.asarray(t))
+        rotation, shift = self._rotation_shift(y)
+        body = self.placed.rest + self._deformation(y)
+        out = body @ rotation.swapaxes(-1, -2).astype(np.float32)
+        out += (shift + self.space.anchor)[:, None].astype(np.float32)
+        return out[0] if np.ndim(t) == 0 else out
+
+    def pose(self, t: float | Floats) -> Floats:
+        """T(t), the rigid part: (4, 4) in scene axes, metres; (T, 4, 4) for (T,) times. The identity at rest."""
+        rotation, shift = self._rotation_shift(self._reduced(np.asarray(t)))
+        rotation = rotation @ self._to_canonical_axes
+        out = np.zeros((len(rotation), 4, 4))
+        out[:, :3, :3] = rotation
+        out[:, :3, 3] = shift + self.space.anchor - rotation @ self.space.anchor
+        out[:, 3, 3] = 1.0
+        return out[0] if np.ndim(t) == 0 else out
+
+    def local(self, t: float | Floats) -> Floats:
+        """D(t) - id, the deformation alone, in the body's frame as it rests in the scene: (N, 3) or (T, N, 3) metres."""
+        out = self._deformation(self._reduced(np.asarray(t))) @ self._to_canonical_axes.astype(np.float32)
+        return out[0] if np.ndim(t) == 0 else out
+
+    def covariances(self, t: float) -> Floats:
+        """(N, 3, 3) covariances of splats at time `t`, turned with the rigid part."""
+        assert isinstance(self.geometry, GaussianSplats)
+        rotation = self.pose(t)[:3, :3]
+        return rotation @ self.geometry.covariances @ rotation.T
+
+    def deformation_rms(self, times: Floats) -> Floats:
+        """(T,) root-mean-square local displacement of the points in metres."""
+        y = self._reduced(times)
+        gram = self.placed.values.T @ self.placed.values / len(self.placed.rest)
+        return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", y[:, 6:], gram, y[:, 6:]), 0.0))
+
+    @property
+    def _to_canonical_axes(self) -> Floats:
+        return rotation_of(np.zeros(6), self.schema.azimuth(self.parameters))[0].T
+
+    def _rotation_shift(self, y: Floats) -> tuple[Floats, Floats]:
+        return rotation_of(y[:, :6], self.schema.azimuth(self.parameters))
+
+    def _deformation(self, y: Floats) -> Floats:
+        coefficients = y[:, 6:].astype(np.float32)
+        # one product for all times; for one time a matrix-vector product at memory speed
+        moved = coefficients @ self.placed.values.T if len(y) > 1 else (self.placed.values @ coefficients[0])[None]
+        return moved.reshape(len(y), -1, 3)

@@ -1,0 +1,148 @@
+"""The ODeform network (paper, Section III) in whitened reduced coordinates, for training and encoding.
+
+Dual encoders of P0 and theta, two neural ODEs of which the local one sees the global state, and two decoders. One
+state of 32 + 128 numbers per object, whatever the number of its points.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import nn
+
+from odeform.model.reduced import POSE
+
+__all__ = ["ModelConfig", "ODeformNet"]
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Sizes of the network."""
+
+    parameters: int
+    modes: int
+    rigid: bool = True
+    """Whether the scene has rigid motion; without, there is no rigid branch."""
+    rigid_latent: int = 32
+    local_latent: int = 128
+    point_width: int = 32
+    encoder_width: int = 128
+    rigid_width: int = 128
+    local_width: int = 256
+    decoder_width: int = 128
+
+    @property
+    def state(self) -> int:
+        return self.rigid_latent * self.rigid + self.local_latent
+
+
+def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for before, after in zip(sizes, sizes[1:], strict=False):
+        layers += [nn.Linear(before, after), activation()]
+    return nn.Sequential(*layers[:-1])
+
+
+class ShapeEncoder(nn.Module):
+    """E(P0, theta): five layers, two on each point, three after pooling (paper eq. 5).
+
+    Points are pooled by an area-weighted mean, so neither their order nor their density matters. Pooled features are
+    standardised over the training shapes; what does not vary among them carries no information and is dropped.
+    """
+
+    def __init__(self, config: ModelConfig, latent: int) -> None:
+        super().__init__()
+        width = config.point_width
+        self.points = mlp([3, width, width], nn.SiLU)
+        hidden = config.encoder_width
+        self.head = mlp([width + config.parameters, hidden, hidden, latent], nn.SiLU)
+        self.register_buffer("pooled_mean", torch.zeros(width))
+        self.register_buffer("pooled_gain", torch.zeros(width))
+
+    def pool(self, points: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
+        """(N, 3) points in units of the body's size and (N,) weights summing to 1 -> (width,)."""
+        return weights @ self.points(points)
+
+    @torch.no_grad()
+    def standardise(self, shapes: list[tuple[torch.Tensor, torch.Tensor]]) -> None:
+        """Set the standardisation from the training shapes."""
+        pooled = torch.stack([self.pool(points, weights) for points, weights in shapes])
+        spread = pooled.std(dim=0, correction=0)
+        self.pooled_mean.copy_(pooled.mean(dim=0))
+        # the same body under several discretisations differs by about 1e-3: not a shape of its own
+        self.pooled_gain.copy_(torch.where(spread > 1e-2, 1.0 / spread.clamp_min(1e-12), 0.0))
+
+    def forward(self, pooled: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(B, width) pooled features and (B, P) parameters in [-1, 1] -> (B, latent)."""
+        features = (pooled - self.pooled_mean) * self.pooled_gain
+        return self.head(torch.cat([features, theta], dim=-1))
+
+
+class Field(nn.Module):
+    """dz/ds = f(z, theta), three tanh layers; its values are bounded, so states grow at most linearly in time."""
+
+    def __init__(self, inputs: int, width: int, latent: int) -> None:
+        super().__init__()
+        self.net = mlp([inputs, width, width, latent], nn.Tanh)
+
+    def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+        return self.net(inputs)
+
+
+class Decoder(nn.Module):
+    """Three layers beside a linear path; what a state moved since the start, so that y(0) = 0 exactly."""
+
+    def __init__(self, latent: int, width: int, outputs: int) -> None:
+        super().__init__()
+        self.linear = nn.Linear(latent, outputs, bias=False)
+        self.net = mlp([latent, width, width, outputs], nn.SiLU)
+
+    def forward(self, state: torch.Tensor) -> torch.Tensor:
+        return self.linear(state) + self.net(state)
+
+
+class ODeformNet(nn.Module):
+    """theta, P0 -> state(0); state -> slope; state -> y in whitened units.
+
+    `gains` (y,) turn whitened outputs to metres and radians; `time_scale` in seconds makes the field's unit of time.
+    """
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.config = config
+        c = config
+        if c.rigid:
+            self.rigid_encoder = ShapeEncoder(c, c.rigid_latent)
+            self.rigid_field = Field(c.rigid_latent + c.parameters, c.rigid_width, c.rigid_latent)
+            self.rigid_decoder = Decoder(c.rigid_latent, c.decoder_width, POSE)
+        self.local_encoder = ShapeEncoder(c, c.local_latent)
+        self.local_field = Field(c.state + c.parameters, c.local_width, c.local_latent)
+        self.local_decoder = Decoder(c.local_latent, c.decoder_width, c.modes)
+        self.register_buffer("gains", torch.ones(POSE + c.modes))
+        self.register_buffer("time_scale", torch.ones(()))
+
+    @property
+    def encoders(self) -> list[ShapeEncoder]:
+        return ([self.rigid_encoder] if self.config.rigid else []) + [self.local_encoder]
+
+    def encode(self, shape: tuple[torch.Tensor, torch.Tensor], theta: torch.Tensor) -> torch.Tensor:
+        """One shape (points (N, 3), weights (N,)) and (B, P) parameters -> (B, state)."""
+        return torch.cat(
+            [e(e.pool(*shape).expand(len(theta), -1), theta) for e in self.encoders],
+            dim=-1,
+        )
+
+    def slope(self, state: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(B, state), (B, P) -> d state / dt in 1/s. The local field sees the global state (paper, III-C)."""
+        slopes = [self.local_field(torch.cat([state, theta], dim=-1))]
+        if self.config.rigid:
+            rigid = state[..., : self.config.rigid_latent]
+            slopes.insert(0, self.rigid_field(torch.cat([rigid, theta], dim=-1)))
+        return torch.cat(slopes, dim=-1) / self.time_scale
+
+    def decode(self, state: torch.Tensor) -> torch.Tensor:
+        """(..., state) -> (..., 6 + K) whitened, not yet relative to the start."""
+        if not self.config.rigid:
+            local = self.local_decoder(state)
+            return torch.cat([torch.zeros_like(local[..., :1]).expand(*local.shape[:-1], POSE), local], dim=-1)
+        split = self.config.rigid_latent
+        return torch.cat([self.rigid_decoder(state[..., :split]), self.local_decoder(state[..., split:])], dim=-1)

@@ -1,0 +1,95 @@
+"""Reduced coordinates: a motion as a rigid pose and the coefficients of a displacement basis.
+
+In the scene's canonical frame (turned by minus the azimuth about the vertical axis through the anchor), a motion is
+
+    P(t) = anchor + Rz(a) [ R(w(t)) (x + sum_k c_k(t) phi_k(x)) + p(t) ],   x = Rz(-a) (P0 - anchor),
+
+with shift p (3) metres, rotation vector w (3) radians (unwrapped over several turns), and coefficients c (K). All
+models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P0 exact (paper eq. 4).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
+from odeform.model.basis import DisplacementBasis, fit_basis
+from odeform.types import Floats, Sequence
+
+__all__ = ["POSE", "ReducedSpace", "decompose", "fit_space", "rotation_of", "to_canonical"]
+
+POSE = 6  # numbers of the rigid part of y
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSpace:
+    """Where y lives: the `anchor` (3,) that rotations turn about, in metres, and the basis of deformations.
+
+    The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
+    displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
+    does the same for small rotation errors.
+    """
+
+    anchor: Floats
+    arm: float
+    basis: DisplacementBasis
+
+    @property
+    def size(self) -> int:
+        return POSE + self.basis.modes
+
+    def to_json(self) -> dict[str, object]:
+        return {"anchor": [float(x) for x in self.anchor], "arm": self.arm, "basis_scale": self.basis.scale}
+
+    def arrays(self) -> dict[str, Floats]:
+        return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
+
+    @classmethod
+    def from_parts(cls, data: dict[str, object], arrays: dict[str, Floats]) -> "ReducedSpace":
+        basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
+        return cls(np.array(data["anchor"], dtype=float), float(data["arm"]), basis)  # pyright: ignore
+
+
+def to_canonical(points: Floats, anchor: Floats, azimuth: float) -> Floats:
+    """(..., 3) points in the scene -> about the anchor, turned by minus the azimuth."""
+    return (np.asarray(points, dtype=float) - anchor) @ rotation_z(azimuth)
+
+
+def decompose(sequence: Sequence, anchor: Floats, azimuth: float) -> tuple[Floats, Floats]:
+    """Best-fit rigid motion and remaining deformation, in the canonical frame.
+
+    Returns `pose` (T, 6): shift of the anchor and rotation vector; `local` (T, N, 3): displacements in the body's
+    frame, metres, both zero in frame 0.
+    """
+    moved = to_canonical(sequence.vertices, anchor, azimuth)
+    rest = moved[0]
+    rotation, shift = best_rigid(rest, moved, sequence.weights)
+    centre = sequence.weights @ rest
+    shift = shift + centre - rotation @ centre  # the rotation turns about the anchor, not the centroid
+    local = np.einsum("tji,tnj->tni", rotation, moved - shift[:, None]) - rest
+    pose = np.concatenate([shift, unwrapped_vectors(rotation)], axis=1)
+    return pose, local
+
+
+def fit_space(
+    rest: Floats, locals_: list[Floats], weights: Floats, anchor: Floats, modes: int
+) -> tuple[ReducedSpace, list[Floats]]:
+    """POD of the training deformations (T, N, 3) over one topology, and its coordinate basis.
+
+    `rest` (N, 3) is canonical. Returns the space, and the coefficients (T, K) of each sequence.
+    """
+    root = np.sqrt(weights)[:, None]
+    snapshots = np.concatenate([(local * root).reshape(len(local), -1) for local in locals_])
+    covariance = snapshots.T @ snapshots
+    _, vectors = np.linalg.eigh(covariance)
+    vectors = vectors[:, ::-1][:, :modes]
+    shapes = vectors.reshape(len(rest), 3, -1) / root[..., None]
+    scale = float(np.sqrt((weights[:, None] * rest**2).sum()))
+    coefficients = [(local * root).reshape(len(local), -1) @ vectors for local in locals_]
+    return ReducedSpace(np.asarray(anchor, dtype=float), scale, fit_basis(rest, shapes, scale)), coefficients
+
+
+def rotation_of(pose: Floats, azimuth: float) -> tuple[Floats, Floats]:
+    """Pose (..., 6) -> rotation (..., 3, 3) from canonical to scene axes, shift (..., 3) in scene axes."""
+    turn = rotation_z(azimuth)
+    return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T

@@ -1,0 +1,40 @@
+"""Losses in millimetres, and their automatic weighting."""
+
+import torch
+from torch import nn
+
+from odeform.model.reduced import POSE
+
+__all__ = ["AutomaticWeights", "Metric"]
+
+
+class Metric(nn.Module):
+    """Squared errors of whitened reduced coordinates, in mm^2 of RMS displacement of the body.
+
+    Orthonormal modes make the sum over coefficients the mean over the points, exactly; a small turn |w| moves a round
+    body of radius of gyration r by sqrt(2/3) r |w| in RMS over axes.
+    """
+
+    def __init__(self, gains: torch.Tensor, arm: float) -> None:
+        super().__init__()
+        scale = 1e3 * gains.clone()
+        scale[3:POSE] *= arm * (2.0 / 3.0) ** 0.5
+        self.register_buffer("scale", scale)
+
+    def forward(self, predicted: torch.Tensor, truth: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """(..., 6 + K) whitened -> L_rigid and L_points, mean mm^2 a frame."""
+        squared = ((predicted - truth) * self.scale) ** 2
+        return squared[..., :POSE].sum(dim=-1).mean(), squared[..., POSE:].sum(dim=-1).mean()
+
+
+class AutomaticWeights(nn.Module):
+    """L = sum_i L_i / (2 s_i^2) + ln(1 + s_i^2) with learned s_i (Liebel & Koerner 2018; paper eq. 10)."""
+
+    def __init__(self, terms: int) -> None:
+        super().__init__()
+        self.log_scale = nn.Parameter(torch.full((terms,), 2.0))
+
+    def forward(self, *losses: torch.Tensor) -> torch.Tensor:
+        squared = torch.exp(2.0 * self.log_scale)
+        stacked = torch.stack(losses)
+        return (stacked / (2.0 * squared) + torch.log1p(squared)).sum()
