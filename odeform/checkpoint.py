@@ -46,7 +46,7 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
         "scores": checkpoint.scores,
     }
     metadata = {"odeform": FORMAT, "model": checkpoint.model, "meta": json.dumps(meta)}
-    data = save({name: np.ascontiguousarray(array) for name, array in checkpoint.arrays.items()}, metadata)
+    data = save({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}, metadata)
     write_aside(Path(path), data)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import expit
 
 from odeform.model.motion import SolveStats
-from odeform.model.network import ModelConfig
+from odeform.model.config import ModelConfig
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution

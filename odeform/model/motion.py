@@ -43,17 +43,22 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PlacedBasis:
-    """A geometry seen through a basis: canonical rest points (N, 3) and basis values (3 N, K), float32."""
+    """A geometry seen through a basis: its points in the scene and in canonical axes (N, 3), values (3 N, K); float32."""
 
+    points: Floats
     rest: Floats
     values: Floats
+    reach: Floats
+    """(K,) largest displacement of any point by each mode."""
 
 
 def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasis:
     """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
     rest = to_canonical(geometry.points, space.anchor, azimuth)
     values = space.basis.values(rest)
-    return PlacedBasis(rest.astype(np.float32), values.reshape(-1, space.basis.modes))
+    points = np.asarray(geometry.points, dtype=np.float32)
+    reach = np.sqrt((values**2).sum(axis=1).max(axis=0))
+    return PlacedBasis(points, rest.astype(np.float32), values.reshape(-1, space.basis.modes), reach)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +94,12 @@ class Motion:
         """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
         y = self._reduced(np.asarray(t))
         rotation, shift = self._rotation_shift(y)
-        body = self.placed.rest + self._deformation(y)
-        out = body @ rotation.swapaxes(-1, -2).astype(np.float32)
-        out += (shift + self.space.anchor)[:, None].astype(np.float32)
+        turned = rotation.swapaxes(-1, -2)
+        # as what moved since P0: the turn vanishes identically at rest, so that P(0) is P0 to the last bit
+        out = self.placed.rest @ (turned - self._to_canonical_axes).astype(np.float32)
+        out += self._deformation(y) @ turned.astype(np.float32)
+        out += shift[:, None].astype(np.float32)
+        out += self.placed.points
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Floats) -> Floats:
@@ -114,6 +122,11 @@ class Motion:
         assert isinstance(self.geometry, GaussianSplats)
         rotation = self.pose(t)[:3, :3]
         return rotation @ self.geometry.covariances @ rotation.T
+
+    def deformation_bound(self, time: float) -> float:
+        """No point is displaced locally by more than this at `time`, in metres."""
+        y = self._reduced(np.asarray(time))
+        return float(np.abs(y[0, 6:]) @ self.placed.reach)
 
     def deformation_rms(self, times: Floats) -> Floats:
         """(T,) root-mean-square local displacement of the points in metres."""

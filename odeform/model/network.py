@@ -4,35 +4,13 @@ Dual encoders of P0 and theta, two neural ODEs of which the local one sees the g
 state of 32 + 128 numbers per object, whatever the number of its points.
 """
 
-from dataclasses import dataclass
-
 import torch
 from torch import nn
 
+from odeform.model.config import ModelConfig
 from odeform.model.reduced import POSE
 
-__all__ = ["ModelConfig", "ODeformNet"]
-
-
-@dataclass(frozen=True)
-class ModelConfig:
-    """Sizes of the network."""
-
-    parameters: int
-    modes: int
-    rigid: bool = True
-    """Whether the scene has rigid motion; without, there is no rigid branch."""
-    rigid_latent: int = 32
-    local_latent: int = 128
-    point_width: int = 32
-    encoder_width: int = 128
-    rigid_width: int = 128
-    local_width: int = 256
-    decoder_width: int = 128
-
-    @property
-    def state(self) -> int:
-        return self.rigid_latent * self.rigid + self.local_latent
+__all__ = ["ODeformNet", "ShapeEncoder", "mlp"]
 
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:

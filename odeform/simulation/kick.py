@@ -11,11 +11,12 @@ from odeform.simulation.scene import Scene
 from odeform.simulation.shell import Material, ShellBody, relax_sphere, run, wall_thickness
 from odeform.types import Floats, Mesh, Sequence
 
-__all__ = ["GRAVITY", "MATERIAL", "PULSE", "RADIUS", "SCENE", "simulate"]
+__all__ = ["GRAVITY", "MATERIAL", "PULSE", "RADIUS", "SCENE", "STEP", "simulate"]
 
 RADIUS = 0.100  # m
 GRAVITY = 9.81  # m/s^2
 PULSE = 0.020  # s
+STEP = 5e-4  # s
 SPREAD = math.radians(25.0)  # angular width of the pulse around the struck point
 MATERIAL = Material(young=0.17e6, poisson=0.3, damping=0.003, friction=0.5, contact_time=0.002)
 
@@ -49,7 +50,7 @@ def pulse_weights(rest: Floats, elevation: float) -> Floats:
     return weights / weights.sum()
 
 
-def simulate(parameters: Parameters, rate: float | None = None, step: float = 5e-4, level: int = 2) -> Sequence:
+def simulate(parameters: Parameters, rate: float | None = None, step: float = STEP, level: int = 2) -> Sequence:
     """One motion over the scene's window, frames at `rate` Hz (default: the window's).
 
     The ball is an icosphere of 10 * 4^level + 2 vertices, oriented with the pulse: the heading is a symmetry of the
@@ -83,6 +84,7 @@ SCENE = Scene(
     schema=SCHEMA,
     simulate=simulate,
     rest_mesh=rest_mesh,
+    step=STEP,
     fixed={
         "radius_m": RADIUS,
         "gravity_m_s2": GRAVITY,

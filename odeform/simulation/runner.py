@@ -14,9 +14,9 @@ from odeform.simulation.shell import SimulationError
 __all__ = ["simulate_dataset"]
 
 
-def _one(scene_name: str, entry: Entry, root: Path, rate: float | None) -> Entry:
+def _one(scene_name: str, entry: Entry, root: Path, rate: float, step: float) -> Entry:
     try:
-        sequence = get_scene(scene_name).simulate(entry.parameters, rate=rate)
+        sequence = get_scene(scene_name).simulate(entry.parameters, rate=rate, step=step)
     except SimulationError as error:
         return replace(entry, status=str(error))
     return replace(entry, sha256=save_sequence(root, entry.name, sequence))
@@ -34,13 +34,23 @@ def _finished(root: Path, plan: list[Entry], provenance: dict[str, object]) -> d
 
 
 def simulate_dataset(
-    scene_name: str, out: str | Path, count: int, seed: int = 0, workers: int = 1, rate: float | None = None
+    scene_name: str,
+    out: str | Path,
+    count: int,
+    seed: int = 0,
+    workers: int = 1,
+    rate: float | None = None,
+    step: float | None = None,
 ) -> Dataset:
-    """Simulate `count` sequences of a scene into the folder `out`; continues where an earlier run stopped."""
+    """Simulate `count` sequences of a scene into the folder `out`; continues where an earlier run stopped.
+
+    `rate` in Hz and `step` in seconds default to the scene's own.
+    """
     scene: Scene = get_scene(scene_name)
     root = Path(out)
     rate = rate or scene.schema.window.rate
-    provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate}
+    step = step or scene.step
+    provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
     plan = [
         Entry(f"{scene_name}_{index:05d}", split, parameters)
         for index, (parameters, split) in enumerate(
@@ -58,7 +68,7 @@ def simulate_dataset(
         return dataset
 
     root.mkdir(parents=True, exist_ok=True)
-    jobs = (delayed(_one)(scene_name, entry, root, rate) for entry in todo)
+    jobs = (delayed(_one)(scene_name, entry, root, rate, step) for entry in todo)
     for entry in Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
         done[entry.name] = entry
         index()

@@ -25,6 +25,8 @@ class Scene:
     schema: Schema
     simulate: Callable[..., Sequence]
     rest_mesh: Callable[[], Mesh]
+    step: float
+    """The simulator's time step in seconds that this scene calls its truth."""
     fixed: dict[str, float] = field(default_factory=dict)
 
     def sample(self, count: int, seed: int) -> list[dict[str, float]]:

@@ -12,7 +12,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from odeform.model.network import ModelConfig, ODeformNet, mlp
+from odeform.model.config import ModelConfig
+from odeform.model.network import ODeformNet, mlp
 from odeform.model.reduced import POSE
 from odeform.solver.adjoint import solve_backprop
 from odeform.solver.integrate import Quality
@@ -30,11 +31,11 @@ class TrainConfig:
     minutes: float = 30.0
     """Wall time."""
     seed: int = 0
-    batch: int = 45
+    batch: int = 60
     """Sequences in a step."""
     segment: int = 10
     """Frames of a shooting segment."""
-    shooting: float = 0.4
+    shooting: float = 0.05
     """Share of the time for multiple shooting."""
     rate: float = 2e-3
     """Learning rate at the start of each phase; falls by a cosine to nothing."""
@@ -117,16 +118,19 @@ class _Trainer:
         return tuple(float((loss / 3.0).sqrt()) for loss in losses)  # pyright: ignore[reportReturnType]
 
     def phase(self, seconds: float, shooting: bool, report: Callable[[str], None]) -> None:
-        modules = [self.net, self.balance, *([self.starter] if shooting else [])]
+        modules = [self.net, *([self.starter] if shooting else [])]
         weights = [p for module in modules for p in module.parameters()]
-        optimiser = torch.optim.AdamW(weights, lr=self.config.rate, weight_decay=1e-4)
+        balance = {"params": list(self.balance.parameters()), "weight_decay": 0.0}
+        optimiser = torch.optim.AdamW([{"params": weights}, balance], lr=self.config.rate, weight_decay=1e-4)
         total = self.truth["train"].shape[1] - 1
         begin = printed = time.monotonic()
         steps = 0
         while (elapsed := time.monotonic() - begin) < seconds:
             share = elapsed / seconds
             warm = min(1.0, steps / 20.0)
-            optimiser.param_groups[0]["lr"] = warm * self.config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
+            rate = warm * self.config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
+            optimiser.param_groups[0]["lr"] = rate
+            optimiser.param_groups[1]["lr"] = rate * AutomaticWeights.RATE
             rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.config.batch]
             if shooting:
                 loss = self.shooting_loss(rows)

@@ -28,13 +28,24 @@ class Metric(nn.Module):
 
 
 class AutomaticWeights(nn.Module):
-    """L = sum_i L_i / (2 s_i^2) + ln(1 + s_i^2) with learned s_i (Liebel & Koerner 2018; paper eq. 10)."""
+    """L = sum_i L_i / (2 s_i^2) + ln(1 + s_i^2), learned s_i (Liebel & Koerner 2018; paper eq. 10).
+
+    The s_i start at what the first losses ask for: rigid and local errors differ by six orders of magnitude in mm^2,
+    and from a common start the smaller one would not be learned for thousands of steps.
+    """
+
+    RATE = 20.0
+    """Learning rate of the s_i relative to the network's: they have to follow losses that fall by orders."""
 
     def __init__(self, terms: int) -> None:
         super().__init__()
-        self.log_scale = nn.Parameter(torch.full((terms,), 2.0))
+        self.log_scale = nn.Parameter(torch.zeros(terms))
+        self._started = False
 
     def forward(self, *losses: torch.Tensor) -> torch.Tensor:
-        squared = torch.exp(2.0 * self.log_scale)
         stacked = torch.stack(losses)
+        if not self._started:
+            self._started = True
+            self.log_scale.data = 0.5 * torch.log(0.5 * stacked.detach() + 1e-6)
+        squared = torch.exp(2.0 * self.log_scale)
         return (stacked / (2.0 * squared) + torch.log1p(squared)).sum()

@@ -1,0 +1,204 @@
+"""The `odeform` command."""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from odeform.errors import InputError
+
+__all__ = ["main", "run_guarded"]
+
+
+def run_guarded(work: Callable[[], None]) -> int:
+    """Exit codes of all commands: 2 and one line when the input is at fault, 130 when interrupted."""
+    try:
+        work()
+    except (InputError, OSError) as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted; what was finished is kept", file=sys.stderr)
+        return 130
+    return 0
+
+
+def parse_settings(pairs: Sequence[str]) -> dict[str, str]:
+    """NAME=VALUE ... -> values as given; the schema turns them to numbers."""
+    settings = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise InputError(f"--set: expected NAME=VALUE, got {pair!r}")
+        settings[name] = value
+    return settings
+
+
+def parse_window(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    try:
+        begin, end = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--window: expected A:B in frames, got {text!r}") from None
+    if not 0 <= begin < end:
+        raise InputError(f"--window: expected 0 <= A < B, got {text!r}")
+    return begin, end
+
+
+def _emit(result: dict[str, Any], path: str | None) -> None:
+    from odeform.dataset.store import write_aside
+
+    if path:
+        write_aside(Path(path), json.dumps(result, indent=1).encode())
+    else:
+        print(json.dumps(result, indent=1))
+
+
+def _simulate(args: argparse.Namespace) -> None:
+    try:
+        from odeform.simulation.runner import simulate_dataset
+    except ModuleNotFoundError as error:
+        raise InputError(f"simulation needs {error.name}: pip install 'odeform[simulate]'") from None
+    if args.count < 1 or args.workers < 1 or (args.rate is not None and not args.rate > 0):
+        raise InputError("simulate: expected --count and --workers of at least 1 and a positive --rate")
+    dataset = simulate_dataset(args.scene, args.out, args.count, args.seed, args.workers, args.rate)
+    failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
+    print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
+
+
+def _train(args: argparse.Namespace) -> None:
+    from odeform.dataset.store import open_dataset
+    from odeform.simulation.scene import get_scene
+    from odeform.training.train import TrainRequest, train
+
+    dataset = open_dataset(args.dataset)
+    rest = get_scene(dataset.schema.scene).rest_mesh()
+    request = TrainRequest(args.model, args.seed, args.minutes, parse_window(args.window), args.every)
+    train(dataset, (rest.points, rest.faces), args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
+
+
+def _evaluate(args: argparse.Namespace) -> None:
+    from odeform.dataset.store import open_dataset
+    from odeform.evaluation.metrics import evaluate
+    from odeform.predictor import load
+
+    dataset, window = open_dataset(args.data), parse_window(args.window)
+    models = {}
+    for name in args.checkpoints:
+        predictor = load(name)
+        key = predictor.model if predictor.model not in models else name
+        models[key] = evaluate(predictor, dataset, args.split, window)
+    result = {"data": args.data, "split": args.split, "window": window, "models": models}
+    if args.json:
+        _emit(result, args.json)
+    columns = ("rmse_pooled_mm", "rmse_mm", "mae_mm", "vertex_mm", "relative", "deformation_relative")
+    print(f"{'model':<16}" + "".join(f"{column:>22}" for column in columns))
+    for key, scores in models.items():
+        print(f"{key:<16}" + "".join(f"{scores[column]:>22.4g}" for column in columns))
+
+
+def _predict(args: argparse.Namespace) -> None:
+    from odeform.export import parse_times, write_motion
+    from odeform.geometry.reading import read_geometry
+    from odeform.geometry.shape import fit_to
+    from odeform.predictor import load
+
+    predictor = load(args.checkpoint)
+    times = predictor.schema.window.times if args.times is None else parse_times(args.times)
+    geometry = fit_to(read_geometry(args.geometry), predictor.rest).geometry if args.geometry else None
+    motion = predictor.solve(geometry, parse_settings(args.set), args.quality, until=float(times[-1]))
+    write_motion(motion, times, args.out)
+    for name in motion.outside:
+        print(f"note: {name} = {motion.parameters[name]:g} is outside the trained range", file=sys.stderr)
+    print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {motion.stats.status}")
+
+
+def _info(args: argparse.Namespace) -> None:
+    from odeform.checkpoint import read_checkpoint, resolve_checkpoint
+
+    checkpoint = read_checkpoint(resolve_checkpoint(args.checkpoint))
+    config = {k: v for k, v in checkpoint.config.items() if k != "trials"}
+    result = {
+        "schema": checkpoint.schema.to_json(),
+        "model": checkpoint.model,
+        "size_bytes": checkpoint.size_bytes,
+        "numbers": sum(int(array.size) for array in checkpoint.arrays.values()),
+        "config": config,
+        "provenance": checkpoint.provenance,
+        "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
+        "sha256": checkpoint.sha256,
+    }
+    _emit(result, args.json)
+
+
+def _bench(args: argparse.Namespace) -> None:
+    from odeform.evaluation.bench import bench, report
+
+    result = bench(args.checkpoint)
+    if args.json:
+        _emit(result, args.json)
+    print(report(result))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="odeform", description="Learned continuous motion of soft bodies.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def command(name: str, run: Callable[[argparse.Namespace], None], text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(run=run)
+        return sub
+
+    sub = command("simulate", _simulate, "simulate a data set of a scene (needs odeform[simulate])")
+    sub.add_argument("scene", help="kick")
+    sub.add_argument("--out", required=True, metavar="DIR")
+    sub.add_argument("--count", type=int, default=256, metavar="N", help="sequences (default 256)")
+    sub.add_argument("--seed", type=int, default=0, metavar="S")
+    sub.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W")
+    sub.add_argument("--rate", type=float, metavar="HZ", help="frames a second (default: the scene's)")
+
+    sub = command("train", _train, "train a model on a data set and score it on the test split")
+    sub.add_argument("dataset", metavar="DATASET")
+    sub.add_argument("--out", required=True, metavar="FILE")
+    sub.add_argument("--model", default="odeform", metavar="NAME", help="odeform (default), pod-rbf, nearest")
+    sub.add_argument("--window", metavar="A:B", help="frames to train on, half-open")
+    sub.add_argument("--every", type=int, default=1, metavar="K", help="train on every k-th frame")
+    sub.add_argument("--seed", type=int, default=0, metavar="S")
+    sub.add_argument("--minutes", type=float, default=30.0, metavar="M", help="wall time (default 30)")
+
+    sub = command("evaluate", _evaluate, "score checkpoints on a data set")
+    sub.add_argument("checkpoints", nargs="+", metavar="CKPT")
+    sub.add_argument("--data", required=True, metavar="DATASET")
+    sub.add_argument("--split", default="test", choices=("train", "val", "test", "all"))
+    sub.add_argument("--window", metavar="A:B", help="frames to score, half-open")
+    sub.add_argument("--json", metavar="FILE")
+
+    sub = command("predict", _predict, "predict one motion and write it to a file")
+    sub.add_argument("checkpoint", metavar="CKPT")
+    sub.add_argument("--out", required=True, metavar="FILE", help=".npz, or .ply with {frame} in its name")
+    sub.add_argument("--geometry", metavar="FILE", help="a mesh, points or splats; fitted to the trained body")
+    sub.add_argument("--set", nargs="*", action="extend", default=[], metavar="NAME=VALUE")
+    sub.add_argument("--times", metavar="START:STOP:STEP", help="seconds, half-open (default: the trained frames)")
+    sub.add_argument("--quality", default="balanced", metavar="NAME")
+
+    sub = command("bench", _bench, "measure latency and compare with peers on this machine")
+    sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
+    sub.add_argument("--json", metavar="FILE")
+
+    sub = command("info", _info, "print what a checkpoint holds")
+    sub.add_argument("checkpoint", metavar="CKPT")
+    sub.add_argument("--json", metavar="FILE")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    args = _parser().parse_args(argv)
+    return run_guarded(lambda: args.run(args))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

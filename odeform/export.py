@@ -1,0 +1,68 @@
+"""A motion sampled into frames, and the files that take frames."""
+
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from odeform.dataset.store import write_aside
+from odeform.errors import InputError
+from odeform.model.motion import Motion
+from odeform.types import Floats, GaussianSplats, Mesh
+
+__all__ = ["parse_times", "write_motion"]
+
+LIMIT = 1_000_000  # frames
+
+
+def parse_times(text: str) -> Floats:
+    """START:STOP:STEP in seconds, half-open, like `numpy.arange`."""
+    try:
+        start, stop, step = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"times: expected START:STOP:STEP in seconds, got {text!r}") from None
+    if not (np.isfinite([start, stop, step]).all() and step > 0.0 and 0.0 <= start < stop):
+        raise InputError(f"times: expected 0 <= START < STOP and STEP > 0, got {text!r}")
+    if (stop - start) / step > LIMIT:
+        raise InputError(f"times: {text!r} asks for more than {LIMIT} frames")
+    return np.arange(start, stop, step)
+
+
+def write_motion(motion: Motion, times: Floats, out: str | Path) -> None:
+    """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name."""
+    path = Path(out)
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        write_aside(path, _npz(motion, times))
+    elif suffix == ".ply" and "{frame}" in path.name:
+        for frame, time in enumerate(times):
+            write_aside(path.with_name(path.name.format(frame=f"{frame:05d}")), _ply(motion, float(time)))
+    else:
+        raise InputError(f"--out {out}: expected a name ending in .npz, or in .ply with {{frame}} in it")
+
+
+def _npz(motion: Motion, times: Floats) -> bytes:
+    geometry = motion.geometry
+    arrays = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
+    frames = motion.vertices(times)
+    if isinstance(geometry, GaussianSplats):
+        arrays["centers"] = frames
+        arrays["covariances"] = np.stack([motion.covariances(float(t)) for t in times]).astype(np.float32)
+    else:
+        arrays["vertices"] = frames
+        arrays["faces"] = np.asarray(geometry.faces if isinstance(geometry, Mesh) else np.zeros((0, 3)), dtype=np.int32)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _ply(motion: Motion, time: float) -> bytes:
+    vertices = motion.vertices(time)
+    if isinstance(motion.geometry, Mesh):
+        shape: trimesh.Trimesh | trimesh.PointCloud = trimesh.Trimesh(vertices, motion.geometry.faces, process=False)
+    else:
+        shape = trimesh.PointCloud(vertices)
+    data = shape.export(file_type="ply")
+    return data if isinstance(data, bytes) else str(data).encode()

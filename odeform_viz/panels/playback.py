@@ -1,0 +1,85 @@
+"""Time: a slider past the trained window, play and pause, speed, steps."""
+
+from collections.abc import Callable
+
+import viser
+
+from odeform.schema import Window
+from odeform_viz.clock import Clock
+
+__all__ = ["PlaybackPanel"]
+
+SPEEDS = {"true speed": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/50": 0.02}
+REACH = 1.5  # windows that the time slider spans
+
+
+class PlaybackPanel:
+    """Drives a clock. A hand on the time slider stops the playing; the slider follows the clock otherwise."""
+
+    def __init__(
+        self, server: viser.ViserServer, window: Window, clock: Clock, wake: Callable[[], None], largest: Callable[[], float]
+    ) -> None:
+        self._clock, self._wake, self._window = clock, wake, window
+        span = window.stop - window.start
+        with server.gui.add_folder("Time"):
+            self._time = server.gui.add_slider(
+                "time (s)",
+                min=window.start,
+                max=round(window.start + REACH * span, 4),
+                step=0.0005,
+                initial_value=window.start,
+                marks=((window.start, f"{window.start:g}"), (window.stop, f"trained to {window.stop:g}")),
+                hint="beyond the trained window the motion is extrapolated",
+            )
+            self._time.on_update(self._dragged)
+            self._play = server.gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+            self._play.on_click(lambda _: self.toggle())
+            step = server.gui.add_button_group("step", ("start", "◀ frame", "frame ▶"))
+            step.on_click(lambda event: self._step(event.target.value))
+            self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
+            self._speed.on_update(lambda _: self._changed())
+            self._loop = server.gui.add_checkbox("loop", initial_value=True)
+            self._loop.on_update(lambda _: self._changed())
+            peak = server.gui.add_button("Largest deformation", hint="jump to the moment of the largest deformation")
+            peak.on_click(lambda _: self._jump(largest()))
+        self._changed()
+
+    def _dragged(self, event: viser.GuiEvent) -> None:
+        if event.client is not None:  # a hand, not the clock
+            self._clock.pause()
+            self._clock.seek(self._time.value)
+            self._refresh_button()
+            self._wake()
+
+    def _changed(self) -> None:
+        self._clock.set_speed(SPEEDS.get(self._speed.value, 0.2))
+        self._clock.loop = bool(self._loop.value)
+        self._wake()
+
+    def toggle(self) -> None:
+        self._clock.pause() if self._clock.playing else self._clock.play()
+        self._refresh_button()
+        self._wake()
+
+    def _step(self, which: str) -> None:
+        frame = 1.0 / self._window.rate
+        index = round((self._clock.time() - self._window.start) / frame)
+        target = {"start": 0, "◀ frame": index - 1, "frame ▶": index + 1}.get(which, index)
+        self._jump(self._window.start + max(target, 0) * frame)
+
+    def _jump(self, moment: float) -> None:
+        self._clock.pause()
+        self._clock.seek(min(max(moment, self._time.min), self._time.max))
+        self._refresh_button()
+        self._wake()
+
+    def _refresh_button(self) -> None:
+        playing = self._clock.playing
+        self._play.label = "Pause" if playing else "Play"
+        self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+
+    def show(self, moment: float) -> None:
+        """Let the slider follow; called by the worker."""
+        self._time.value = min(max(round(moment, 4), self._time.min), self._time.max)
+        if self._play.label == "Pause" and not self._clock.playing:
+            self._refresh_button()

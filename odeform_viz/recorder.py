@@ -1,0 +1,124 @@
+"""Frames -> Rerun. One recording a session; static topology, moving positions."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from odeform.errors import InputError
+from odeform.types import Floats, Mesh
+from odeform_viz.session import Column, ColumnFrame, Frame
+
+__all__ = ["Recorder"]
+
+SHOWN = "shown"  # timeline: index of the frame on screen
+MOTION = "motion_time"  # timeline: seconds of the motion
+
+
+class Recorder:
+    """Logs every published frame to a file. Use from one thread: Rerun's clock is thread-local."""
+
+    def __init__(self, path: str | Path, columns: Sequence[Column]) -> None:
+        path = Path(path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("ab"):
+                pass
+        except OSError as error:
+            raise InputError(f"recording {path}: cannot be written: {error.strerror}") from None
+        self._columns = columns
+        self._stream = rr.RecordingStream("odeform")
+        self._stream.save(str(path), default_blueprint=_blueprint(columns))
+        self._index = 0
+        self._poses: list[Floats | None] = [None] * len(columns)
+        for index, column in enumerate(columns):
+            self._log_static(index, column)
+
+    def _log_static(self, index: int, column: Column) -> None:
+        checkpoint = column.predictor.checkpoint
+        provenance = {
+            "label": column.label,
+            "model": checkpoint.model,
+            "sha256": checkpoint.sha256,
+            "schema": checkpoint.schema.to_json(),
+            "provenance": checkpoint.provenance,
+            "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
+        }
+        text = rr.TextDocument(f"```json\n{json.dumps(provenance, indent=1)}\n```", media_type=rr.MediaType.MARKDOWN)
+        self._stream.log(f"provenance/{column.label}", text, static=True)
+        geometry = column.geometry
+        if isinstance(geometry, Mesh):
+            self._stream.log(
+                f"world/{column.label}/body",
+                rr.Mesh3D.from_fields(triangle_indices=geometry.faces, albedo_factor=[236, 112, 60, 255]),
+                static=True,
+            )
+        if index == 0:
+            self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+    def log(self, frame: Frame) -> None:
+        self._stream.set_time(SHOWN, sequence=self._index)
+        self._stream.set_time(MOTION, duration=frame.wish.time)
+        self._index += 1
+        for name, value in frame.wish.parameters.items():
+            self._stream.log(f"parameters/{name}", rr.Scalars(value))
+        for column, shown in zip(self._columns, frame.columns, strict=True):
+            if shown is not None:
+                self._log_column(column, shown, frame.wish.time)
+
+    def _log_column(self, column: Column, shown: ColumnFrame, time: float) -> None:
+        path = f"world/{column.label}/body"
+        points = shown.motion.vertices(time) if shown.points is None else shown.points
+        if isinstance(column.geometry, Mesh):
+            normals = _normals(points, column.geometry.faces)
+            self._stream.log(path, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
+        else:
+            self._stream.log(path, rr.Points3D(points))
+        pose = shown.pose
+        self._stream.log(f"pose/{column.label}", rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        stats = shown.stats
+        numbers = {
+            "evaluations": stats.evaluations,
+            "solve_ms": stats.wall_ms,
+            "solver_error_mm": stats.solver_error_mm,
+            "height_m": float(points[:, 2].mean()),
+        }
+        for name, value in numbers.items():
+            if value is not None:
+                self._stream.log(f"statistics/{column.label}/{name}", rr.Scalars(value))
+
+    def close(self) -> None:
+        self._stream.flush()
+        self._stream.disconnect()
+
+
+def _normals(points: Floats, faces: Floats) -> Floats:
+    """(N, 3) area-weighted vertex normals; a mesh without them is drawn unlit."""
+    corners = points[faces]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.zeros_like(points)
+    for corner in range(3):
+        np.add.at(total, faces[:, corner], face)
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-20)
+
+
+def _blueprint(columns: Sequence[Column]) -> rrb.Blueprint:
+    views = [
+        rrb.Spatial3DView(origin="world", contents=[f"world/{column.label}/**"], name=column.label) for column in columns
+    ]
+    return rrb.Blueprint(
+        rrb.Vertical(
+            rrb.Horizontal(*views),
+            rrb.Horizontal(
+                rrb.TimeSeriesView(origin="parameters", name="parameters"),
+                rrb.TimeSeriesView(origin="statistics", name="statistics"),
+                rrb.TextDocumentView(origin=f"provenance/{columns[0].label}", name="provenance"),
+            ),
+            row_shares=[3, 2],
+        ),
+        rrb.TimePanel(timeline=SHOWN, state="collapsed"),
+        collapse_panels=True,
+    )

@@ -1,0 +1,179 @@
+"""Frames -> viser handles: columns side by side under one camera, the floor, the pulse."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+import viser.transforms as vtf
+
+from odeform.geometry.rigid import rotation_z
+from odeform.model.motion import Motion
+from odeform.types import Floats, GaussianSplats, Mesh
+from odeform_viz.session import Column, ColumnFrame, Frame
+
+__all__ = ["SceneView"]
+
+COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (90, 90, 90))
+ARROW = (214, 48, 48)
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
+
+
+class _ColumnView:
+    """The nodes of one column. The body's node carries the pose when that says it all, else its points move."""
+
+    def __init__(self, server: viser.ViserServer, root: str, column: Column, color: tuple[int, int, int]) -> None:
+        self._server, self._geometry = server, column.geometry
+        geometry, points = column.geometry, np.asarray(column.geometry.points, dtype=np.float32)
+        scene = server.scene
+        # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
+        self._scale = 0.01 if isinstance(geometry, GaussianSplats) else 1.0
+        if isinstance(geometry, Mesh):
+            self._body = scene.add_mesh_simple(f"{root}/body", points, geometry.faces, color=color)
+        elif isinstance(geometry, GaussianSplats):
+            self._body = scene.add_gaussian_splats(
+                f"{root}/body",
+                points / self._scale,
+                (geometry.covariances / self._scale**2).astype(np.float32),
+                geometry.colors.astype(np.float32),
+                geometry.opacities[:, None].astype(np.float32),
+                scale=self._scale,
+            )
+        else:
+            self._body = scene.add_point_cloud(f"{root}/body", points, color, point_size=0.003)
+        self._resting = True
+        self._path: viser.SceneNodeHandle | None = None
+        self._root, self._color = root, color
+
+    def show(self, frame: ColumnFrame) -> None:
+        if frame.points is None:
+            if not self._resting:
+                self._send(np.asarray(self._geometry.points, dtype=np.float32), None)
+                self._resting = True
+            self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
+            self._body.position = frame.pose[:3, 3]
+            return
+        if self._resting:
+            self._body.wxyz, self._body.position = IDENTITY, (0.0, 0.0, 0.0)
+            self._resting = False
+        self._send(frame.points, frame.covariances)
+
+    def _send(self, points: Floats, covariances: Floats | None) -> None:
+        if isinstance(self._body, viser.MeshHandle):
+            self._body.vertices = points
+        elif isinstance(self._geometry, GaussianSplats):
+            kept = self._geometry.covariances if covariances is None else covariances
+            self._body.set_gaussians(  # pyright: ignore[reportAttributeAccessIssue]
+                centers=points / self._scale,
+                covariances=(kept / self._scale**2).astype(np.float32),
+                rgbs=self._geometry.colors.astype(np.float32),
+                opacities=self._geometry.opacities[:, None].astype(np.float32),
+            )
+        else:
+            self._body.points = points  # pyright: ignore[reportAttributeAccessIssue]
+
+    def show_path(self, motion: Motion) -> None:
+        """The way of the body's centre over the trained window."""
+        window = motion.schema.window
+        poses = motion.pose(np.linspace(window.start, window.stop, 61))
+        centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
+        way = poses[:, :3, :3] @ centre + poses[:, :3, 3]
+        segments = np.stack([way[:-1], way[1:]], axis=1).astype(np.float32)
+        self._path = self._server.scene.add_line_segments(
+            f"{self._root}/path", segments, colors=np.array(self._color, dtype=np.uint8), line_width=2.0
+        )
+
+
+class SceneView:
+    """Everything in the viewport."""
+
+    def __init__(self, server: viser.ViserServer, columns: Sequence[Column]) -> None:
+        self._server, self._columns = server, columns
+        self.follow = True
+        extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
+        self._gap, self._size = 1.6 * extent, extent
+        self._set_stage()
+        self._frames, self._views = [], []
+        for index, column in enumerate(columns):
+            root = f"/world/column_{index}"
+            self._frames.append(server.scene.add_frame(root, show_axes=False, position=self._place(index)))
+            self._views.append(_ColumnView(server, root, column, COLORS[index % len(COLORS)]))
+            if len(columns) > 1:
+                above = np.asarray(column.geometry.points).max(axis=0)[2] + 0.35 * extent
+                server.scene.add_label(f"{root}/label", column.label, position=(0.0, 0.0, above))
+        self._motions: list[Motion | None] = [None] * len(columns)
+
+    def _place(self, index: int) -> tuple[float, float, float]:
+        """Columns stand in a row across the default heading, from left to right."""
+        return (0.0, self._gap * (0.5 * (len(self._columns) - 1) - index), 0.0)
+
+    def _set_stage(self) -> None:
+        server, size = self._server, self._size
+        wide = 1.0 + 0.45 * (len(self._columns) - 1)
+        server.scene.set_up_direction("+z")
+        server.initial_camera.position = (-3.9 * size * wide, -2.6 * size * wide, 1.9 * size * wide)
+        # the panel covers the right third of the view: look past the body's right side
+        server.initial_camera.look_at = (0.3 * size, -0.45 * size, 0.45 * size)
+        server.initial_camera.fov = 0.7
+        self._world = server.scene.add_frame("/world", show_axes=False)
+        server.scene.add_grid(
+            "/world/floor",
+            infinite_grid=True,
+            cell_size=0.1,
+            section_size=0.5,
+            cell_color=(205, 208, 214),
+            section_color=(150, 156, 168),
+            fade_distance=60.0 * size,
+            shadow_opacity=0.35,
+            plane_color=(243, 244, 247),
+            plane_opacity=1.0,
+        )
+
+    def publish(self, frame: Frame) -> None:
+        """Send one frame, whole: clients never see half of it."""
+        with self._server.atomic():
+            for index, column in enumerate(frame.columns):
+                self._frames[index].visible = column is not None
+                if column is None:
+                    continue
+                if self._motions[index] is not column.motion:
+                    self._motions[index] = column.motion
+                    self._views[index].show_path(column.motion)
+                    self._show_pulse(index, column.motion)
+                self._views[index].show(column)
+            self._world.position = self._offset(frame)
+        self._server.flush()
+
+    def _offset(self, frame: Frame) -> tuple[float, float, float]:
+        """Following moves the world past the camera, which stays in the user's hand."""
+        first = next((column for column in frame.columns if column is not None), None)
+        if not self.follow or first is None:
+            return (0.0, 0.0, 0.0)
+        centre = np.asarray(first.motion.geometry.points, dtype=float).mean(axis=0)
+        moved = first.pose[:3, :3] @ centre + first.pose[:3, 3] - centre
+        return (-float(moved[0]), -float(moved[1]), 0.0)
+
+    def _show_pulse(self, index: int, motion: Motion) -> None:
+        """The push, on the side where it drives the body, as long as it is strong; only scenes with a force have one.
+
+        It acts on the far side, low at the back, where the floor would hide most of an arrow.
+        """
+        parameters = motion.parameters
+        if not {"force", "elevation"} <= set(parameters):
+            return
+        elevation = parameters["elevation"]
+        heading = rotation_z(motion.schema.azimuth(parameters))
+        direction = heading @ np.array([np.cos(elevation), 0.0, np.sin(elevation)])
+        points = np.asarray(motion.geometry.points, dtype=float)
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        start = centre + 0.55 * self._size * direction
+        force = next(p for p in motion.schema.parameters if p.name == "force")
+        length = self._size * max(parameters["force"], 0.0) / force.high
+        shaft = np.array([[start, start + length * direction]], dtype=np.float32)
+        self._server.scene.add_arrows(
+            f"/world/column_{index}/pulse",
+            shaft,
+            ARROW,
+            shaft_radius=0.02 * self._size,
+            head_radius=0.055 * self._size,
+            head_length=0.12 * self._size,
+        )

@@ -1,0 +1,48 @@
+"""One thread that serves the newest wish. Callbacks only wake it, so nothing stale is ever shown."""
+
+import threading
+import traceback
+from collections.abc import Callable
+
+__all__ = ["Worker"]
+
+
+class Worker:
+    """Calls `serve` whenever woken, however often that was while it was busy: once, with the newest state.
+
+    `serve` returns the seconds after which it wants to be called again, or None to sleep until woken.
+    """
+
+    def __init__(self, serve: Callable[[], float | None]) -> None:
+        self._serve = serve
+        self._awake = threading.Event()
+        self._running = True
+        self._thread = threading.Thread(target=self._loop, name="odeform-worker", daemon=True)
+
+    def start(self) -> None:
+        self._awake.set()
+        self._thread.start()
+
+    def wake(self) -> None:
+        self._awake.set()
+
+    def stop(self) -> None:
+        """Finish the round under way and end the thread."""
+        self._running = False
+        self._awake.set()
+        if self._thread.is_alive():
+            self._thread.join(timeout=5.0)
+
+    def _loop(self) -> None:
+        pause: float | None = None
+        while True:
+            self._awake.wait(pause)
+            self._awake.clear()  # before reading the wishes: one that comes later wakes the next round
+            if not self._running:
+                return
+            try:
+                pause = self._serve()
+            except Exception:
+                # an internal error must not end the session; the last good frame stays
+                traceback.print_exc()
+                pause = None

@@ -1,0 +1,39 @@
+"""Shared fixtures: a small real data set, simulated once, and a model trained on it for seconds."""
+
+from pathlib import Path
+
+import pytest
+
+from odeform.dataset.store import Dataset
+from odeform.predictor import Predictor, load
+from odeform.simulation.runner import simulate_dataset
+from odeform.simulation.scene import get_scene
+from odeform.training.train import TrainRequest, train
+
+
+@pytest.fixture(scope="session")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Ten coarse kicks: really simulated, at a larger step than the scene's own."""
+    return simulate_dataset("kick", tmp_path_factory.mktemp("kick"), count=10, seed=3, workers=2, step=2e-3)
+
+
+@pytest.fixture(scope="session")
+def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A checkpoint of every model, each trained on the small data set."""
+    root, rest, paths = tmp_path_factory.mktemp("models"), get_scene("kick").rest_mesh(), {}
+    for model in ("odeform", "pod-rbf", "nearest"):
+        paths[model] = root / f"{model}.safetensors"
+        request = TrainRequest(model, seed=1, minutes=0.15)
+        train(dataset, (rest.points, rest.faces), paths[model], request, lambda _: None)
+    return paths
+
+
+@pytest.fixture(scope="session")
+def predictors(trained: dict[str, Path]) -> dict[str, Predictor]:
+    return {model: load(path) for model, path in trained.items()}
+
+
+@pytest.fixture(scope="session")
+def kick() -> Predictor:
+    """The bundled model."""
+    return load("kick")
