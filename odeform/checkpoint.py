@@ -13,7 +13,7 @@ from safetensors.numpy import load, save
 from odeform.dataset.store import write_aside
 from odeform.errors import InputError
 from odeform.schema import Schema
-from odeform.types import Floats
+from odeform.types import Arrays
 
 __all__ = ["Checkpoint", "bundled_checkpoints", "read_checkpoint", "resolve_checkpoint", "write_checkpoint"]
 
@@ -31,7 +31,7 @@ class Checkpoint:
     model: str
     schema: Schema
     config: dict[str, Any]
-    arrays: dict[str, Floats]
+    arrays: Arrays
     provenance: dict[str, Any] = field(default_factory=dict)
     scores: dict[str, Any] = field(default_factory=dict)
     sha256: str = ""
@@ -62,7 +62,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     try:
         arrays = load(data)
         header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-    except (SafetensorError, ValueError):
+    except (SafetensorError, KeyError, ValueError):
         raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
     metadata = header.get("__metadata__", {})
     if metadata.get("odeform") != FORMAT:
@@ -79,7 +79,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
             sha256=hashlib.sha256(data).hexdigest(),
             size_bytes=len(data),
         )
-    except (KeyError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"checkpoint {path}: damaged metadata: {error}") from None
 
 

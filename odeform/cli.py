@@ -78,7 +78,7 @@ def _train(args: argparse.Namespace) -> None:
     dataset = open_dataset(args.dataset)
     rest = get_scene(dataset.schema.scene).rest_mesh()
     request = TrainRequest(args.model, args.seed, args.minutes, parse_window(args.window), args.every)
-    train(dataset, (rest.points, rest.faces), args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
+    train(dataset, rest, args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
 
 
 def _evaluate(args: argparse.Namespace) -> None:

@@ -38,7 +38,7 @@ def write_motion(motion: Motion, times: Floats, out: str | Path) -> None:
         write_aside(path, _npz(motion, times))
     elif suffix == ".ply" and "{frame}" in path.name:
         for frame, time in enumerate(times):
-            write_aside(path.with_name(path.name.format(frame=f"{frame:05d}")), _ply(motion, float(time)))
+            write_aside(path.with_name(path.name.replace("{frame}", f"{frame:05d}")), _ply(motion, float(time)))
     else:
         raise InputError(f"--out {out}: expected a name ending in .npz, or in .ply with {{frame}} in it")
 

@@ -18,11 +18,15 @@ __all__ = ["Predictor", "load"]
 class Predictor(Protocol):
     """Parameters and a shape in, a motion out."""
 
-    model: str
     schema: Schema
     checkpoint: Checkpoint
     rest: Mesh
-    qualities: Mapping[str, Quality]
+
+    @property
+    def model(self) -> str: ...
+
+    @property
+    def qualities(self) -> Mapping[str, Quality]: ...
 
     def solve(
         self,

@@ -124,9 +124,7 @@ class Schema:
         try:
             return cls(
                 scene=str(data["scene"]),
-                parameters=tuple(
-                    Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]
-                ),
+                parameters=tuple(Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]),
                 window=Window(**data["window"]),
                 parts=tuple(data["parts"]),
                 needs_observations=bool(data.get("needs_observations", False)),

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, field
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "GaussianSplats", "Geometry", "Ints", "Mesh", "PointCloud", "Sequence"]
+__all__ = ["Arrays", "Floats", "GaussianSplats", "Geometry", "Ints", "Mesh", "PointCloud", "Sequence"]
 
 Floats = NDArray[np.floating]
 Ints = NDArray[np.integer]
+Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class GaussianSplats:
-    """`points` (N, 3) centres in metres, `covariances` (N, 3, 3) m^2, `colors` (N, 3) and `opacities` (N,) in [0, 1]."""
+    """`points` (N, 3) centres in m, `covariances` (N, 3, 3) m^2, `colors` (N, 3) and `opacities` (N,) in [0, 1]."""
 
     points: Floats
     covariances: Floats

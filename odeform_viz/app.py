@@ -34,7 +34,11 @@ class App:
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
         self.server.gui.configure_theme(
-            titlebar_content=None, control_width="medium", show_logo=False, show_share_button=False, brand_color=(214, 96, 48)
+            titlebar_content=None,
+            control_width="medium",
+            show_logo=False,
+            show_share_button=False,
+            brand_color=(214, 96, 48),
         )
         self.server.gui.set_panel_label(f"ODeform · {self.session.schema.scene}")
         window = self.session.schema.window

@@ -9,7 +9,6 @@ import odeform
 from odeform.cli import run_guarded
 from odeform.errors import InputError
 from odeform.geometry.shape import fit_to
-from odeform.predictor import Predictor
 from odeform.types import Geometry
 from odeform_viz.session import Column
 

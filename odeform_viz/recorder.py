@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from odeform.errors import InputError
-from odeform.types import Floats, Mesh
+from odeform.types import Floats, Ints, Mesh
 from odeform_viz.session import Column, ColumnFrame, Frame
 
 __all__ = ["Recorder"]
@@ -95,7 +95,7 @@ class Recorder:
         self._stream.disconnect()
 
 
-def _normals(points: Floats, faces: Floats) -> Floats:
+def _normals(points: Floats, faces: Ints) -> Floats:
     """(N, 3) area-weighted vertex normals; a mesh without them is drawn unlit."""
     corners = points[faces]
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -107,7 +107,8 @@ def _normals(points: Floats, faces: Floats) -> Floats:
 
 def _blueprint(columns: Sequence[Column]) -> rrb.Blueprint:
     views = [
-        rrb.Spatial3DView(origin="world", contents=[f"world/{column.label}/**"], name=column.label) for column in columns
+        rrb.Spatial3DView(origin="world", contents=[f"world/{column.label}/**"], name=column.label)
+        for column in columns
     ]
     return rrb.Blueprint(
         rrb.Vertical(

@@ -79,7 +79,11 @@ class _ColumnView:
         way = poses[:, :3, :3] @ centre + poses[:, :3, 3]
         segments = np.stack([way[:-1], way[1:]], axis=1).astype(np.float32)
         self._path = self._server.scene.add_line_segments(
-            f"{self._root}/path", segments, colors=np.array(self._color, dtype=np.uint8), line_width=2.0
+            f"{self._root}/path",
+            segments,
+            colors=np.array(self._color, dtype=np.uint8),
+            thickness=2.0,
+            thickness_units="screen",
         )
 
 

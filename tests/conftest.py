@@ -13,8 +13,8 @@ from odeform.training.train import TrainRequest, train
 
 @pytest.fixture(scope="session")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Ten coarse kicks: really simulated, at a larger step than the scene's own."""
-    return simulate_dataset("kick", tmp_path_factory.mktemp("kick"), count=10, seed=3, workers=2, step=2e-3)
+    """Coarse kicks: really simulated, at a larger step than the scene's own."""
+    return simulate_dataset("kick", tmp_path_factory.mktemp("kick"), count=21, seed=3, workers=2, step=2e-3)
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +24,7 @@ def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[
     for model in ("odeform", "pod-rbf", "nearest"):
         paths[model] = root / f"{model}.safetensors"
         request = TrainRequest(model, seed=1, minutes=0.15)
-        train(dataset, (rest.points, rest.faces), paths[model], request, lambda _: None)
+        train(dataset, rest, paths[model], request, lambda _: None)
     return paths
 
 

@@ -5,9 +5,9 @@ import numpy as np
 from odeform.baselines.frames import FrameTrajectory
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
-from odeform.solver.integrate import Quality
 from odeform.model.data import TrainingData
-from odeform.types import Floats, Geometry
+from odeform.solver.integrate import Quality
+from odeform.types import Arrays, Floats, Geometry
 
 __all__ = ["Nearest", "fit_nearest"]
 
@@ -27,7 +27,7 @@ class Nearest(ReducedModel):
         return FrameTrajectory("nearest training sequence", self._times, lambda: self._reduced[row])
 
 
-def fit_nearest(data: TrainingData) -> tuple[dict[str, Floats], dict[str, object]]:
+def fit_nearest(data: TrainingData) -> tuple[Arrays, dict[str, object]]:
     """Arrays and settings of the checkpoint. Deformations are kept to single precision."""
     reduced = data.reduced["train"].astype(np.float32)
     return {"times": data.times, "theta": data.theta["train"], "reduced": reduced}, {}

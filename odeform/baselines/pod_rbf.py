@@ -13,10 +13,10 @@ from scipy.interpolate import RBFInterpolator
 from odeform.baselines.frames import FrameTrajectory
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
+from odeform.model.data import TrainingData
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality
-from odeform.model.data import TrainingData
-from odeform.types import Floats, Geometry
+from odeform.types import Arrays, Floats, Geometry
 
 __all__ = ["PodRbf", "fit_pod_rbf"]
 
@@ -48,7 +48,7 @@ class PodRbf(ReducedModel):
         return FrameTrajectory("POD + RBF", self._times, predict)
 
 
-def fit_pod_rbf(data: TrainingData) -> tuple[dict[str, Floats], dict[str, Any]]:
+def fit_pod_rbf(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
     """Fit on train; choose kernel and smoothing on val by RMS displacement. Arrays and settings of the checkpoint."""
     train, val = data.reduced["train"], data.reduced["val"]
     weight = np.ones(train.shape[-1])

@@ -134,7 +134,7 @@ def open_dataset(path: str | Path) -> Dataset:
     except ValueError:
         raise InputError(f"{root / INDEX}: not valid JSON") from None
     if not isinstance(index, dict) or index.get("format") != FORMAT:
-        raise InputError(f"{root / INDEX}: expected format {FORMAT}, got {dict(index).get('format')!r}")
+        raise InputError(f"{root / INDEX}: expected an index of format {FORMAT}")
     try:
         entries = tuple(Entry(**entry) for entry in index["sequences"])
         return Dataset(root, Schema.from_json(index["schema"]), entries, index["fixed"], index["provenance"])

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from odeform.dataset.store import Dataset
 from odeform.errors import InputError
@@ -29,7 +30,7 @@ def _deformation(vertices: Floats, weights: Floats) -> Floats:
     return back - (rest - centre)
 
 
-def score(pairs: Iterable[tuple[Floats, Sequence, Floats]]) -> dict[str, Any]:
+def score(pairs: Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]) -> dict[str, Any]:
     """Scores of predictions (T, N, 3) metres against sequences, with a mask (T,) of the frames that count on-grid.
 
     `off_grid_rmse_mm` is the pooled RMSE over the frames that the mask leaves out (None without any).
@@ -76,7 +77,7 @@ def _even(rows: list[Floats]) -> bool:
     return len({len(row) for row in rows}) == 1
 
 
-def _grid(times: Floats, window: Window) -> Floats:
+def _grid(times: Floats, window: Window) -> NDArray[np.bool_]:
     """Which times lie on the frames of a window's rate."""
     phase = (times - window.start) * window.rate
     return np.abs(phase - np.round(phase)) < 1e-3
@@ -89,7 +90,7 @@ def evaluate(
     if predictor.schema.scene != dataset.schema.scene:
         raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {dataset.schema.scene}")
 
-    def pairs() -> Iterable[tuple[Floats, Sequence, Floats]]:
+    def pairs() -> Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]:
         for whole in dataset.sequences(split):
             begin, end = window or (0, len(whole.times))
             keep = np.unique(np.concatenate([[0], np.arange(begin, min(end, len(whole.times)))]))

@@ -26,7 +26,7 @@ def read_geometry(path: str | Path) -> Geometry:
         if suffix == ".splat":
             geometry: Geometry = _splat(path.read_bytes(), path)
         elif suffix == ".xyz":
-            geometry = PointCloud(np.loadtxt(path, ndmin=2)[:, :3])
+            geometry = PointCloud(np.loadtxt(path, ndmin=2)[:, [0, 1, 2]])
         elif suffix in MESHES:
             geometry = _from_trimesh(path)
         else:
@@ -44,7 +44,8 @@ def _validated(geometry: Geometry, path: Path) -> Geometry:
     points = geometry.points
     if len(points) < 2:
         raise InputError(f"geometry {path}: expected at least 2 points, got {len(points)}")
-    bad = int((~np.isfinite(points).all(axis=1)).sum())
+    numbers = [np.reshape(x, (len(points), -1)) for name, x in vars(geometry).items() if name != "faces"]
+    bad = int((~np.isfinite(np.concatenate(numbers, axis=1)).all(axis=1)).sum())
     if bad:
         raise InputError(f"geometry {path}: {bad} of {len(points)} points are not finite")
     if np.ptp(points, axis=0).max() <= 0.0:
@@ -111,7 +112,7 @@ def _splat(data: bytes, path: Path) -> GaussianSplats:
 def _covariances(scales: Floats, quaternions: Floats) -> Floats:
     """(N, 3) standard deviations and (N, 4) quaternions, w first and of any length -> (N, 3, 3)."""
     length = np.linalg.norm(quaternions, axis=1, keepdims=True)
-    unit = np.where(length > 1e-12, quaternions / np.maximum(length, 1e-12), [1.0, 0.0, 0.0, 0.0])
+    unit = np.where(~(length <= 1e-12), quaternions / np.maximum(length, 1e-12), [1.0, 0.0, 0.0, 0.0])
     w, x, y, z = unit.T
     rotation = np.stack(
         [

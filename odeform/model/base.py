@@ -34,7 +34,7 @@ class ReducedModel(ABC):
             self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays)
             self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
             self._read(checkpoint)
-        except (KeyError, TypeError) as error:
+        except (KeyError, TypeError, ValueError, IndexError) as error:
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
         self._placed: OrderedDict[tuple[int, float], tuple[Geometry, PlacedBasis]] = OrderedDict()
 

@@ -51,7 +51,10 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
         if not vectors:
             raise InputError(f"{dataset.root}: no sequence in split {split}")
         theta[split] = np.stack(vectors)
-    assert rest is not None and weights is not None and anchor is not None and times is not None
+    assert rest is not None
+    assert weights is not None
+    assert anchor is not None
+    assert times is not None
     space, train = fit_space(rest, locals_["train"], weights, anchor, modes)
     shapes = space.basis.values(rest)
     root = weights[:, None]
@@ -60,7 +63,10 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
     begin, end = window or (0, len(times))
     for split in ("train", "val"):
         reduced[split] = np.stack(
-            [np.concatenate(pair, axis=1)[begin:end:every] for pair in zip(poses[split], coefficients[split], strict=True)]
+            [
+                np.concatenate(pair, axis=1)[begin:end:every]
+                for pair in zip(poses[split], coefficients[split], strict=True)
+            ]
         )
         total = np.mean([(root * local**2).sum(axis=(1, 2)).mean() for local in locals_[split]])
         kept = np.mean([(c**2).sum(axis=1).mean() for c in coefficients[split]])
@@ -76,5 +82,3 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
         schema.notes,
     )
     return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation)
-
-

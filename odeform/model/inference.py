@@ -12,23 +12,21 @@ from functools import cached_property
 import numpy as np
 from scipy.special import expit
 
-from odeform.model.motion import SolveStats
 from odeform.model.config import ModelConfig
+from odeform.model.motion import SolveStats
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution
-from odeform.types import Floats
+from odeform.types import Arrays, Floats
 
-__all__ = ["LatentTrajectory", "Weights", "encode", "make_decoder", "make_field", "pool_shape"]
-
-Weights = dict[str, Floats]
+__all__ = ["LatentTrajectory", "encode", "make_decoder", "make_field", "pool_shape"]
 
 
 def _silu(x: Floats) -> Floats:
     return x * expit(x)
 
 
-def _layers(weights: Weights, prefix: str, dtype: type) -> list[tuple[Floats, Floats]]:
+def _layers(weights: Arrays, prefix: str, dtype: type) -> list[tuple[Floats, Floats]]:
     """Weight and bias of each linear layer of an `mlp`, column-major: the faster order for matrix-vector products."""
     out = []
     index = 0
@@ -51,15 +49,15 @@ def _branches(config: ModelConfig) -> list[str]:
     return ["rigid", "local"] if config.rigid else ["local"]
 
 
-def pool_shape(weights: Weights, config: ModelConfig, points: Floats, shares: Floats) -> list[Floats]:
-    """Pooled features of a shape for each branch: points (N, 3) in units of the body's size, shares (N,) of its area."""
+def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, shares: Floats) -> list[Floats]:
+    """Features of a shape for each branch: points (N, 3) in units of the body's size, shares (N,) of its area."""
     return [
         shares @ _mlp(_layers(weights, f"{branch}_encoder.points", np.float64), points, _silu)
         for branch in _branches(config)
     ]
 
 
-def encode(weights: Weights, config: ModelConfig, pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
+def encode(weights: Arrays, config: ModelConfig, pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
     """The state at time 0 from pooled shape features and parameters in [-1, 1]."""
     parts = []
     for branch, features in zip(_branches(config), pooled, strict=True):
@@ -69,7 +67,7 @@ def encode(weights: Weights, config: ModelConfig, pooled: list[Floats], theta: F
     return np.concatenate(parts).astype(dtype)
 
 
-def make_field(weights: Weights, config: ModelConfig, theta: Floats, dtype: type) -> Callable[[float, Floats], Floats]:
+def make_field(weights: Arrays, config: ModelConfig, theta: Floats, dtype: type) -> Callable[[float, Floats], Floats]:
     """dz/dt = f(z) with the parameters, which do not change in time, folded into the first bias."""
     branches = []
     rate = 1.0 / float(weights["time_scale"])
@@ -102,7 +100,7 @@ def make_field(weights: Weights, config: ModelConfig, theta: Floats, dtype: type
     return field
 
 
-def make_decoder(weights: Weights, config: ModelConfig, dtype: type) -> Callable[[Floats], Floats]:
+def make_decoder(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Floats]:
     """(T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start."""
     split = config.rigid_latent if config.rigid else 0
     gains = weights["gains"].astype(np.float64)
@@ -154,7 +152,8 @@ class LatentTrajectory:
 
     def reduced(self, times: Floats) -> Floats:
         solution = self._extend(float(np.max(times)))
-        return self._decode(solution.sample(times)) - self._origin
+        # y(0) = 0 to the last bit: the product over many rows rounds otherwise than that over one
+        return (self._decode(solution.sample(times)) - self._origin) * (np.asarray(times) > 0.0)[:, None]
 
     @cached_property
     def _error_mm(self) -> float | None:
@@ -167,7 +166,10 @@ class LatentTrajectory:
 
         quality = self._quality
         if quality.step is not None:
-            coarse, share = Quality(quality.method, step=2.0 * quality.step), 2.0 ** get_method(quality.method).order - 1.0
+            coarse, share = (
+                Quality(quality.method, step=2.0 * quality.step),
+                2.0 ** get_method(quality.method).order - 1.0,
+            )
         else:
             coarse, share = Quality(quality.method, tolerance=10.0 * (quality.tolerance or 0.0)), 1.0
         other = integrate(self._field, self._solution.states[0], coarse, self._span)
@@ -175,7 +177,7 @@ class LatentTrajectory:
             return None
         times = np.linspace(0.0, self._span, 33)[1:]
         difference = self._decode(self._solution.sample(times)) - self._decode(other.sample(times))
-        # half-weight turns |w| to the RMS over directions of a round body: sqrt(2/3) r |w|
+        # a small turn |w| moves a round body of radius of gyration r by sqrt(2/3) r |w| in RMS
         difference[:, 3:POSE] *= self._arm * np.sqrt(2.0 / 3.0)
         return float(1e3 * np.linalg.norm(difference, axis=1).max() / share)
 

@@ -43,7 +43,7 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PlacedBasis:
-    """A geometry seen through a basis: its points in the scene and in canonical axes (N, 3), values (3 N, K); float32."""
+    """A geometry seen through a basis: points in the scene and canonical (N, 3), values (3 N, K); float32."""
 
     points: Floats
     rest: Floats
@@ -113,7 +113,7 @@ class Motion:
         return out[0] if np.ndim(t) == 0 else out
 
     def local(self, t: float | Floats) -> Floats:
-        """D(t) - id, the deformation alone, in the body's frame as it rests in the scene: (N, 3) or (T, N, 3) metres."""
+        """D(t) - id, the deformation alone, in the frame of the body at rest: (N, 3) or (T, N, 3) metres."""
         out = self._deformation(self._reduced(np.asarray(t))) @ self._to_canonical_axes.astype(np.float32)
         return out[0] if np.ndim(t) == 0 else out
 

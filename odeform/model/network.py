@@ -4,6 +4,8 @@ Dual encoders of P0 and theta, two neural ODEs of which the local one sees the g
 state of 32 + 128 numbers per object, whatever the number of its points.
 """
 
+import itertools
+
 import torch
 from torch import nn
 
@@ -15,7 +17,7 @@ __all__ = ["ODeformNet", "ShapeEncoder", "mlp"]
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:
     layers: list[nn.Module] = []
-    for before, after in zip(sizes, sizes[1:], strict=False):
+    for before, after in itertools.pairwise(sizes):
         layers += [nn.Linear(before, after), activation()]
     return nn.Sequential(*layers[:-1])
 
@@ -26,6 +28,9 @@ class ShapeEncoder(nn.Module):
     Points are pooled by an area-weighted mean, so neither their order nor their density matters. Pooled features are
     standardised over the training shapes; what does not vary among them carries no information and is dropped.
     """
+
+    pooled_mean: torch.Tensor
+    pooled_gain: torch.Tensor
 
     def __init__(self, config: ModelConfig, latent: int) -> None:
         super().__init__()
@@ -83,6 +88,9 @@ class ODeformNet(nn.Module):
 
     `gains` (y,) turn whitened outputs to metres and radians; `time_scale` in seconds makes the field's unit of time.
     """
+
+    gains: torch.Tensor
+    time_scale: torch.Tensor
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()

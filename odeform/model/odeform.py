@@ -5,8 +5,8 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.shape import surface_shares
 from odeform.model.base import ReducedModel
-from odeform.model.inference import LatentTrajectory, encode, make_decoder, make_field, pool_shape
 from odeform.model.config import ModelConfig
+from odeform.model.inference import LatentTrajectory, encode, make_decoder, make_field, pool_shape
 from odeform.solver.integrate import Quality
 from odeform.types import Floats, Geometry
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Floats, Sequence
+from odeform.types import Arrays, Floats, Sequence
 
 __all__ = ["POSE", "ReducedSpace", "decompose", "fit_space", "rotation_of", "to_canonical"]
 
@@ -41,11 +41,11 @@ class ReducedSpace:
     def to_json(self) -> dict[str, object]:
         return {"anchor": [float(x) for x in self.anchor], "arm": self.arm, "basis_scale": self.basis.scale}
 
-    def arrays(self) -> dict[str, Floats]:
+    def arrays(self) -> Arrays:
         return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
 
     @classmethod
-    def from_parts(cls, data: dict[str, object], arrays: dict[str, Floats]) -> "ReducedSpace":
+    def from_parts(cls, data: dict[str, object], arrays: Arrays) -> "ReducedSpace":
         basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
         return cls(np.array(data["anchor"], dtype=float), float(data["arm"]), basis)  # pyright: ignore
 

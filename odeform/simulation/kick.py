@@ -77,7 +77,7 @@ def simulate(parameters: Parameters, rate: float | None = None, step: float = ST
 def rest_mesh() -> Mesh:
     """A fine ball touching the floor, for display."""
     sphere = trimesh.creation.icosphere(4, RADIUS)
-    return Mesh(np.asarray(sphere.vertices) + [0.0, 0.0, RADIUS], np.asarray(sphere.faces))
+    return Mesh(np.add(sphere.vertices, (0.0, 0.0, RADIUS)), np.asarray(sphere.faces))
 
 
 SCENE = Scene(

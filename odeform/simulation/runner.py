@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from joblib import Parallel, delayed
 
@@ -69,7 +70,8 @@ def simulate_dataset(
 
     root.mkdir(parents=True, exist_ok=True)
     jobs = (delayed(_one)(scene_name, entry, root, rate, step) for entry in todo)
-    for entry in Parallel(n_jobs=workers, return_as="generator_unordered")(jobs):
+    finished: Any = Parallel(n_jobs=workers, return_as="generator_unordered")(jobs)
+    for entry in finished:
         done[entry.name] = entry
         index()
         progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from odeform.errors import InputError
-from odeform.schema import Parameters, Schema
+from odeform.schema import Schema
 from odeform.types import Mesh, Sequence
 
 __all__ = ["Scene", "get_scene"]
@@ -41,7 +41,6 @@ class Scene:
             {p.name: p.denormalise(2.0 * float(u) - 1.0) for p, u in zip(parameters, row, strict=True)}
             for row in points
         ]
-
 
 
 def get_scene(name: str) -> Scene:

@@ -1,5 +1,8 @@
 """Soft shells on MuJoCo flexes: building, relaxing and stepping one body over a floor."""
 
+# MuJoCo is a compiled module without type stubs
+# pyright: reportAttributeAccessIssue=false
+
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -33,7 +36,9 @@ def wall_thickness(bending: float, material: Material) -> float:
     return (12.0 * (1.0 - material.poisson**2) * bending / material.young) ** (1.0 / 3.0)
 
 
-def _xml(mesh: Mesh, mass: float, thickness: float, material: Material, step: float, gravity: float, floor: bool) -> str:
+def _xml(
+    mesh: Mesh, mass: float, thickness: float, material: Material, step: float, gravity: float, floor: bool
+) -> str:
     contact = f'friction="{material.friction} 0.005 0.0001" solref="{material.contact_time} 1"'
     plane = f'<geom type="plane" size="0 0 1" pos="0 0 {-CONTACT_RADIUS}" {contact}/>' if floor else ""
     points = " ".join(f"{x:.17g}" for x in np.asarray(mesh.points, dtype=float).ravel())
@@ -70,9 +75,7 @@ class ShellBody:
         gravity: float,
         floor: bool = True,
     ) -> None:
-        self.model = mujoco.MjModel.from_xml_string(
-            _xml(reference, mass, thickness, material, step, gravity, floor)
-        )
+        self.model = mujoco.MjModel.from_xml_string(_xml(reference, mass, thickness, material, step, gravity, floor))
         self.data = mujoco.MjData(self.model)
         self._reference = np.array(reference.points, dtype=float)
         self.masses = self.model.body_mass[-len(self._reference) :].copy()
@@ -144,7 +147,9 @@ def relax_sphere(mesh: Mesh, radius: float, thickness: float, material: Material
     raise SimulationError(f"the ball did not relax to radius {radius} m (last {mean} m) at thickness {thickness:.4f} m")
 
 
-def run(body: ShellBody, duration: float, rate: float, force: Callable[[float], Floats | None]) -> tuple[Floats, Floats]:
+def run(
+    body: ShellBody, duration: float, rate: float, force: Callable[[float], Floats | None]
+) -> tuple[Floats, Floats]:
     """Step the body for `duration` seconds; returns times (T,) and vertices (T, N, 3) at `rate` Hz, start included.
 
     Frames fall between steps where the rate does not divide them: positions are then interpolated with the

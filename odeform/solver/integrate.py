@@ -124,9 +124,7 @@ def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solut
     """Proportional step control on the embedded error estimate."""
     tolerance = quality.tolerance or 0.0
     if not solution.next_step:
-        solution.next_step = _first_step(
-            method, field, solution.end, solution.states[0], solution.slopes[0], tolerance
-        )
+        solution.next_step = _first_step(method, field, solution.end, solution.states[0], solution.slopes[0], tolerance)
         solution.evaluations += 1
     assert method.error is not None
     while solution.end < until:

@@ -13,13 +13,13 @@ import torch
 from torch import nn
 
 from odeform.model.config import ModelConfig
+from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet, mlp
 from odeform.model.reduced import POSE
 from odeform.solver.adjoint import solve_backprop
 from odeform.solver.integrate import Quality
-from odeform.model.data import TrainingData
 from odeform.training.losses import AutomaticWeights, Metric
-from odeform.types import Floats
+from odeform.types import Arrays
 
 __all__ = ["TrainConfig", "build_network", "network_weights", "train_network"]
 
@@ -53,7 +53,9 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
     config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE, rigid=rigid)
     net = ODeformNet(config)
     spread = np.sqrt((train**2).mean(axis=(0, 1)))
-    gains = np.concatenate([np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]])
+    gains = np.concatenate(
+        [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
+    )
     net.gains.copy_(torch.as_tensor(np.maximum(gains, 1e-9)))
     # fields of order one should cross the latent space in a few frames, not in a second
     net.time_scale.fill_(0.05)
@@ -149,7 +151,9 @@ class _Trainer:
                 printed = now
                 rigid, local = self.errors_mm("val")
                 name = "shooting" if shooting else "roll-out"
-                report(f"{name} {100 * share:.0f} %, step {steps}: val rigid {rigid:.2f} mm, deformation {local:.3f} mm")
+                report(
+                    f"{name} {100 * share:.0f} %, step {steps}: val rigid {rigid:.2f} mm, deformation {local:.3f} mm"
+                )
 
 
 def train_network(
@@ -169,5 +173,5 @@ def train_network(
     return {"val_rigid_rmse_mm": rigid, "val_deformation_rmse_mm": local}
 
 
-def network_weights(net: ODeformNet) -> dict[str, Floats]:
+def network_weights(net: ODeformNet) -> Arrays:
     return {name: value.detach().cpu().numpy() for name, value in net.state_dict().items()}

@@ -15,6 +15,8 @@ class Metric(nn.Module):
     body of radius of gyration r by sqrt(2/3) r |w| in RMS over axes.
     """
 
+    scale: torch.Tensor
+
     def __init__(self, gains: torch.Tensor, arm: float) -> None:
         super().__init__()
         scale = 1e3 * gains.clone()

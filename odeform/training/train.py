@@ -18,7 +18,7 @@ from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare
 from odeform.model.odeform import PREFIX
 from odeform.predictor import load
-from odeform.types import Floats
+from odeform.types import Arrays, Mesh
 
 __all__ = ["MODELS", "TrainRequest", "train"]
 
@@ -39,7 +39,7 @@ class TrainRequest:
 
 def _fit_odeform(
     data: TrainingData, request: TrainRequest, report: Callable[[str], None]
-) -> tuple[dict[str, Floats], dict[str, object]]:
+) -> tuple[Arrays, dict[str, object]]:
     from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
 
     net = build_network(data, request.seed)
@@ -56,11 +56,11 @@ def _fit_odeform(
 
 
 def train(
-    dataset: Dataset, rest: tuple[Floats, Floats], out: str | Path, request: TrainRequest, report: Callable[[str], None]
+    dataset: Dataset, rest: Mesh, out: str | Path, request: TrainRequest, report: Callable[[str], None]
 ) -> Checkpoint:
     """Train one model, score it on the test split, write the checkpoint.
 
-    `rest` are points (N, 3) and faces of the body as viewers show it, as it rests in the scene.
+    `rest` is the body as viewers show it, as it rests in the scene.
     """
     if request.model not in MODELS:
         raise InputError(f"unknown model {request.model!r}: expected one of {', '.join(MODELS)}")
@@ -91,8 +91,8 @@ def train(
         arrays={
             **arrays,
             **data.space.arrays(),
-            "rest.points": np.asarray(rest[0], dtype=np.float32),
-            "rest.faces": np.asarray(rest[1], dtype=np.int32),
+            "rest.points": np.asarray(rest.points, dtype=np.float32),
+            "rest.faces": np.asarray(rest.faces, dtype=np.int32),
         },
         provenance=provenance,
     )

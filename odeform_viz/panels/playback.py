@@ -17,7 +17,12 @@ class PlaybackPanel:
     """Drives a clock. A hand on the time slider stops the playing; the slider follows the clock otherwise."""
 
     def __init__(
-        self, server: viser.ViserServer, window: Window, clock: Clock, wake: Callable[[], None], largest: Callable[[], float]
+        self,
+        server: viser.ViserServer,
+        window: Window,
+        clock: Clock,
+        wake: Callable[[], None],
+        largest: Callable[[], float],
     ) -> None:
         self._clock, self._wake, self._window = clock, wake, window
         span = window.stop - window.start
@@ -44,10 +49,12 @@ class PlaybackPanel:
             peak.on_click(lambda _: self._jump(largest()))
         self._changed()
 
-    def _dragged(self, event: viser.GuiEvent) -> None:
-        if event.client is not None:  # a hand, not the clock
+    async def _dragged(self, event: viser.GuiEvent) -> None:
+        # a coroutine runs at once where the message came in, before the clock moves the slider on
+        if event.client_id is not None:  # a hand, not the clock
+            moment = self._time.value
             self._clock.pause()
-            self._clock.seek(self._time.value)
+            self._clock.seek(moment)
             self._refresh_button()
             self._wake()
 

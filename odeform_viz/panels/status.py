@@ -32,7 +32,9 @@ def describe(column: Column, frame: ColumnFrame) -> str:
     if score is not None:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
     if stats.status != "ok":
-        lines.append(f"⚠ **{stats.status}**: showing the last good state, t = {frame.motion.trajectory.last_good:.3f} s")
+        lines.append(
+            f"⚠ **{stats.status}**: showing the last good state, t = {frame.motion.trajectory.last_good:.3f} s"
+        )
     return "  \n".join(lines)
 
 

@@ -1,0 +1,228 @@
+"""What the motions of every model have in common, on really trained checkpoints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from odeform.errors import InputError
+from odeform.geometry.rigid import rotation_z
+from odeform.model.motion import Motion
+from odeform.predictor import Predictor
+from odeform.solver.integrate import Quality
+from odeform.types import GaussianSplats, Mesh, PointCloud
+
+MODELS = ("odeform", "pod-rbf", "nearest")
+SETTING = {"mass": 0.4, "force": 110.0, "azimuth": 0.7}
+GRIDS = {
+    "window": np.arange(121) / 120.0,
+    "backwards": np.arange(121)[::-1] / 120.0,
+    "shuffled": np.random.default_rng(0).permutation(121) / 120.0,
+    "few": np.array([0.75, 0.25]),
+    "repeated": np.array([0.5, 0.1, 0.5, 0.0, 0.5]),
+}
+ROUNDING = 1e-6  # m; frames come from one product over all times, which rounds by their number
+
+everywhere = pytest.mark.parametrize("model", MODELS)
+
+
+def ball(level: int) -> Mesh:
+    sphere = trimesh.creation.icosphere(level, 0.1)
+    return Mesh(np.asarray(sphere.vertices) + [0.0, 0.0, 0.1], np.asarray(sphere.faces))
+
+
+def egg() -> Mesh:
+    """Not round, so that turning it matters."""
+    return Mesh((ball(3).points * [1.2, 0.8, 1.0]), ball(3).faces)
+
+
+@everywhere
+def test_starts_at_the_shape_itself(predictors: dict[str, Predictor], model: str) -> None:
+    for shape in (predictors[model].rest, egg()):
+        motion = predictors[model].solve(shape, SETTING)
+        start = np.asarray(shape.points, dtype=np.float32)
+        assert np.array_equal(motion.vertices(0.0), start)
+        assert np.array_equal(motion.vertices(GRIDS["window"])[0], start)
+        assert np.abs(motion.vertices(1.0) - start).max() > 0.1
+        assert np.array_equal(motion.pose(0.0), np.eye(4))
+        assert not motion.local(0.0).any()
+
+
+@everywhere
+def test_vertices_are_the_pose_of_the_deformed_shape(predictors: dict[str, Predictor], model: str) -> None:
+    motion = predictors[model].solve(egg(), SETTING)
+    times = GRIDS["window"]
+    pose, deformed = motion.pose(times), egg().points + motion.local(times)
+    moved = deformed @ pose[:, :3, :3].swapaxes(1, 2) + pose[:, None, :3, 3]
+    assert np.abs(motion.local(times)).max() > 1e-4
+    assert np.abs(moved - motion.vertices(times)).max() < 1e-6
+    one = (egg().points + motion.local(0.4)) @ motion.pose(0.4)[:3, :3].T + motion.pose(0.4)[:3, 3]
+    assert np.abs(one - motion.vertices(0.4)).max() < 1e-6
+
+
+@everywhere
+def test_a_time_has_one_answer(predictors: dict[str, Predictor], model: str) -> None:
+    """Whatever was asked before, alongside or beyond, and in whatever order."""
+    predictor, times = predictors[model], GRIDS["window"]
+    motion = predictor.solve(None, SETTING)
+    frames = motion.vertices(times)
+    assert np.array_equal(motion.vertices(times), frames)
+    motion.vertices(3.0)
+    assert np.array_equal(motion.vertices(times), frames)
+    late = predictor.solve(None, SETTING, until=2.0)
+    assert np.array_equal(late.vertices(times), frames)
+    early = predictor.solve(None, SETTING, until=0.1)
+    early.vertices(0.05)
+    assert np.array_equal(early.vertices(times), frames)
+    assert np.array_equal(early.vertices(3.0), motion.vertices(3.0))
+    for grid in GRIDS.values():
+        rows = np.round(grid * 120.0).astype(int)
+        assert np.abs(motion.vertices(grid) - frames[rows]).max() < ROUNDING
+    singles = [motion.vertices(float(time)) for time in reversed(times)]
+    assert np.abs(np.stack(singles[::-1]) - frames).max() < ROUNDING
+    assert all(np.array_equal(motion.vertices(float(t)), s) for t, s in zip(times, singles[::-1], strict=True))
+
+
+@everywhere
+def test_points_in_another_order_move_alike(predictors: dict[str, Predictor], model: str) -> None:
+    shape = egg()
+    order = np.random.default_rng(0).permutation(len(shape.points))
+    other = Mesh(shape.points[order], np.argsort(order)[shape.faces])
+    one, two = (predictors[model].solve(s, SETTING).vertices(GRIDS["few"]) for s in (shape, other))
+    assert np.abs(two - one[:, order]).max() < ROUNDING
+
+
+@everywhere
+def test_resolution_does_not_matter(predictors: dict[str, Predictor], model: str) -> None:
+    coarse, fine = (predictors[model].solve(ball(level), SETTING) for level in (3, 4))
+    times = GRIDS["window"]
+    assert np.abs(coarse.pose(times) - fine.pose(times)).max() < 1e-4
+    # the vertices of the coarser one are among those of the finer one
+    shared = [int(np.linalg.norm(ball(4).points - p, axis=1).argmin()) for p in ball(3).points[::20]]
+    assert np.abs(coarse.vertices(times)[:, ::20] - fine.vertices(times)[:, shared]).max() < 1e-4
+
+
+@everywhere
+def test_shape_and_heading_turn_the_motion(predictors: dict[str, Predictor], model: str) -> None:
+    turn = rotation_z(1.1)
+    turned = Mesh(egg().points @ turn.T, egg().faces)
+    one = predictors[model].solve(egg(), {**SETTING, "azimuth": -0.4}).vertices(GRIDS["window"])
+    two = predictors[model].solve(turned, {**SETTING, "azimuth": 0.7}).vertices(GRIDS["window"])
+    assert np.abs(one @ turn.T - two).max() < ROUNDING
+    unturned = predictors[model].solve(egg(), {**SETTING, "azimuth": 0.7}).vertices(GRIDS["window"])
+    assert np.abs(unturned - two).max() > 1e-3
+
+
+@everywhere
+def test_all_kinds_of_shapes_move_alike(predictors: dict[str, Predictor], model: str) -> None:
+    points, count = ball(2).points, len(ball(2).points)
+    covariances = np.tile(np.diag([1e-4, 4e-4, 9e-4]), (count, 1, 1))
+    splats = GaussianSplats(points, covariances, np.ones((count, 3)), np.ones(count))
+    times = GRIDS["few"]
+    mesh = predictors[model].solve(ball(2), SETTING).vertices(times)
+    cloud = predictors[model].solve(PointCloud(points), SETTING).vertices(times)
+    motion = predictors[model].solve(splats, SETTING)
+    # bare points count equally, those of a mesh by their area: a little different on the same ball
+    assert np.abs(cloud - mesh).max() < 1e-3
+    assert np.abs(motion.vertices(times) - cloud).max() < ROUNDING
+    moved = motion.covariances(0.5)
+    assert np.allclose(np.linalg.eigvalsh(moved), [1e-4, 4e-4, 9e-4])
+    turn = motion.pose(0.5)[:3, :3]
+    assert np.allclose(moved[7], turn @ covariances[7] @ turn.T)
+    assert np.allclose(motion.covariances(0.0), covariances)
+
+
+@everywhere
+def test_bound_and_size_of_the_deformation(predictors: dict[str, Predictor], model: str) -> None:
+    motion = predictors[model].solve(egg(), SETTING)
+    times = GRIDS["window"]
+    size = np.linalg.norm(motion.local(times), axis=-1)
+    bounds = np.array([motion.deformation_bound(float(time)) for time in times])
+    assert (size.max(axis=1) <= bounds * (1.0 + 1e-5) + 1e-9).all()
+    assert np.allclose(motion.deformation_rms(times), np.sqrt((size**2).mean(axis=1)), rtol=1e-3, atol=1e-8)
+
+
+@everywhere
+def test_shapes_without_sense(predictors: dict[str, Predictor], model: str) -> None:
+    for points in (np.zeros((0, 3)), np.array([[0.0, 0.0, np.nan], [1.0, 0.0, 0.0]])):
+        with pytest.raises(InputError):
+            predictors[model].solve(PointCloud(points))
+
+
+@everywhere
+@pytest.mark.parametrize(
+    "setting", [{"speed": 1.0}, {"mass": "heavy"}, {"mass": np.nan}, {"mass": -1.0}, {"force": np.inf}], ids=str
+)
+def test_parameters_without_sense(predictors: dict[str, Predictor], model: str, setting: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(setting))):
+        predictors[model].solve(None, setting)
+
+
+@everywhere
+def test_outside_and_beyond_are_told(predictors: dict[str, Predictor], model: str) -> None:
+    motion = predictors[model].solve(None, {"mass": 2.0, "azimuth": 9.0})
+    assert motion.outside == ("mass",)
+    assert not motion.extrapolates(1.0)
+    assert motion.extrapolates(1.01)
+    assert motion.stats.status == "ok"
+    assert np.isfinite(motion.vertices(GRIDS["window"])).all()
+
+
+def test_unknown_quality(predictors: dict[str, Predictor]) -> None:
+    with pytest.raises(InputError, match="balanced"):
+        predictors["odeform"].solve(None, quality="perfect")
+
+
+def test_baselines_hold_their_last_frame(predictors: dict[str, Predictor]) -> None:
+    for model in ("pod-rbf", "nearest"):
+        motion = predictors[model].solve(None, SETTING)
+        assert np.array_equal(motion.vertices(7.0), motion.vertices(1.0))
+
+
+@pytest.mark.parametrize(
+    "quality",
+    [
+        Quality("euler", step=1.0 / 120.0),
+        Quality("midpoint", step=1.0 / 120.0),
+        Quality("rk4", step=1.0 / 60.0),
+        Quality("rk4", step=1.0 / 120.0),
+        Quality("dopri5", tolerance=1e-3),
+        Quality("dopri5", tolerance=1e-5),
+    ],
+    ids=str,
+)
+def test_solver_error_is_of_the_size_it_says(predictors: dict[str, Predictor], quality: Quality) -> None:
+    """In double precision: single rounds by more than what the better settings leave."""
+    predictor = predictors["odeform"]
+    motion = predictor.solve(None, SETTING)
+    theta = predictor.schema.vector(motion.parameters)
+
+    def solve(setting: Quality) -> Motion:
+        trajectory = predictor._trajectory(theta, predictor.rest, setting, 1.0, np.float64)  # pyright: ignore
+        return replace(motion, trajectory=trajectory)
+
+    def frames(setting: Quality) -> tuple[np.ndarray, np.ndarray]:
+        y = solve(setting).trajectory.reduced(times)
+        return y[:, :6], y[:, 6:]
+
+    times = np.linspace(0.0, 1.0, 66)[1:]
+    (pose, local), (true_pose, true_local) = frames(quality), frames(Quality("dopri5", tolerance=1e-10))
+    arm = predictor.space.arm  # pyright: ignore[reportAttributeAccessIssue]
+    # the vertices are single precision: compare what moves them instead, in RMS over the body
+    squared = ((pose - true_pose)[:, :3] ** 2).sum(axis=1) + ((local - true_local) ** 2).sum(axis=1)
+    squared += 2.0 / 3.0 * arm**2 * ((pose - true_pose)[:, 3:] ** 2).sum(axis=1)
+    error = 1e3 * np.sqrt(squared.max())
+    said = solve(quality).stats.solver_error_mm
+    assert said is not None
+    assert error / 10.0 < said < error * 10.0
+
+
+def test_half_the_step_moves_less_than_the_error_said(predictors: dict[str, Predictor]) -> None:
+    predictor = predictors["odeform"]
+    for name in ("euler", "midpoint"):
+        motion = predictor.solve(None, SETTING, Quality(name, step=1.0 / 120.0))
+        half = predictor.solve(None, SETTING, Quality(name, step=0.5 / 120.0))
+        moved = np.linalg.norm(motion.vertices(GRIDS["window"]) - half.vertices(GRIDS["window"]), axis=-1)
+        assert motion.stats.solver_error_mm is not None
+        assert 1e3 * np.sqrt((moved**2).mean(axis=1)).max() < motion.stats.solver_error_mm

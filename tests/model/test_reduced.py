@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+import trimesh
+
+from odeform.dataset.store import Dataset
+from odeform.geometry.rigid import rotation_from_vector, rotation_z
+from odeform.model.data import prepare
+from odeform.model.reduced import POSE, ReducedSpace, decompose, rotation_of, to_canonical
+from odeform.predictor import Predictor
+from odeform.types import Mesh, Sequence
+
+HEADING = 0.9
+
+
+def rolling() -> tuple[Sequence, np.ndarray, np.ndarray]:
+    """A stiff ball that flies off and makes two turns, and the pose that describes it."""
+    sphere = trimesh.creation.icosphere(2, 0.1)
+    rest = np.asarray(sphere.vertices) + [0.0, 0.0, 0.1]
+    s = np.linspace(0.0, 1.0, 61)[:, None]
+    pose = np.concatenate([s * [0.8, 0.1, 0.3], s * [0.2, 4.0 * np.pi, 0.1]], axis=1)
+    anchor = np.array([0.0, 0.0, 0.1])
+    canonical = to_canonical(rest, anchor, HEADING)
+    moved = canonical @ rotation_from_vector(pose[:, 3:]).swapaxes(1, 2) + pose[:, None, :3]
+    vertices = moved @ rotation_z(HEADING).T + anchor
+    weights = np.full(len(rest), 1.0 / len(rest))
+    return Sequence(s[:, 0], vertices, np.asarray(sphere.faces), weights), anchor, pose
+
+
+def test_decomposes_a_rigid_motion() -> None:
+    sequence, anchor, true = rolling()
+    pose, local = decompose(sequence, anchor, HEADING)
+    assert np.abs(pose - true).max() < 1e-9
+    assert np.abs(local).max() < 1e-12
+
+
+def test_pose_does_not_depend_on_the_heading() -> None:
+    sequence, anchor, true = rolling()
+    turned = (sequence.vertices - anchor) @ rotation_z(1.7).T + anchor
+    other = Sequence(sequence.times, turned, sequence.faces, sequence.weights)
+    assert np.abs(decompose(other, anchor, HEADING + 1.7)[0] - true).max() < 1e-9
+
+
+def test_anchor_need_not_be_the_centroid() -> None:
+    sequence, _, _ = rolling()
+    anchor = np.array([0.05, -0.02, 0.3])
+    pose, _ = decompose(sequence, anchor, HEADING)
+    rotation, shift = rotation_of(pose, HEADING)
+    canonical = to_canonical(sequence.vertices[0], anchor, HEADING)
+    rebuilt = canonical @ rotation.swapaxes(1, 2) + (shift + anchor)[:, None]
+    assert np.abs(rebuilt - sequence.vertices).max() < 1e-12
+
+
+def test_modes_are_orthonormal_in_the_mass(dataset: Dataset) -> None:
+    data = prepare(dataset, modes=12)
+    modes = data.space.basis.values(data.rest).astype(float)
+    gram = np.einsum("n,nik,nil->kl", data.weights, modes, modes)
+    assert np.abs(gram - np.eye(12)).max() < 1e-5
+
+
+def test_truncation_is_what_the_modes_leave_out(dataset: Dataset) -> None:
+    few, many = prepare(dataset, modes=3), prepare(dataset, modes=12)
+    assert 0.0 < many.truncation_mm["train"] < few.truncation_mm["train"]
+    residual = []
+    modes = few.space.basis.values(few.rest)
+    for row, sequence in enumerate(dataset.sequences("train")):
+        _, local = decompose(sequence, few.space.anchor, few.schema.azimuth(sequence.parameters))
+        rest = local - np.einsum("nik,tk->tni", modes, few.reduced["train"][row][:, POSE:])
+        residual.append(np.einsum("n,tni->t", sequence.weights, rest**2).mean())
+    assert few.truncation_mm["train"] == pytest.approx(1e3 * np.sqrt(np.mean(residual)), rel=1e-3)
+
+
+def test_training_motions_come_back(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    """Decomposed, kept, looked up by their own parameters and composed again: the simulated vertices."""
+    for sequence in dataset.sequences("train"):
+        motion = predictors["nearest"].solve(sequence.rest, sequence.parameters)
+        error = np.linalg.norm(motion.vertices(sequence.times) - sequence.vertices, axis=-1)
+        assert np.sqrt((error**2).mean()) < 5e-5
+        assert error.max() < 5e-4
+
+
+def test_space_survives_its_parts(predictors: dict[str, Predictor]) -> None:
+    space = predictors["nearest"].space  # pyright: ignore[reportAttributeAccessIssue]
+    again = ReducedSpace.from_parts(space.to_json(), space.arrays())
+    points = np.asarray(Mesh(space.basis.centers * space.arm, np.zeros((0, 3), int)).points)
+    assert np.array_equal(again.basis.values(points), space.basis.values(points))
+    assert np.array_equal(again.anchor, space.anchor)
+    assert again.arm == space.arm

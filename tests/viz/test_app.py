@@ -1,0 +1,100 @@
+"""The running viewer, seen through its protocol."""
+
+import socket
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from odeform import InputError
+from odeform.predictor import Predictor
+from odeform_viz.app import App
+from odeform_viz.bench import BODY
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.session import Column
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def app(kick: Predictor, port: int) -> Iterator[App]:
+    app = App([Column("odeform", kick, kick.rest)], port=port)
+    yield app
+    app.close()
+
+
+def test_has_the_sliders_of_the_scene_and_nothing_else_to_set(app: App, port: int) -> None:
+    with LoopbackClient(port) as client:
+        for parameter in app.session.schema.parameters:
+            assert f"{parameter.name} ({parameter.unit})" in client.controls
+        assert "time (s)" in client.controls
+        assert "odeform" not in client.controls  # nothing to switch with one column
+
+
+def test_opens_playing_and_a_hand_on_time_stops_it(app: App, port: int) -> None:
+    with LoopbackClient(port) as client:
+        assert client.wait_vertices(BODY) is not None
+        client.set("time (s)", 0.5)
+        time.sleep(0.3)
+        assert not app.clock.playing
+        assert app.clock.time() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("label", "value"), [("mass (kg)", 0.9), ("bending (N m)", 2.5), ("force (N)", 80.0)])
+def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: str, value: float) -> None:
+    with LoopbackClient(port) as client:
+        client.set("time (s)", 0.05)
+        client.collect(0.5)
+        client.set(label, value)
+        shown = client.wait_vertices(BODY)
+    expected = kick.solve(kick.rest, {label.split()[0]: value}).vertices(0.05)
+    np.testing.assert_array_equal(shown, expected)
+
+
+def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predictor, port: int) -> None:
+    with LoopbackClient(port) as client:
+        client.set("time (s)", 0.03)
+        client.collect(0.5)
+        values = np.linspace(0.31, 0.95, 150)
+        for value in values:
+            client.set("mass (kg)", float(value))
+        last = None
+        while (vertices := client.wait_vertices(BODY, 1.0)) is not None:
+            last = vertices
+    np.testing.assert_array_equal(last, kick.solve(kick.rest, {"mass": float(values[-1])}).vertices(0.03))
+
+
+def test_values_that_no_slider_sends_leave_the_last_frame_and_a_message(app: App, port: int) -> None:
+    with LoopbackClient(port) as client:
+        client.set("time (s)", 0.03)
+        client.collect(0.5)
+        client.set("mass (kg)", float("nan"))
+        assert client.wait_vertices(BODY, 0.7) is None
+        assert "mass" in client.text()
+        client.set("quality", "nonsense")
+        client.set("mass (kg)", 0.6)
+        client.collect(0.7)
+        assert "quality" in client.text()
+        client.set("quality", "draft")
+        assert client.wait_vertices(BODY) is not None
+
+
+def test_beyond_the_trained_range_the_page_says_so(app: App, port: int) -> None:
+    with LoopbackClient(port) as client:
+        client.set("time (s)", 1.2)
+        client.collect(0.3)
+        client.set("mass (kg)", 1.1)
+        client.collect(0.7)
+        assert "extrapolated" in client.text()
+        assert "time, mass" in client.text()
+
+
+def test_a_port_in_use_is_refused(app: App, kick: Predictor, port: int) -> None:
+    with pytest.raises(InputError, match=str(port)):
+        App([Column("odeform", kick, kick.rest)], port=port)
