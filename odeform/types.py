@@ -1,7 +1,6 @@
 """Value types shared by all layers. Lengths are metres, times seconds, masses kilograms."""
 
 from dataclasses import dataclass, field
-
 from typing import Any
 
 import numpy as np

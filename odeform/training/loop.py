@@ -41,6 +41,11 @@ class TrainConfig:
     """Learning rate at the start of each phase; falls by a cosine to nothing."""
     tie: float = 0.1
     """Weight of the gap between a segment's end and the next one's start."""
+    change: float = 3.0
+    """Frames for which an error of the speed counts as if it went on."""
+    floor: float = 0.1
+    """Frames count by 1 / (their displacement + this share of the largest): the kick itself moves little, but is
+    what people look at."""
     report: float = 20.0
     """Seconds between lines of progress."""
 
@@ -79,6 +84,9 @@ class _Trainer:
         self.theta = {k: torch.as_tensor(v).float() for k, v in data.theta.items()}
         self.step = float(data.times[1] - data.times[0])
         self.quality = Quality("rk4", step=self.step)
+        size = np.linalg.norm(data.reduced["train"][..., :3], axis=-1).mean(axis=0)
+        emphasis = 1.0 / (size + config.floor * size.max())
+        self.emphasis = torch.as_tensor(emphasis / emphasis.mean()).float()
         speed = np.gradient(data.reduced["train"], self.step, axis=1)
         self.speed = torch.as_tensor(speed / np.sqrt((speed**2).mean(axis=(0, 1)) + 1e-12)).float()
         outputs = self.truth["train"].shape[-1]
@@ -105,18 +113,23 @@ class _Trainer:
         gap = ((states[-1, :, :-1] - starts[:, 1:]) ** 2).mean()
         return self.balance(rigid, points) + self.config.tie * gap
 
-    def rollout(self, split: str, rows: torch.Tensor, frames: int) -> tuple[torch.Tensor, torch.Tensor]:
+    def rollout(
+        self, split: str, rows: torch.Tensor, frames: int, plain: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """L_rigid and L_points over the first `frames`; `plain` without emphasis and changes, as scores are."""
         truth, theta = self.truth[split][rows][:, : frames + 1], self.theta[split][rows]
         first = self.net.encode(self.shape, theta)
         states = self._roll(first, theta, frames)
         predicted = (self.net.decode(states) - self.net.decode(first)).transpose(0, 1)
-        return self.metric(predicted, truth)
+        if plain:
+            return self.metric(predicted, truth)
+        return self.metric(predicted, truth, self.emphasis[: frames + 1], self.config.change)
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         rows = torch.arange(len(self.theta[split]))
-        losses = self.rollout(split, rows, self.truth[split].shape[1] - 1)
+        losses = self.rollout(split, rows, self.truth[split].shape[1] - 1, plain=True)
         return tuple(float((loss / 3.0).sqrt()) for loss in losses)  # pyright: ignore[reportReturnType]
 
     def phase(self, seconds: float, shooting: bool, report: Callable[[str], None]) -> None:
@@ -151,8 +164,10 @@ class _Trainer:
                 printed = now
                 rigid, local = self.errors_mm("val")
                 name = "shooting" if shooting else "roll-out"
+                trained, _ = self.errors_mm("train")
                 report(
-                    f"{name} {100 * share:.0f} %, step {steps}: val rigid {rigid:.2f} mm, deformation {local:.3f} mm"
+                    f"{name} {100 * share:.0f} %, step {steps}: val rigid {rigid:.2f} mm (train {trained:.2f}), "
+                    f"deformation {local:.3f} mm"
                 )
 
 

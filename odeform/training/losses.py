@@ -23,9 +23,21 @@ class Metric(nn.Module):
         scale[3:POSE] *= arm * (2.0 / 3.0) ** 0.5
         self.register_buffer("scale", scale)
 
-    def forward(self, predicted: torch.Tensor, truth: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """(..., 6 + K) whitened -> L_rigid and L_points, mean mm^2 a frame."""
-        squared = ((predicted - truth) * self.scale) ** 2
+    def forward(
+        self, predicted: torch.Tensor, truth: torch.Tensor, emphasis: torch.Tensor | None = None, change: float = 0.0
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """(..., T, 6 + K) whitened -> L_rigid and L_points, mean mm^2 a frame.
+
+        `emphasis` (T,) weights the frames. `change` adds the squared errors of the steps from frame to frame, as if
+        each went on for so many frames: motion that is right on average but trembles or jumps is not right.
+        """
+        error = (predicted - truth) * self.scale
+        squared = error**2
+        if change:
+            steps = change**2 * (error[..., 1:, :] - error[..., :-1, :]) ** 2
+            squared = squared + torch.cat([torch.zeros_like(steps[..., :1, :]), steps], dim=-2)
+        if emphasis is not None:
+            squared = squared * emphasis[:, None]
         return squared[..., :POSE].sum(dim=-1).mean(), squared[..., POSE:].sum(dim=-1).mean()
 
 

@@ -45,7 +45,7 @@ def test_starts_at_the_shape_itself(predictors: dict[str, Predictor], model: str
         assert np.array_equal(motion.vertices(0.0), start)
         assert np.array_equal(motion.vertices(GRIDS["window"])[0], start)
         assert np.abs(motion.vertices(1.0) - start).max() > 0.1
-        assert np.array_equal(motion.pose(0.0), np.eye(4))
+        assert np.allclose(motion.pose(0.0), np.eye(4), rtol=0.0, atol=1e-15)
         assert not motion.local(0.0).any()
 
 
@@ -215,7 +215,9 @@ def test_solver_error_is_of_the_size_it_says(predictors: dict[str, Predictor], q
     error = 1e3 * np.sqrt(squared.max())
     said = solve(quality).stats.solver_error_mm
     assert said is not None
-    assert error / 10.0 < said < error * 10.0
+    # step doubling is exact to leading order; for a tolerance the difference is that of a ten times larger one
+    low, high = (0.2, 5.0) if quality.step else (1.0, 50.0)
+    assert low * error < said < high * error
 
 
 def test_half_the_step_moves_less_than_the_error_said(predictors: dict[str, Predictor]) -> None:

@@ -1,0 +1,157 @@
+import hashlib
+import json
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import safetensors.numpy
+import safetensors.torch
+import torch
+
+from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint, write_checkpoint
+from odeform.errors import InputError
+from odeform.predictor import Predictor, load
+from odeform.simulation.scene import get_scene
+
+MODELS = ("odeform", "pod-rbf", "nearest")
+
+
+def small() -> Checkpoint:
+    return Checkpoint(
+        model="nearest",
+        schema=get_scene("kick").schema,
+        config={"answer": 42, "list": [1.5, None]},
+        arrays={"a": np.arange(6.0).reshape(2, 3).T, "b": np.array([1, 2], dtype=np.int32), "c": np.zeros((0, 3))},
+        provenance={"seed": 1},
+        scores={"rmse_mm": 0.25},
+    )
+
+
+def rewritten(source: Path, target: Path, change: Callable[[dict[str, str]], dict[str, str]]) -> Path:
+    """A copy of a checkpoint with its metadata changed."""
+    data = source.read_bytes()
+    header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+    target.write_bytes(safetensors.numpy.save(safetensors.numpy.load(data), change(header["__metadata__"])))
+    return target
+
+
+def test_comes_back_as_written(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "a.safetensors"
+    write_checkpoint(path, small())
+    again = read_checkpoint(path)
+    for name in ("model", "schema", "config", "provenance", "scores"):
+        assert getattr(again, name) == getattr(small(), name)
+    assert again.arrays.keys() == small().arrays.keys()
+    for name, array in small().arrays.items():
+        assert np.array_equal(again.arrays[name], array)
+        assert again.arrays[name].dtype == array.dtype
+    assert again.size_bytes == path.stat().st_size
+    assert again.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_same_content_same_file(tmp_path: Path) -> None:
+    write_checkpoint(tmp_path / "a", small())
+    write_checkpoint(tmp_path / "b", small())
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+def test_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.safetensors"
+    write_checkpoint(path, small())
+    before = path.read_bytes()
+    with pytest.raises(TypeError):
+        write_checkpoint(path, replace(small(), config={"unserialisable": object()}))
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_reloaded_model_predicts_the_same(
+    trained: dict[str, Path], predictors: dict[str, Predictor], model: str, tmp_path: Path
+) -> None:
+    write_checkpoint(tmp_path / "copy.safetensors", read_checkpoint(trained[model]))
+    again = load(tmp_path / "copy.safetensors")
+    assert isinstance(again, Predictor)
+    assert again.model == model
+    assert again.checkpoint.sha256 == predictors[model].checkpoint.sha256
+    times = np.linspace(0.0, 1.2, 7)
+    assert np.array_equal(again.solve().vertices(times), predictors[model].solve().vertices(times))
+
+
+@pytest.mark.parametrize("keep", [0, 4, 8, 100, -1, -1000])
+def test_truncated(trained: dict[str, Path], tmp_path: Path, keep: int) -> None:
+    path = tmp_path / "cut.safetensors"
+    path.write_bytes(trained["nearest"].read_bytes()[:keep])
+    with pytest.raises(InputError, match="truncated"):
+        load(path)
+
+
+def foreign() -> dict[str, bytes]:
+    return {
+        "pickle": pickle.dumps({"weights": [1.0]}),
+        "text": b"{}",
+        "huge header": (2**63).to_bytes(8, "little") + b"{}",
+        "without metadata": safetensors.numpy.save({"a": np.zeros(3)}),
+        "of another": safetensors.numpy.save({"a": np.zeros(3)}, {"format": "pt"}),
+        "of a later format": safetensors.numpy.save({"a": np.zeros(3)}, {"odeform": "2"}),
+        "bfloat16": safetensors.torch.save({"a": torch.zeros(3, dtype=torch.bfloat16)}),
+    }
+
+
+@pytest.mark.parametrize("kind", foreign())
+def test_foreign_files(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "foreign.safetensors"
+    path.write_bytes(foreign()[kind])
+    with pytest.raises(InputError, match=r"foreign\.safetensors"):
+        load(path)
+
+
+def meta(**changes: Any) -> Callable[[dict[str, str]], dict[str, str]]:
+    return lambda metadata: {**metadata, "meta": json.dumps({**json.loads(metadata["meta"]), **changes})}
+
+
+DAMAGE: dict[str, Callable[[dict[str, str]], dict[str, str]]] = {
+    "no meta": lambda metadata: {k: v for k, v in metadata.items() if k != "meta"},
+    "no model": lambda metadata: {k: v for k, v in metadata.items() if k != "model"},
+    "unknown model": lambda metadata: {**metadata, "model": "oracle"},
+    "model of other arrays": lambda metadata: {**metadata, "model": "odeform"},
+    "not JSON": lambda metadata: {**metadata, "meta": "{"},
+    "not an object": lambda metadata: {**metadata, "meta": "[]"},
+    "schema without fields": meta(schema={}),
+    "schema of a wrong type": meta(schema=7),
+    "config without fields": meta(config={}),
+    "config of a wrong type": meta(config=[1]),
+    "words for numbers": meta(config={"space": {"anchor": [0, 0, 0], "arm": "long", "basis_scale": 1.0}}),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_metadata(trained: dict[str, Path], tmp_path: Path, damage: str) -> None:
+    path = rewritten(trained["nearest"], tmp_path / "a.safetensors", DAMAGE[damage])
+    with pytest.raises(InputError):
+        load(path)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_missing_space(trained: dict[str, Path], tmp_path: Path, model: str) -> None:
+    whole = read_checkpoint(trained[model])
+    for missing in ("basis.weights", "rest.points"):
+        arrays = {name: array for name, array in whole.arrays.items() if name != missing}
+        write_checkpoint(tmp_path / "a.safetensors", replace(whole, arrays=arrays))
+        with pytest.raises(InputError, match=missing):
+            load(tmp_path / "a.safetensors")
+
+
+def test_names(tmp_path: Path) -> None:
+    path = tmp_path / "a.safetensors"
+    write_checkpoint(path, small())
+    assert resolve_checkpoint(str(path)) == path
+    with pytest.raises(InputError, match="neither a file nor bundled"):
+        resolve_checkpoint("throw/odeform")
+    with pytest.raises(InputError):
+        load(tmp_path)

@@ -1,0 +1,58 @@
+import json
+import math
+
+import numpy as np
+import pytest
+
+from odeform.errors import InputError
+from odeform.schema import Schema, Window
+from odeform.simulation.scene import get_scene
+
+SCHEMA = get_scene("kick").schema
+
+
+def test_survives_json() -> None:
+    assert Schema.from_json(json.loads(json.dumps(SCHEMA.to_json()))) == SCHEMA
+
+
+def test_ranges_map_to_the_unit_cube() -> None:
+    for parameter in SCHEMA.parameters:
+        assert parameter.normalise(parameter.low) == pytest.approx(-1.0)
+        assert parameter.normalise(parameter.high) == pytest.approx(1.0)
+        middle = math.sqrt if parameter.scale == "log" else lambda x: x / 2.0
+        between = parameter.low * parameter.high if parameter.scale == "log" else parameter.low + parameter.high
+        assert parameter.normalise(middle(between)) == pytest.approx(0.0, abs=1e-12)
+        for unit in (-1.4, -0.3, 0.9, 1.7):
+            assert parameter.normalise(parameter.denormalise(unit)) == pytest.approx(unit)
+
+
+def test_ends_of_the_window_are_frames() -> None:
+    assert np.allclose(Window(0.25, 1.0, 20.0).times, 0.25 + 0.05 * np.arange(16))
+
+
+def test_completes_with_defaults_in_order() -> None:
+    complete = SCHEMA.complete({"force": "100", "mass": 0.4})
+    assert list(complete) == [p.name for p in SCHEMA.parameters]
+    assert complete["force"] == 100.0
+    assert complete["bending"] == next(p.default for p in SCHEMA.parameters if p.name == "bending")
+
+
+def test_the_heading_is_not_learned() -> None:
+    one, two = (SCHEMA.complete({"azimuth": angle}) for angle in (0.0, 2.0))
+    assert np.array_equal(SCHEMA.vector(one), SCHEMA.vector(two))
+    assert SCHEMA.vector(one).shape == (4,)
+    assert SCHEMA.azimuth(two) == 2.0
+
+
+def test_outside_is_told_and_the_edge_is_inside() -> None:
+    edge = {p.name: p.high for p in SCHEMA.parameters}
+    assert SCHEMA.outside(SCHEMA.complete(edge)) == ()
+    assert SCHEMA.outside(SCHEMA.complete({**edge, "force": 151.0, "azimuth": 99.0})) == ("force",)
+
+
+@pytest.mark.parametrize(
+    "given", [{"Mass": 0.5}, {"mass": "x"}, {"mass": None}, {"mass": math.nan}, {"mass": 0.0}, {"force": -math.inf}], ids=str
+)
+def test_impossible_parameters(given: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(given))):
+        SCHEMA.complete(given)
