@@ -10,11 +10,12 @@ import odeform
 from odeform.evaluation.bench import ball
 from odeform_viz.app import App
 from odeform_viz.loopback import LoopbackClient
+from odeform_viz.scene import checker_parts
 from odeform_viz.session import Column
 
 __all__ = ["drag"]
 
-BODY = "/world/column_0/body"
+BODY = "/world/column_0/body/part_0"
 
 
 def drag(checkpoint: str, port: int, messages: int, points: int = 5000, rate: float = 20.0) -> dict[str, float]:
@@ -36,7 +37,8 @@ def drag(checkpoint: str, port: int, messages: int, points: int = 5000, rate: fl
         with LoopbackClient(port) as client:
             client.set("time (s)", moment)  # pauses
             client.collect(0.5)
-            expected = np.stack([predictor.solve(shape, {name: v}).vertices(moment)[0] for v in values])
+            first = checker_parts(shape)[0][0][0]
+            expected = np.stack([predictor.solve(shape, {name: v}).deformed(moment)[first] for v in values])
             for index, value in enumerate(values):
                 begin = time.perf_counter()
                 client.set(label, float(value))

@@ -71,20 +71,20 @@ class Recorder:
 
     def _log_column(self, column: Column, shown: ColumnFrame, time: float) -> None:
         path = f"world/{column.label}/body"
-        points = shown.motion.vertices(time) if shown.points is None else shown.points
+        points = shown.motion.deformed(time) if shown.points is None else shown.points
         if isinstance(column.geometry, Mesh):
             normals = _normals(points, column.geometry.faces)
             self._stream.log(path, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
         else:
             self._stream.log(path, rr.Points3D(points))
         pose = shown.pose
-        self._stream.log(f"pose/{column.label}", rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        self._stream.log(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
         stats = shown.stats
         numbers = {
             "evaluations": stats.evaluations,
             "solve_ms": stats.wall_ms,
             "solver_error_mm": stats.solver_error_mm,
-            "height_m": float(points[:, 2].mean()),
+            "height_m": float((pose[:3, :3] @ points.mean(axis=0) + pose[:3, 3])[2]),
         }
         for name, value in numbers.items():
             if value is not None:

@@ -1,6 +1,6 @@
 """Frames -> viser handles: columns side by side under one camera, the floor, the pulse."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import viser
@@ -8,68 +8,100 @@ import viser.transforms as vtf
 
 from odeform.geometry.rigid import rotation_z
 from odeform.model.motion import Motion
-from odeform.types import Floats, GaussianSplats, Mesh
+from odeform.types import Floats, GaussianSplats, Geometry, Ints, Mesh
 from odeform_viz.session import Column, ColumnFrame, Frame
 
-__all__ = ["SceneView"]
+__all__ = ["SceneView", "checker_parts"]
 
 COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (90, 90, 90))
-ARROW = (214, 48, 48)
+ARROW = (190, 20, 20)
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 
+def checker_parts(mesh: Mesh) -> list[tuple[Ints, Ints]]:
+    """A mesh in two parts, octants about its centre in turn: for each the vertices (M,) it uses and its faces (F, 3).
+
+    A body of one colour hides how it turns.
+    """
+    points = np.asarray(mesh.points, dtype=float)
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    odd = np.prod(points[mesh.faces].mean(axis=1) - centre, axis=1) > 0.0
+    parts = []
+    for faces in (mesh.faces[odd], mesh.faces[~odd]):
+        used, local = np.unique(faces, return_inverse=True)
+        parts.append((used, local.reshape(-1, 3)))
+    return [part for part in parts if len(part[0])]
+
+
+Update = Callable[[Floats], None]
+
+
+def _show_shape(server: viser.ViserServer, root: str, geometry: Geometry, color: tuple[int, int, int]) -> Update:
+    """Add a shape to the scene; returns what moves its points."""
+    points = np.asarray(geometry.points, dtype=np.float32)
+    if isinstance(geometry, Mesh):
+        return _show_mesh(server, root, geometry, color)
+    if isinstance(geometry, GaussianSplats):
+        return _show_splats(server, root, geometry)
+    cloud = server.scene.add_point_cloud(f"{root}/points", points, color, point_size=0.003)
+
+    def move(points: Floats) -> None:
+        cloud.points = points
+
+    return move
+
+
+def _show_mesh(server: viser.ViserServer, root: str, mesh: Mesh, color: tuple[int, int, int]) -> Update:
+    points = np.asarray(mesh.points, dtype=np.float32)
+    red, green, blue = (round(0.45 * c + 0.55 * 235) for c in color)
+    handles = []
+    for index, ((used, faces), shade) in enumerate(zip(checker_parts(mesh), (color, (red, green, blue)), strict=False)):
+        handle = server.scene.add_mesh_simple(f"{root}/part_{index}", points[used], faces, color=shade)
+        handles.append((handle, used))
+
+    def move(points: Floats) -> None:
+        for handle, used in handles:
+            handle.vertices = points[used]
+
+    return move
+
+
+def _show_splats(server: viser.ViserServer, root: str, splats: GaussianSplats) -> Update:
+    # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
+    scale = 0.01
+    covariances = (splats.covariances / scale**2).astype(np.float32)
+    colors, opacities = splats.colors.astype(np.float32), splats.opacities[:, None].astype(np.float32)
+    centers = (splats.points / scale).astype(np.float32)
+    handle = server.scene.add_gaussian_splats(f"{root}/splats", centers, covariances, colors, opacities, scale=scale)
+
+    def move(points: Floats) -> None:
+        handle.set_gaussians((points / scale).astype(np.float32), covariances, colors, opacities)
+
+    return move
+
+
 class _ColumnView:
-    """The nodes of one column. The body's node carries the pose when that says it all, else its points move."""
+    """The nodes of one column: a frame that carries the pose, and in it a shape whose points carry the deformation.
+
+    The pose travels with the world's offset, the points one rendering later: were they to carry the whole motion, a
+    body that the camera follows would tremble.
+    """
 
     def __init__(self, server: viser.ViserServer, root: str, column: Column, color: tuple[int, int, int]) -> None:
         self._server, self._geometry = server, column.geometry
-        geometry, points = column.geometry, np.asarray(column.geometry.points, dtype=np.float32)
-        scene = server.scene
-        # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
-        self._scale = 0.01 if isinstance(geometry, GaussianSplats) else 1.0
-        if isinstance(geometry, Mesh):
-            self._body = scene.add_mesh_simple(f"{root}/body", points, geometry.faces, color=color)
-        elif isinstance(geometry, GaussianSplats):
-            self._body = scene.add_gaussian_splats(
-                f"{root}/body",
-                points / self._scale,
-                (geometry.covariances / self._scale**2).astype(np.float32),
-                geometry.colors.astype(np.float32),
-                geometry.opacities[:, None].astype(np.float32),
-                scale=self._scale,
-            )
-        else:
-            self._body = scene.add_point_cloud(f"{root}/body", points, color, point_size=0.003)
+        self._body = server.scene.add_frame(f"{root}/body", show_axes=False)
+        self._shape = _show_shape(server, f"{root}/body", column.geometry, color)
         self._resting = True
-        self._path: viser.SceneNodeHandle | None = None
         self._root, self._color = root, color
 
     def show(self, frame: ColumnFrame) -> None:
-        if frame.points is None:
-            if not self._resting:
-                self._send(np.asarray(self._geometry.points, dtype=np.float32), None)
-                self._resting = True
-            self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
-            self._body.position = frame.pose[:3, 3]
-            return
-        if self._resting:
-            self._body.wxyz, self._body.position = IDENTITY, (0.0, 0.0, 0.0)
-            self._resting = False
-        self._send(frame.points, frame.covariances)
-
-    def _send(self, points: Floats, covariances: Floats | None) -> None:
-        if isinstance(self._body, viser.MeshHandle):
-            self._body.vertices = points
-        elif isinstance(self._geometry, GaussianSplats):
-            kept = self._geometry.covariances if covariances is None else covariances
-            self._body.set_gaussians(  # pyright: ignore[reportAttributeAccessIssue]
-                centers=points / self._scale,
-                covariances=(kept / self._scale**2).astype(np.float32),
-                rgbs=self._geometry.colors.astype(np.float32),
-                opacities=self._geometry.opacities[:, None].astype(np.float32),
-            )
-        else:
-            self._body.points = points  # pyright: ignore[reportAttributeAccessIssue]
+        self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
+        self._body.position = frame.pose[:3, 3]
+        if frame.points is not None:
+            self._shape(frame.points)
+        elif not self._resting:
+            self._shape(np.asarray(self._geometry.points, dtype=np.float32))
+        self._resting = frame.points is None
 
     def show_path(self, motion: Motion) -> None:
         """The way of the body's centre over the trained window."""
@@ -78,13 +110,19 @@ class _ColumnView:
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         way = poses[:, :3, :3] @ centre + poses[:, :3, 3]
         segments = np.stack([way[:-1], way[1:]], axis=1).astype(np.float32)
-        self._path = self._server.scene.add_line_segments(
+        self._server.scene.add_line_segments(
             f"{self._root}/path",
             segments,
             colors=np.array(self._color, dtype=np.uint8),
             thickness=2.0,
             thickness_units="screen",
         )
+
+
+def _centre(frame: ColumnFrame) -> Floats:
+    """(3,) where the rigid part takes the centre of the body."""
+    centre = np.asarray(frame.motion.geometry.points, dtype=float).mean(axis=0)
+    return frame.pose[:3, :3] @ centre + frame.pose[:3, 3]
 
 
 class SceneView:
@@ -96,14 +134,15 @@ class SceneView:
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
         self._gap, self._size = 1.6 * extent, extent
         self._set_stage()
-        self._frames, self._views = [], []
+        self._frames, self._views, self._labels = [], [], []
         for index, column in enumerate(columns):
             root = f"/world/column_{index}"
             self._frames.append(server.scene.add_frame(root, show_axes=False, position=self._place(index)))
             self._views.append(_ColumnView(server, root, column, COLORS[index % len(COLORS)]))
             if len(columns) > 1:
-                above = np.asarray(column.geometry.points).max(axis=0)[2] + 0.35 * extent
-                server.scene.add_label(f"{root}/label", column.label, position=(0.0, 0.0, above))
+                # a label lags where its own position changes, not where its parent's does
+                self._labels.append(server.scene.add_frame(f"{root}/above", show_axes=False))
+                server.scene.add_label(f"{root}/above/label", column.label, position=(0.0, 0.0, 0.75 * extent))
         self._motions: list[Motion | None] = [None] * len(columns)
 
     def _place(self, index: int) -> tuple[float, float, float]:
@@ -144,6 +183,8 @@ class SceneView:
                     self._views[index].show_path(column.motion)
                     self._show_pulse(index, column.motion)
                 self._views[index].show(column)
+                if self._labels:
+                    self._labels[index].position = _centre(column)
             self._world.position = self._offset(frame)
         self._server.flush()
 
@@ -152,8 +193,7 @@ class SceneView:
         first = next((column for column in frame.columns if column is not None), None)
         if not self.follow or first is None:
             return (0.0, 0.0, 0.0)
-        centre = np.asarray(first.motion.geometry.points, dtype=float).mean(axis=0)
-        moved = first.pose[:3, :3] @ centre + first.pose[:3, 3] - centre
+        moved = _centre(first) - np.asarray(first.motion.geometry.points, dtype=float).mean(axis=0)
         return (-float(moved[0]), -float(moved[1]), 0.0)
 
     def _show_pulse(self, index: int, motion: Motion) -> None:

@@ -9,7 +9,7 @@ from odeform.errors import InputError
 from odeform.model.motion import Motion, SolveStats
 from odeform.predictor import Predictor
 from odeform.schema import Schema
-from odeform.types import Floats, GaussianSplats, Geometry
+from odeform.types import Floats, Geometry
 
 __all__ = ["Column", "ColumnFrame", "Frame", "Session", "Wish"]
 
@@ -37,11 +37,14 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class ColumnFrame:
-    """One column at one moment. `points` is None where the pose says it all; `covariances` only for splats."""
+    """One column at one moment: the `pose` (4, 4), and what it moves.
+
+    `points` (N, 3) is the body deformed where it rests; None where the deformation is too small to be seen, and the
+    pose says it all.
+    """
 
     motion: Motion
     points: Floats | None
-    covariances: Floats | None
     pose: Floats
 
     @property
@@ -101,12 +104,11 @@ class Session:
     def _column(self, motion: Motion, time: float) -> ColumnFrame:
         pose = motion.pose(time)
         if motion.deformation_bound(time) < INVISIBLE:
-            return ColumnFrame(motion, None, None, pose)
-        points = motion.vertices(time)
+            return ColumnFrame(motion, None, pose)
+        points = motion.deformed(time)
         if not (np.isfinite(points).all() and np.isfinite(pose).all()):
             raise InputError(f"the prediction at t = {time:.3f} s is not finite; the last good frame stays")
-        covariances = motion.covariances(time) if isinstance(motion.geometry, GaussianSplats) else None
-        return ColumnFrame(motion, points, covariances, pose)
+        return ColumnFrame(motion, points, pose)
 
     def largest_deformation(self, wish: Wish) -> float:
         """The time within the trained window at which the first visible column is deformed most."""

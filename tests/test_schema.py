@@ -51,7 +51,9 @@ def test_outside_is_told_and_the_edge_is_inside() -> None:
 
 
 @pytest.mark.parametrize(
-    "given", [{"Mass": 0.5}, {"mass": "x"}, {"mass": None}, {"mass": math.nan}, {"mass": 0.0}, {"force": -math.inf}], ids=str
+    "given",
+    [{"Mass": 0.5}, {"mass": "x"}, {"mass": None}, {"mass": math.nan}, {"mass": 0.0}, {"force": -math.inf}],
+    ids=str,
 )
 def test_impossible_parameters(given: dict) -> None:
     with pytest.raises(InputError, match=next(iter(given))):

@@ -117,6 +117,10 @@ class Motion:
         out = self._deformation(self._reduced(np.asarray(t))) @ self._to_canonical_axes.astype(np.float32)
         return out[0] if np.ndim(t) == 0 else out
 
+    def deformed(self, t: float) -> Floats:
+        """D(t)(P0), the deformation alone where the body rests: (N, 3) float32 metres. `pose(t)` takes it on."""
+        return self.placed.points + self.local(t)
+
     def covariances(self, t: float) -> Floats:
         """(N, 3, 3) covariances of splats at time `t`, turned with the rigid part."""
         assert isinstance(self.geometry, GaussianSplats)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import trimesh
 
+from odeform.geometry.primitives import octasphere
 from odeform.geometry.rigid import rotation_z
 from odeform.schema import Parameter, Parameters, Schema, Window
 from odeform.simulation.scene import Scene
@@ -76,8 +77,8 @@ def simulate(parameters: Parameters, rate: float | None = None, step: float = ST
 
 def rest_mesh() -> Mesh:
     """A fine ball touching the floor, for display."""
-    sphere = trimesh.creation.icosphere(4, RADIUS)
-    return Mesh(np.add(sphere.vertices, (0.0, 0.0, RADIUS)), np.asarray(sphere.faces))
+    sphere = octasphere(RADIUS, segments=24)
+    return Mesh(np.add(sphere.points, (0.0, 0.0, RADIUS)), sphere.faces)
 
 
 SCENE = Scene(

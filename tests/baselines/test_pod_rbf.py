@@ -46,6 +46,8 @@ def test_chosen_setting_is_the_best_on_val(data: TrainingData) -> None:
     strict=True, reason="scipy's quintic kernel wants at least 15 points in 4 dimensions", raises=ValueError
 )
 def test_few_sequences(data: TrainingData) -> None:
-    few = TrainingData(**{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced")}})
+    few = TrainingData(
+        **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced")}}
+    )
     arrays, _ = fit_pod_rbf(few)
     assert np.isfinite(arrays["pod.coefficients"]).all()

@@ -29,7 +29,7 @@ everywhere = pytest.mark.parametrize("model", MODELS)
 
 def ball(level: int) -> Mesh:
     sphere = trimesh.creation.icosphere(level, 0.1)
-    return Mesh(np.asarray(sphere.vertices) + [0.0, 0.0, 0.1], np.asarray(sphere.faces))
+    return Mesh(np.add(sphere.vertices, (0.0, 0.0, 0.1)), np.asarray(sphere.faces))
 
 
 def egg() -> Mesh:

@@ -15,7 +15,7 @@ HEADING = 0.9
 def rolling() -> tuple[Sequence, np.ndarray, np.ndarray]:
     """A stiff ball that flies off and makes two turns, and the pose that describes it."""
     sphere = trimesh.creation.icosphere(2, 0.1)
-    rest = np.asarray(sphere.vertices) + [0.0, 0.0, 0.1]
+    rest = np.add(sphere.vertices, (0.0, 0.0, 0.1))
     s = np.linspace(0.0, 1.0, 61)[:, None]
     pose = np.concatenate([s * [0.8, 0.1, 0.3], s * [0.2, 4.0 * np.pi, 0.1]], axis=1)
     anchor = np.array([0.0, 0.0, 0.1])

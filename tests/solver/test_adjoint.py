@@ -29,9 +29,7 @@ def gradients(frames: int, adjoint: bool) -> tuple[torch.Tensor, Tensors]:
         states = solve_backprop(field, start, quality, frames)
     loss = (states[frames // 2] ** 2).sum() + torch.sin(states[-1]).sum()
     grads = torch.autograd.grad(loss, (start, *weights), allow_unused=True)
-    return states.detach(), tuple(
-        torch.zeros(2, dtype=torch.float64) if g is None else g.detach() for g in grads
-    )
+    return states.detach(), tuple(torch.zeros(2, dtype=torch.float64) if g is None else g.detach() for g in grads)
 
 
 def gap(frames: int) -> float:

@@ -21,7 +21,7 @@ def _record(kick: Predictor, path: Path, times: list[float]) -> list[np.ndarray]
         recorder.log(frame)
         column = frame.columns[0]
         assert column is not None
-        shown.append(column.motion.vertices(time))
+        shown.append(column.motion.deformed(time))
     recorder.close()
     return shown
 

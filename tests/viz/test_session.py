@@ -47,7 +47,7 @@ def test_hidden_columns_are_not_computed(session: Session, wish: Wish, monkeypat
 def test_a_frame_is_what_the_predictor_says(session: Session, wish: Wish) -> None:
     shown = session.frame(wish).columns[0]
     assert shown is not None
-    expected = session.columns[0].predictor.solve(session.columns[0].geometry, dict(wish.parameters)).vertices(0.02)
+    expected = session.columns[0].predictor.solve(session.columns[0].geometry, dict(wish.parameters)).deformed(0.02)
     np.testing.assert_array_equal(shown.points, expected)
 
 

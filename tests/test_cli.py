@@ -1,0 +1,177 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from odeform.cli import main, run_guarded
+from odeform.dataset.store import Dataset, open_dataset
+from odeform.predictor import Predictor, load
+
+
+def run(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def test_info(trained: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for model, path in trained.items():
+        assert run("info", path) == 0
+        result = json.loads(capsys.readouterr().out)
+        assert result["model"] == model
+        assert result["schema"]["scene"] == "kick"
+        assert result["sha256"] == load(path).checkpoint.sha256
+        assert result["scores"]["rmse_pooled_mm"] > 0.0
+        assert run("info", path, "--json", tmp_path / "info.json") == 0
+        assert json.loads((tmp_path / "info.json").read_text()) == result
+        assert capsys.readouterr().out == ""
+
+
+def test_predict_npz(
+    trained: dict[str, Path], predictors: dict[str, Predictor], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "motion.npz"
+    settings = ("--set", "mass=0.4", "azimuth=1.0", "--set", "force=100")
+    assert run("predict", trained["odeform"], "--out", out, *settings, "--times", "0:1.5:0.1") == 0
+    assert "15 frames of 2562 points" in capsys.readouterr().out
+    motion = predictors["odeform"].solve(None, {"mass": 0.4, "azimuth": 1.0, "force": 100.0})
+    with np.load(out, allow_pickle=False) as arrays:
+        assert set(arrays) == {"times", "vertices", "faces", "parameters"}
+        assert arrays["vertices"].dtype == np.float32
+        assert arrays["vertices"].shape == (15, 2562, 3)
+        assert np.allclose(arrays["times"], np.arange(15) / 10.0)
+        assert np.array_equal(arrays["faces"], motion.geometry.faces)  # pyright: ignore[reportAttributeAccessIssue]
+        assert json.loads(str(arrays["parameters"])) == motion.parameters
+        assert np.array_equal(arrays["vertices"], motion.vertices(arrays["times"]))
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_predict_defaults_to_the_trained_frames(trained: dict[str, Path], tmp_path: Path) -> None:
+    assert run("predict", trained["nearest"], "--out", tmp_path / "a.npz") == 0
+    with np.load(tmp_path / "a.npz") as arrays:
+        assert np.allclose(arrays["times"], np.arange(121) / 120.0)
+
+
+def test_predict_ply(trained: dict[str, Path], predictors: dict[str, Predictor], tmp_path: Path) -> None:
+    out = tmp_path / "frames" / "ball_{frame}.ply"
+    assert run("predict", trained["odeform"], "--out", out, "--times", "0:0.3:0.1") == 0
+    files = sorted(out.parent.iterdir())
+    assert [file.name for file in files] == ["ball_00000.ply", "ball_00001.ply", "ball_00002.ply"]
+    mesh = trimesh.load_mesh(files[2], process=False)
+    motion = predictors["odeform"].solve()
+    assert np.allclose(mesh.vertices, motion.vertices(0.2), atol=1e-6)
+    assert np.array_equal(mesh.faces, motion.geometry.faces)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_predict_fits_a_foreign_shape(trained: dict[str, Path], tmp_path: Path) -> None:
+    box = trimesh.creation.box((2.0, 1.0, 1.0))
+    box.apply_translation([50.0, 3.0, -7.0])
+    box.export(tmp_path / "box.obj")
+    out = tmp_path / "box.npz"
+    assert run("predict", trained["odeform"], "--geometry", tmp_path / "box.obj", "--out", out) == 0
+    with np.load(out) as arrays:
+        start = arrays["vertices"][0]
+        assert np.allclose(np.ptp(start, axis=0), [0.2, 0.1, 0.1], atol=1e-5)
+        assert start[:, 2].min() == pytest.approx(0.0, abs=1e-5)
+
+
+def test_predict_tells_what_is_outside(
+    trained: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("predict", trained["nearest"], "--out", tmp_path / "a.npz", "--set", "mass=7") == 0
+    assert capsys.readouterr().err.splitlines() == ["note: mass = 7 is outside the trained range"]
+
+
+def test_evaluate(
+    trained: dict[str, Path], dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = tmp_path / "scores.json"
+    arguments = ("evaluate", trained["odeform"], trained["nearest"], trained["pod-rbf"], "--data", dataset.root)
+    assert run(*arguments, "--json", report) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["model", "odeform", "nearest", "pod-rbf"]
+    result = json.loads(report.read_text())
+    for model, scores in result["models"].items():
+        said = load(trained[model]).checkpoint.scores
+        assert scores["rmse_pooled_mm"] == pytest.approx(said["rmse_pooled_mm"], rel=1e-6)
+
+
+def test_train(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new.safetensors"
+    assert run("train", dataset.root, "--out", out, "--model", "nearest", "--window", "0:61", "--every", "2") == 0
+    assert str(out) in capsys.readouterr().err
+    assert load(out).schema.window.rate == pytest.approx(60.0)
+    assert load(out).schema.window.stop == pytest.approx(0.5)
+
+
+def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("simulate", "kick", "--out", tmp_path / "new", "--count", 1, "--seed", 2, "--workers", 1, "--rate", 30)
+    assert run(*arguments) == 0
+    assert "1 sequences" in capsys.readouterr().out
+    made = open_dataset(tmp_path / "new")
+    sequence = made.read(made.entries[0])
+    assert sequence.vertices.shape == (31, 162, 3)
+    assert made.provenance["rate_hz"] == 30.0
+
+
+BAD = {
+    "info: no such checkpoint": "info nothing.safetensors",
+    "info: not a checkpoint": "info {text}",
+    "info: a folder": "info {data}",
+    "info: cannot write": "info {nearest} --json {text}/info.json",
+    "evaluate: no such checkpoint": "evaluate nothing --data {data}",
+    "evaluate: no data set": "evaluate {nearest} --data {empty}",
+    "evaluate: window": "evaluate {nearest} --data {data} --window 5",
+    "evaluate: window reversed": "evaluate {nearest} --data {data} --window 9:3",
+    "predict: no such checkpoint": "predict nothing --out {empty}/a.npz",
+    "predict: ending": "predict {nearest} --out {empty}/a.obj",
+    "predict: one file for all frames": "predict {nearest} --out {empty}/a.ply",
+    "predict: unknown parameter": "predict {nearest} --out {empty}/a.npz --set speed=3",
+    "predict: no value": "predict {nearest} --out {empty}/a.npz --set mass",
+    "predict: word": "predict {nearest} --out {empty}/a.npz --set mass=heavy",
+    "predict: negative": "predict {nearest} --out {empty}/a.npz --set mass=-1",
+    "predict: not finite": "predict {nearest} --out {empty}/a.npz --set force=nan",
+    "predict: times": "predict {nearest} --out {empty}/a.npz --times 1:0:0.1",
+    "predict: quality": "predict {odeform} --out {empty}/a.npz --quality perfect",
+    "predict: no such shape": "predict {nearest} --out {empty}/a.npz --geometry nothing.obj",
+    "predict: no shape": "predict {nearest} --out {empty}/a.npz --geometry {text}",
+    "train: no data set": "train {empty} --out {empty}/a.safetensors",
+    "train: unknown model": "train {data} --out {empty}/a.safetensors --model oracle",
+    "train: window": "train {data} --out {empty}/a.safetensors --window 0:b",
+    "simulate: unknown scene": "simulate throw --out {empty}",
+    "simulate: another data set": "simulate kick --out {data} --count 2",
+    "simulate: count": "simulate kick --out {empty} --count 0",
+    "simulate: workers": "simulate kick --out {empty} --workers 0",
+    "simulate: rate": "simulate kick --out {empty} --rate nan",
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_faults_in_one_line(
+    trained: dict[str, Path], dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str
+) -> None:
+    (tmp_path / "text.txt").write_text("hello\n")
+    (tmp_path / "empty").mkdir()
+    places = {**trained, "data": dataset.root, "text": tmp_path / "text.txt", "empty": tmp_path / "empty"}
+    assert run(*(word.format(**places) for word in BAD[fault].split())) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert len(captured.err.splitlines()) == 1
+    assert captured.err.startswith("error: ")
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["predict"], ["predict", "a", "--out"], ["train", "a"]], ids=str)
+def test_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as error:
+        main(arguments)
+    assert error.value.code == 2
+    assert "usage: odeform" in capsys.readouterr().err
+
+
+def test_interrupted(capsys: pytest.CaptureFixture[str]) -> None:
+    def work() -> None:
+        raise KeyboardInterrupt
+
+    assert run_guarded(work) == 130
+    assert len(capsys.readouterr().err.splitlines()) == 1

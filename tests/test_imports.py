@@ -1,0 +1,26 @@
+"""What looking at a model costs to import: neither the training framework, nor GUI, recorder or simulator."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HEAVY = ("torch", "viser", "rerun", "mujoco", "joblib", "odeform_viz")
+
+
+@pytest.mark.parametrize("model", ["odeform", "pod-rbf", "nearest"])
+def test_predicting_loads_nothing_heavy(trained: dict[str, Path], model: str, tmp_path: Path) -> None:
+    script = f"""
+import sys
+import odeform
+motion = odeform.load({str(trained[model])!r}).solve(parameters={{"mass": 0.4}})
+assert motion.vertices(0.5).shape == (2562, 3)
+from odeform.cli import main
+assert main(["predict", {str(trained[model])!r}, "--out", {str(tmp_path / "a.npz")!r}, "--times", "0:0.1:0.05"]) == 0
+assert main(["info", {str(trained[model])!r}]) == 0
+found = [name for name in {HEAVY!r} if name in sys.modules]
+assert not found, found
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,109 @@
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from odeform.dataset.store import Dataset
+from odeform.errors import InputError
+from odeform.evaluation.metrics import evaluate
+from odeform.model.data import TrainingData, prepare
+from odeform.predictor import Predictor, load
+from odeform.simulation.scene import get_scene
+from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
+from odeform.training.train import TrainRequest, train
+
+
+@pytest.fixture(scope="module")
+def data(dataset: Dataset) -> TrainingData:
+    return prepare(dataset, modes=8)
+
+
+def silent(_: str) -> None: ...
+
+
+def test_a_seed_makes_one_network(data: TrainingData) -> None:
+    one, two, other = (network_weights(build_network(data, seed)) for seed in (5, 5, 6))
+    assert all(np.array_equal(one[name], two[name]) for name in one)
+    name = "local_field.net.0.weight"
+    assert not np.array_equal(one[name], other[name])
+
+
+def test_outputs_are_whitened(data: TrainingData) -> None:
+    """Each part of y comes out of order one: shifts alike, turns alike, every mode for itself."""
+    gains = build_network(data, 0).gains.numpy()
+    assert len(set(gains[:3])) == len(set(gains[3:6])) == 1
+    whitened = data.reduced["train"] / gains
+    assert (whitened[..., :3] ** 2).mean(axis=(0, 1)).sum() == pytest.approx(1.0, rel=1e-4)
+    assert (whitened[..., 3:6] ** 2).mean(axis=(0, 1)).sum() == pytest.approx(1.0, rel=1e-4)
+    assert (whitened[..., 6:] ** 2).mean(axis=(0, 1)) == pytest.approx(np.ones(8), rel=1e-4)
+
+
+def test_seconds_of_training_lower_the_error(data: TrainingData) -> None:
+    before = train_network(build_network(data, 0), data, TrainConfig(minutes=0.0), silent)
+    after = train_network(build_network(data, 0), data, TrainConfig(minutes=0.1), silent)
+    assert after["val_rigid_rmse_mm"] < 0.75 * before["val_rigid_rmse_mm"]
+
+
+def test_training_does_not_look_at_val(data: TrainingData) -> None:
+    """With validation data of pure noise, whitening and network stay the same."""
+    noise = np.random.default_rng(0).normal(size=data.reduced["val"].shape)
+    blind = TrainingData(**{**vars(data), "reduced": {"train": data.reduced["train"], "val": noise}})
+    one, two = (network_weights(build_network(d, 0)) for d in (data, blind))
+    assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
+def test_scores_are_those_of_the_file(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    for predictor in predictors.values():
+        again = evaluate(predictor, dataset, "test")
+        for name in ("rmse_pooled_mm", "deformation_relative", "parameters"):
+            assert predictor.checkpoint.scores[name] == pytest.approx(again[name], rel=1e-6)
+
+
+def test_a_checkpoint_says_where_it_comes_from(predictors: dict[str, Predictor]) -> None:
+    provenance = predictors["odeform"].checkpoint.provenance
+    assert provenance["dataset"]["seed"] == 3
+    assert provenance["seed"] == 1
+    assert provenance["fixed"]["radius_m"] == 0.1
+    assert provenance["versions"]["torch"] == torch.__version__
+    assert provenance["command"][1].startswith("odeform train")
+
+
+def trained_on(
+    dataset: Dataset, tmp_path: Path, window: tuple[int, int] | None, every: int = 1, report: Callable = silent
+) -> Predictor:
+    rest = get_scene("kick").rest_mesh()
+    path = tmp_path / "nearest.safetensors"
+    train(dataset, rest, path, TrainRequest("nearest", window=window, every=every), report)
+    return load(path)
+
+
+def test_part_of_the_frames(dataset: Dataset, tmp_path: Path) -> None:
+    predictor = trained_on(dataset, tmp_path, window=(0, 41), every=4)
+    assert np.allclose(predictor.schema.window.times, np.arange(11) / 30.0)
+    scores = evaluate(predictor, dataset, "train", window=(0, 41))
+    assert scores["rmse_pooled_mm"] < 0.1
+    # the frames in between were never shown, and are known apart
+    assert scores["rmse_pooled_mm"] < scores["off_grid_rmse_mm"] < 20.0
+
+
+@pytest.mark.xfail(strict=True, reason="solvers and splines count from the window's start, motions from zero")
+def test_window_that_starts_late(dataset: Dataset, tmp_path: Path) -> None:
+    predictor = trained_on(dataset, tmp_path, window=(10, 41))
+    assert evaluate(predictor, dataset, "train", window=(10, 41))["rmse_pooled_mm"] < 0.1
+
+
+@pytest.mark.xfail(strict=True, reason="not checked", raises=(IndexError, ValueError))
+@pytest.mark.parametrize(("window", "every"), [((500, 600), 1), ((120, 121), 1), (None, 121), (None, 0), (None, -1)])
+def test_frames_that_are_not_there(
+    dataset: Dataset, tmp_path: Path, window: tuple[int, int] | None, every: int
+) -> None:
+    with pytest.raises(InputError):
+        trained_on(dataset, tmp_path, window, every)
+
+
+def test_unknown_model(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="oracle"):
+        train(dataset, get_scene("kick").rest_mesh(), tmp_path / "a", TrainRequest("oracle"), silent)
+    assert not (tmp_path / "a").exists()
