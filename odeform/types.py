@@ -4,38 +4,70 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
-__all__ = ["Arrays", "Floats", "GaussianSplats", "Geometry", "Ints", "Mesh", "PointCloud", "Sequence"]
+__all__ = [
+    "Arrays",
+    "Basis",
+    "Faces",
+    "Floats",
+    "Frames",
+    "GaussianSplats",
+    "Geometry",
+    "Ints",
+    "Mesh",
+    "Perpoint",
+    "PointCloud",
+    "Points",
+    "Pose",
+    "Rotations",
+    "Sequence",
+    "Times",
+    "Vector",
+    "Vectors",
+]
 
 Floats = NDArray[np.floating]
 Ints = NDArray[np.integer]
 Arrays = dict[str, NDArray[Any]]
+
+# Shapes; sizes of one name agree within a call. Checked at run time in tests only.
+Points = Float[np.ndarray, "points 3"]
+Perpoint = Float[np.ndarray, "points"]
+Faces = Int[np.ndarray, "faces 3"]
+Frames = Float[np.ndarray, "times points 3"]
+Times = Float[np.ndarray, "times"]
+Vector = Float[np.ndarray, "3"]
+Vectors = Float[np.ndarray, "*batch 3"]
+Rotations = Float[np.ndarray, "*batch 3 3"]
+Pose = Float[np.ndarray, "*batch 4 4"]
+Basis = Float[np.ndarray, "points 3 modes"]
 
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
     """`points` (N, 3) metres."""
 
-    points: Floats
+    points: Points
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """`points` (N, 3) metres, `faces` (F, 3) indices, counter-clockwise from outside."""
 
-    points: Floats
-    faces: Ints
+    points: Points
+    faces: Faces
 
 
 @dataclass(frozen=True, eq=False)
 class GaussianSplats:
     """`points` (N, 3) centres in m, `covariances` (N, 3, 3) m^2, `colors` (N, 3) and `opacities` (N,) in [0, 1]."""
 
-    points: Floats
-    covariances: Floats
-    colors: Floats
-    opacities: Floats
+    points: Points
+    covariances: Float[np.ndarray, "points 3 3"]
+    colors: Points
+    opacities: Perpoint
 
 
 Geometry = Mesh | PointCloud | GaussianSplats
@@ -49,10 +81,10 @@ class Sequence:
     mass at each vertex, summing to 1; `parameters` in the units of the schema.
     """
 
-    times: Floats
-    vertices: Floats
-    faces: Ints
-    weights: Floats
+    times: Times
+    vertices: Frames
+    faces: Faces
+    weights: Perpoint
     parameters: dict[str, float] = field(default_factory=dict)
     name: str = ""
 

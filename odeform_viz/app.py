@@ -51,6 +51,8 @@ class App:
         self._scene = SceneView(self.server, self.session.columns)
         with self.server.gui.add_folder("View"):
             follow = self.server.gui.add_checkbox("follow the body", initial_value=True)
+        with self.server.gui.add_folder("About", expand_by_default=False):
+            self.server.gui.add_markdown(_about(self.session))
         follow.on_update(lambda event: self._set_follow(bool(event.target.value)))
         self.server.gui.add_command("Play or pause", hotkey="K").on_trigger(lambda _: self._playback.toggle())
         self._shown: Frame | None = None
@@ -99,6 +101,15 @@ class App:
         except InputError as error:
             self._status.show_error(str(error))
         return TICK if self.clock.playing else None
+
+
+def _about(session: Session) -> str:
+    """What the scene leaves fixed, what to keep in mind, and where the models come from."""
+    checkpoint = session.columns[0].predictor.checkpoint
+    fixed = ", ".join(f"{name} {value:.4g}" for name, value in checkpoint.provenance.get("fixed", {}).items())
+    lines = [*session.schema.notes, f"Fixed: {fixed}."]
+    lines += [f"Made by `{command}`." for command in checkpoint.provenance.get("command", [])]
+    return "\n\n".join([*lines, "Press K to play or pause."])
 
 
 def _require_free(host: str, port: int) -> None:

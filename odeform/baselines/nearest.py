@@ -6,8 +6,9 @@ from odeform.baselines.frames import FrameTrajectory
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.data import TrainingData
+from odeform.model.motion import PlacedBasis
 from odeform.solver.integrate import Quality
-from odeform.types import Arrays, Floats, Geometry
+from odeform.types import Arrays, Floats
 
 __all__ = ["Nearest", "fit_nearest"]
 
@@ -22,7 +23,7 @@ class Nearest(ReducedModel):
         self._theta = checkpoint.arrays["theta"]
         self._reduced = checkpoint.arrays["reduced"]
 
-    def _trajectory(self, theta: Floats, geometry: Geometry, quality: Quality | None, until: float) -> FrameTrajectory:
+    def _trajectory(self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float) -> FrameTrajectory:
         row = int(((self._theta - theta) ** 2).sum(axis=1).argmin())
         return FrameTrajectory("nearest training sequence", self._times, lambda: self._reduced[row])
 

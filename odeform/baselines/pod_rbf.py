@@ -12,11 +12,13 @@ from scipy.interpolate import RBFInterpolator
 
 from odeform.baselines.frames import FrameTrajectory
 from odeform.checkpoint import Checkpoint
+from odeform.errors import InputError
 from odeform.model.base import ReducedModel
 from odeform.model.data import TrainingData
+from odeform.model.motion import PlacedBasis
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality
-from odeform.types import Arrays, Floats, Geometry
+from odeform.types import Arrays, Floats
 
 __all__ = ["PodRbf", "fit_pod_rbf"]
 
@@ -40,7 +42,7 @@ class PodRbf(ReducedModel):
             smoothing=config["smoothing"],
         )
 
-    def _trajectory(self, theta: Floats, geometry: Geometry, quality: Quality | None, until: float) -> FrameTrajectory:
+    def _trajectory(self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float) -> FrameTrajectory:
         def predict() -> Floats:
             flat = self._mean + self._interpolate(theta[None])[0] @ self._basis
             return flat.reshape(len(self._times), -1)
@@ -61,11 +63,16 @@ def fit_pod_rbf(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
     target = (val * weight).reshape(len(val), -1)
 
     def error(kernel: str, smoothing: float) -> float:
-        model = RBFInterpolator(data.theta["train"], coefficients, kernel=kernel, smoothing=smoothing)
+        try:
+            model = RBFInterpolator(data.theta["train"], coefficients, kernel=kernel, smoothing=smoothing)
+        except (ValueError, np.linalg.LinAlgError):
+            return float("inf")  # too few sequences for the polynomial that goes with this kernel
         return float(np.sqrt(((mean + model(data.theta["val"]) @ modes - target) ** 2).sum(axis=1).mean()))
 
     settings = list(itertools.product(KERNELS, SMOOTHINGS))
     scores = [error(kernel, smoothing) for kernel, smoothing in settings]
+    if not np.isfinite(min(scores)):
+        raise InputError(f"pod-rbf: {len(train)} training sequences are too few for any kernel")
     kernel, smoothing = settings[int(np.argmin(scores))]
     unweight = np.tile(1.0 / weight, train.shape[1])
     arrays = {

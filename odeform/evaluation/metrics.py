@@ -16,12 +16,12 @@ from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
 from odeform.predictor import Predictor
 from odeform.schema import Window
-from odeform.types import Floats, Sequence
+from odeform.types import Floats, Frames, Perpoint, Sequence
 
 __all__ = ["evaluate", "score"]
 
 
-def _deformation(vertices: Floats, weights: Floats) -> Floats:
+def _deformation(vertices: Frames, weights: Perpoint) -> Frames:
     """(T, N, 3) displacements that remain after the best rigid motion of each frame."""
     rest = vertices[0].astype(float)
     rotation, shift = best_rigid(rest, vertices, weights)
@@ -90,9 +90,15 @@ def evaluate(
     if predictor.schema.scene != dataset.schema.scene:
         raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {dataset.schema.scene}")
 
+    frames = range(*(window or (1, 2)))
+    if not any(frame > 0 for frame in frames):
+        raise InputError(f"window {window}: expected frames after frame 0, which is given")
+
     def pairs() -> Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]:
         for whole in dataset.sequences(split):
             begin, end = window or (0, len(whole.times))
+            if begin >= len(whole.times):
+                raise InputError(f"window {window}: {whole.name} has {len(whole.times)} frames")
             keep = np.unique(np.concatenate([[0], np.arange(begin, min(end, len(whole.times)))]))
             truth = Sequence(
                 whole.times[keep], whole.vertices[keep], whole.faces, whole.weights, whole.parameters, whole.name

@@ -1,19 +1,20 @@
 """Rigid motion: rotations, rotation vectors, and the best rigid fit between two shapes. All float64 numpy."""
 
 import numpy as np
+from jaxtyping import Float
 
-from odeform.types import Floats
+from odeform.types import Perpoint, Points, Rotations, Vectors
 
 __all__ = ["best_rigid", "rotation_from_vector", "rotation_z", "unwrapped_vectors", "vector_from_rotation"]
 
 
-def rotation_z(angle: float) -> Floats:
+def rotation_z(angle: float) -> Rotations:
     """(3, 3) rotation by `angle` radians about the vertical axis."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def rotation_from_vector(vector: Floats) -> Floats:
+def rotation_from_vector(vector: Vectors) -> Rotations:
     """(..., 3) rotation vectors in radians of any length -> (..., 3, 3) (Rodrigues)."""
     vector = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]
@@ -25,7 +26,7 @@ def rotation_from_vector(vector: Floats) -> Floats:
     return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
 
 
-def vector_from_rotation(rotation: Floats) -> Floats:
+def vector_from_rotation(rotation: Rotations) -> Vectors:
     """(..., 3, 3) -> (..., 3) rotation vector of angle at most pi, through a unit quaternion for accuracy near pi."""
     from scipy.spatial.transform import Rotation
 
@@ -33,7 +34,7 @@ def vector_from_rotation(rotation: Floats) -> Floats:
     return flat.reshape(*rotation.shape[:-2], 3)
 
 
-def unwrapped_vectors(rotations: Floats) -> Floats:
+def unwrapped_vectors(rotations: Rotations) -> Vectors:
     """(T, 3, 3) -> (T, 3) rotation vectors without jumps: each frame takes the turn count nearest to the last one.
 
     A ball that rolls makes several turns; its rotation vector then grows past pi instead of flipping back.
@@ -53,7 +54,9 @@ def unwrapped_vectors(rotations: Floats) -> Floats:
     return vectors
 
 
-def best_rigid(rest: Floats, moved: Floats, weights: Floats) -> tuple[Floats, Floats]:
+def best_rigid(
+    rest: Points, moved: Float[np.ndarray, "*batch points 3"], weights: Perpoint
+) -> tuple[Rotations, Vectors]:
     """Weighted best-fit rigid motion of `rest` (N, 3) onto `moved` (..., N, 3) (Kabsch 1976).
 
     Returns rotations R (..., 3, 3) and shifts p (..., 3) of the weighted centroid c:

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from odeform.types import Floats, GaussianSplats, Geometry, Mesh
+from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Vector
 
 __all__ = ["Fit", "fit_to", "surface_shares"]
 
 
-def surface_shares(geometry: Geometry) -> Floats:
+def surface_shares(geometry: Geometry) -> Perpoint:
     """(N,) share of the surface at each point, summing to 1: a third of the adjacent faces; equal for bare points."""
     count = len(geometry.points)
     if not isinstance(geometry, Mesh):
@@ -27,7 +27,7 @@ class Fit:
 
     geometry: Geometry
     factor: float
-    shift: Floats
+    shift: Vector
 
 
 def fit_to(geometry: Geometry, reference: Mesh) -> Fit:

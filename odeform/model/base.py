@@ -43,7 +43,7 @@ class ReducedModel(ABC):
         """Take what this model needs; KeyError where it is missing."""
 
     @abstractmethod
-    def _trajectory(self, theta: Floats, geometry: Geometry, quality: Quality | None, until: float) -> Trajectory: ...
+    def _trajectory(self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float) -> Trajectory: ...
 
     def place(self, geometry: Geometry, azimuth: float) -> PlacedBasis:
         """The basis on a geometry; kept for the last few."""
@@ -83,5 +83,5 @@ class ReducedModel(ABC):
         shape = self.rest if geometry is None else geometry
         placed = self.place(shape, self.schema.azimuth(complete))
         span = self.schema.window.stop if until is None else until
-        trajectory = self._trajectory(self.schema.vector(complete), shape, self._quality(quality), span)
+        trajectory = self._trajectory(self.schema.vector(complete), placed, self._quality(quality), span)
         return Motion(self.schema, complete, shape, self.space, placed, trajectory)

@@ -8,8 +8,9 @@ bending energy; Duchon 1977), with a closed-form gradient.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
-from odeform.types import Floats
+from odeform.types import Basis, Floats, Points
 
 __all__ = ["DisplacementBasis", "fit_basis"]
 
@@ -20,7 +21,7 @@ CHUNK = 8192  # points evaluated at once: bounds memory at a million points
 class DisplacementBasis:
     """`centers` (M, 3) in units of `scale` metres about the anchor; `weights` (M + 4, K * 3)."""
 
-    centers: Floats
+    centers: Float[np.ndarray, "centers 3"]
     weights: Floats
     scale: float
 
@@ -28,7 +29,7 @@ class DisplacementBasis:
     def modes(self) -> int:
         return self.weights.shape[1] // 3
 
-    def values(self, points: Floats) -> Floats:
+    def values(self, points: Points) -> Basis:
         """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32, so that a frame is values @ c."""
         out = np.empty((len(points), 3, self.modes), dtype=np.float32)
         for at in range(0, len(points), CHUNK):
@@ -38,7 +39,7 @@ class DisplacementBasis:
             out[at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
         return out
 
-    def gradients(self, points: Floats) -> Floats:
+    def gradients(self, points: Points) -> Float[np.ndarray, "points 3 3 modes"]:
         """d phi / dx at `points` (N, 3) -> (N, 3, 3, K) float32, [n, i, j, k] = d(phi_k)_i / dx_j, per metre/metre."""
         out = np.empty((len(points), 3, 3, self.modes), dtype=np.float32)
         count = len(self.centers)
@@ -52,11 +53,11 @@ class DisplacementBasis:
         return out / np.float32(self.scale)
 
 
-def _distances(points: Floats, centers: Floats) -> Floats:
+def _distances(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Float[np.ndarray, "points centers"]:
     return np.sqrt(((points[:, None, :] - centers[None, :, :]) ** 2).sum(axis=-1))
 
 
-def fit_basis(points: Floats, modes: Floats, scale: float) -> DisplacementBasis:
+def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
     """The basis that takes the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)

@@ -32,6 +32,8 @@ class TrainingData:
 def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None, every: int = 1) -> TrainingData:
     """Decompose all training and validation sequences; fit the deformation basis on the training ones alone."""
     schema = dataset.schema
+    if window is not None and window[0] != 0:
+        raise InputError(f"window {window[0]}:{window[1]}: expected to start at frame 0, where the body is at rest")
     poses, locals_, theta = {}, {}, {}
     rest = weights = anchor = times = None
     for split in ("train", "val"):
@@ -61,6 +63,8 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
     coefficients = {"train": train, "val": [np.einsum("tni,nik->tk", local * root, shapes) for local in locals_["val"]]}
     reduced, truncation = {}, {}
     begin, end = window or (0, len(times))
+    if every < 1 or len(times[begin:end:every]) < 4:
+        raise InputError(f"every {every}: expected at least 4 frames to learn from among {len(times[begin:end])}")
     for split in ("train", "val"):
         reduced[split] = np.stack(
             [

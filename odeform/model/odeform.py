@@ -3,12 +3,12 @@
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.geometry.shape import surface_shares
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
 from odeform.model.inference import LatentTrajectory, encode, make_decoder, make_field, pool_shape
+from odeform.model.motion import PlacedBasis
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, Geometry
+from odeform.types import Floats
 
 __all__ = ["ODeform"]
 
@@ -25,18 +25,18 @@ class ODeform(ReducedModel):
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
         self._decoders = {dtype: make_decoder(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
-        self._pooled: tuple[Geometry | None, list[Floats]] = (None, [])
+        self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
 
-    def _pool(self, geometry: Geometry) -> list[Floats]:
-        if self._pooled[0] is not geometry:
-            points = (np.asarray(geometry.points, dtype=float) - self.space.anchor) / self.space.arm
-            self._pooled = (geometry, pool_shape(self.weights, self.config, points, surface_shares(geometry)))
+    def _pool(self, placed: PlacedBasis) -> list[Floats]:
+        if self._pooled[0] is not placed:
+            points = placed.rest.astype(float) / self.space.arm
+            self._pooled = (placed, pool_shape(self.weights, self.config, points, placed.shares))
         return self._pooled[1]
 
     def _trajectory(
-        self, theta: Floats, geometry: Geometry, quality: Quality | None, until: float, dtype: type = np.float32
+        self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float, dtype: type = np.float32
     ) -> LatentTrajectory:
         assert quality is not None
-        start = encode(self.weights, self.config, self._pool(geometry), theta, dtype)
+        start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = make_field(self.weights, self.config, theta, dtype)
         return LatentTrajectory(field, self._decoders[dtype], start, quality, until, self.space.arm)

@@ -11,10 +11,11 @@ models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Arrays, Floats, Sequence
+from odeform.types import Arrays, Floats, Frames, Perpoint, Points, Rotations, Sequence, Vector, Vectors
 
 __all__ = ["POSE", "ReducedSpace", "decompose", "fit_space", "rotation_of", "to_canonical"]
 
@@ -30,7 +31,7 @@ class ReducedSpace:
     does the same for small rotation errors.
     """
 
-    anchor: Floats
+    anchor: Vector
     arm: float
     basis: DisplacementBasis
 
@@ -50,12 +51,12 @@ class ReducedSpace:
         return cls(np.array(data["anchor"], dtype=float), float(data["arm"]), basis)  # pyright: ignore
 
 
-def to_canonical(points: Floats, anchor: Floats, azimuth: float) -> Floats:
+def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:
     """(..., 3) points in the scene -> about the anchor, turned by minus the azimuth."""
     return (np.asarray(points, dtype=float) - anchor) @ rotation_z(azimuth)
 
 
-def decompose(sequence: Sequence, anchor: Floats, azimuth: float) -> tuple[Floats, Floats]:
+def decompose(sequence: Sequence, anchor: Vector, azimuth: float) -> tuple[Float[np.ndarray, "times 6"], Frames]:
     """Best-fit rigid motion and remaining deformation, in the canonical frame.
 
     Returns `pose` (T, 6): shift of the anchor and rotation vector; `local` (T, N, 3): displacements in the body's
@@ -72,7 +73,7 @@ def decompose(sequence: Sequence, anchor: Floats, azimuth: float) -> tuple[Float
 
 
 def fit_space(
-    rest: Floats, locals_: list[Floats], weights: Floats, anchor: Floats, modes: int
+    rest: Points, locals_: list[Frames], weights: Perpoint, anchor: Vector, modes: int
 ) -> tuple[ReducedSpace, list[Floats]]:
     """POD of the training deformations (T, N, 3) over one topology, and its coordinate basis.
 
@@ -89,7 +90,7 @@ def fit_space(
     return ReducedSpace(np.asarray(anchor, dtype=float), scale, fit_basis(rest, shapes, scale)), coefficients
 
 
-def rotation_of(pose: Floats, azimuth: float) -> tuple[Floats, Floats]:
+def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Rotations, Vectors]:
     """Pose (..., 6) -> rotation (..., 3, 3) from canonical to scene axes, shift (..., 3) in scene axes."""
     turn = rotation_z(azimuth)
     return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T

@@ -42,9 +42,6 @@ def test_chosen_setting_is_the_best_on_val(data: TrainingData) -> None:
     assert (settings["kernel"], settings["smoothing"]) == (best["kernel"], best["smoothing"])
 
 
-@pytest.mark.xfail(
-    strict=True, reason="scipy's quintic kernel wants at least 15 points in 4 dimensions", raises=ValueError
-)
 def test_few_sequences(data: TrainingData) -> None:
     few = TrainingData(
         **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced")}}

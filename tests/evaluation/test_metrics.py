@@ -111,8 +111,6 @@ def test_a_window_scores_its_frames(dataset: Dataset, predictors: dict[str, Pred
     assert evaluate(predictors["pod-rbf"], dataset, "test", window=(0, 500))["mse_mm2"] == whole["mse_mm2"]
 
 
-@pytest.mark.xfail(strict=True, reason="scores of no frames are NaN")
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("window", [(500, 600), (0, 1)])
 def test_a_window_without_frames(dataset: Dataset, predictors: dict[str, Predictor], window: tuple[int, int]) -> None:
     with pytest.raises(InputError):

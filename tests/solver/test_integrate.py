@@ -142,6 +142,15 @@ def test_counts_every_evaluation(quality: Quality) -> None:
     assert solution.evaluations == calls
 
 
+@pytest.mark.parametrize(("step", "count"), [(0.1, 3), (0.1, 1000), (1.0 / 120.0, 120), (0.05, 7)])
+def test_nodes_are_multiples_of_the_step(step: float, count: int) -> None:
+    """No drift, and an end that is a node up to rounding needs no further step."""
+    solution = integrate(lambda _, y: -y, np.ones(1), Quality("euler", step=step), until=count * step)
+    assert solution.times == [index * step for index in range(count + 1)]
+    ends = integrate(lambda _, y: -y, np.ones(1), Quality("euler", step=step), until=round(count * step, 12))
+    assert ends.steps == count
+
+
 def test_outside_the_span_the_end_states_stand() -> None:
     solution = integrate(field, exact(0.0), Quality("rk4", step=0.1), until=0.35)
     assert np.array_equal(solution.at(-1.0), solution.states[0])

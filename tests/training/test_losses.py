@@ -58,7 +58,7 @@ def test_automatic_weights_start_balanced() -> None:
     """Six orders of magnitude apart, both losses pull equally at first: d total / d log L_i is the same."""
     losses = [torch.tensor(x, dtype=torch.float64, requires_grad=True) for x in (1e4, 1e-2)]
     pulls = torch.autograd.grad(AutomaticWeights(2).double()(*losses), losses)
-    relative = [float(pull * loss) for pull, loss in zip(pulls, losses, strict=True)]
+    relative = [(pull * loss).item() for pull, loss in zip(pulls, losses, strict=True)]
     assert relative[0] == pytest.approx(relative[1], rel=1e-3)
 
 
