@@ -29,8 +29,8 @@ class App:
         self, columns: Sequence[Column], host: str = "127.0.0.1", port: int = 8080, record: str | None = None
     ) -> None:
         self.session = Session(columns)
-        self._recorder = Recorder(record, self.session.columns) if record else None
         _require_free(host, port)
+        self._recorder = Recorder(record, self.session.columns) if record else None
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
         self.server.gui.configure_theme(

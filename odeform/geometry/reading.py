@@ -74,7 +74,8 @@ def _from_trimesh(path: Path) -> Geometry:
         return _inria(raw, names, path)
     if isinstance(loaded, trimesh.PointCloud):
         return PointCloud(np.asarray(loaded.vertices, dtype=np.float32))
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)
+    if np.isfinite(loaded.vertices).all():  # else it is refused below, by number
+        loaded.merge_vertices(merge_tex=True, merge_norm=True)
     return Mesh(np.asarray(loaded.vertices, dtype=np.float32), np.asarray(loaded.faces, dtype=np.int32))
 
 

@@ -117,7 +117,7 @@ def test_a_window_without_frames(dataset: Dataset, predictors: dict[str, Predict
         evaluate(predictors["nearest"], dataset, "test", window)
 
 
-def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, Predictor], kick: Predictor) -> None:
     train = [s.vertices @ rotation_z(s.parameters["azimuth"]) for s in dataset.sequences("train")]
     mean = np.mean(train, axis=0)
     guesses = [
@@ -125,8 +125,9 @@ def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, 
         for s in dataset.sequences("test")
     ]
     by_mean = score(guesses)["rmse_pooled_mm"]
-    for model in ("odeform", "pod-rbf"):
-        assert evaluate(predictors[model], dataset, "test")["rmse_pooled_mm"] < 0.75 * by_mean
+    assert evaluate(predictors["pod-rbf"], dataset, "test")["rmse_pooled_mm"] < 0.75 * by_mean
+    # trained on finer steps than these sequences are made of, and still close
+    assert evaluate(kick, dataset, "test")["rmse_pooled_mm"] < 0.25 * by_mean
 
 
 def test_another_scene(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
