@@ -17,7 +17,7 @@ from odeform.types import Arrays
 
 __all__ = ["Checkpoint", "bundled_checkpoints", "read_checkpoint", "resolve_checkpoint", "write_checkpoint"]
 
-FORMAT = "1"
+FORMAT = 1
 LIMIT = 1 << 30  # bytes; a larger file is not one of ours
 
 
@@ -40,12 +40,14 @@ class Checkpoint:
 
 def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     meta = {
+        "format": FORMAT,
+        "model": checkpoint.model,
         "schema": checkpoint.schema.to_json(),
         "config": checkpoint.config,
         "provenance": checkpoint.provenance,
         "scores": checkpoint.scores,
     }
-    metadata = {"odeform": FORMAT, "model": checkpoint.model, "meta": json.dumps(meta)}
+    metadata = {"odeform": json.dumps(meta)}  # one key: safetensors writes several in no fixed order
     data = save({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}, metadata)
     write_aside(Path(path), data)
 
@@ -65,12 +67,14 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     except (SafetensorError, KeyError, ValueError):
         raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
     metadata = header.get("__metadata__", {})
-    if metadata.get("odeform") != FORMAT:
-        raise InputError(f"checkpoint {path}: a safetensors file, but not of ODeform (format {FORMAT})")
+    if "odeform" not in metadata:
+        raise InputError(f"checkpoint {path}: a safetensors file, but not of ODeform")
     try:
-        meta = json.loads(metadata["meta"])
+        meta = json.loads(metadata["odeform"])
+        if meta["format"] != FORMAT:
+            raise InputError(f"checkpoint {path}: expected format {FORMAT}, got {meta['format']!r}")
         return Checkpoint(
-            model=metadata["model"],
+            model=meta["model"],
             schema=Schema.from_json(meta["schema"]),
             config=meta["config"],
             arrays=arrays,
@@ -79,6 +83,8 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
             sha256=hashlib.sha256(data).hexdigest(),
             size_bytes=len(data),
         )
+    except InputError:
+        raise
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"checkpoint {path}: damaged metadata: {error}") from None
 

@@ -98,7 +98,8 @@ def _evaluate(args: argparse.Namespace) -> None:
     columns = ("rmse_pooled_mm", "rmse_mm", "mae_mm", "vertex_mm", "relative", "deformation_relative")
     print(f"{'model':<16}" + "".join(f"{column:>22}" for column in columns))
     for key, scores in models.items():
-        print(f"{key:<16}" + "".join(f"{scores[column]:>22.4g}" for column in columns))
+        cells = ("-" if scores[column] is None else f"{scores[column]:.4g}" for column in columns)
+        print(f"{key:<16}" + "".join(f"{cell:>22}" for cell in cells))
 
 
 def _predict(args: argparse.Namespace) -> None:

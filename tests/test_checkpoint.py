@@ -104,17 +104,28 @@ def test_foreign_files(tmp_path: Path, kind: str) -> None:
         load(path)
 
 
-def meta(**changes: Any) -> Callable[[dict[str, str]], dict[str, str]]:
-    return lambda metadata: {**metadata, "meta": json.dumps({**json.loads(metadata["meta"]), **changes})}
+Metadata = dict[str, str]
 
 
-DAMAGE: dict[str, Callable[[dict[str, str]], dict[str, str]]] = {
-    "no meta": lambda metadata: {k: v for k, v in metadata.items() if k != "meta"},
-    "no model": lambda metadata: {k: v for k, v in metadata.items() if k != "model"},
-    "unknown model": lambda metadata: {**metadata, "model": "oracle"},
-    "model of other arrays": lambda metadata: {**metadata, "model": "odeform"},
-    "not JSON": lambda metadata: {**metadata, "meta": "{"},
-    "not an object": lambda metadata: {**metadata, "meta": "[]"},
+def meta(**changes: Any) -> Callable[[Metadata], Metadata]:
+    return lambda metadata: {"odeform": json.dumps({**json.loads(metadata["odeform"]), **changes})}
+
+
+def without(key: str) -> Callable[[Metadata], Metadata]:
+    def change(metadata: Metadata) -> Metadata:
+        return {"odeform": json.dumps({k: v for k, v in json.loads(metadata["odeform"]).items() if k != key})}
+
+    return change
+
+
+DAMAGE: dict[str, Callable[[Metadata], Metadata]] = {
+    "no scores": without("scores"),
+    "no model": without("model"),
+    "another format": meta(format=2),
+    "unknown model": meta(model="oracle"),
+    "model of other arrays": meta(model="odeform"),
+    "not JSON": lambda _: {"odeform": "{"},
+    "not an object": lambda _: {"odeform": "[]"},
     "schema without fields": meta(schema={}),
     "schema of a wrong type": meta(schema=7),
     "config without fields": meta(config={}),
@@ -148,3 +159,18 @@ def test_names(tmp_path: Path) -> None:
         resolve_checkpoint("throw/odeform")
     with pytest.raises(InputError):
         load(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["net.local_field.2.weight", "net.local_encoder.head.4.bias", "net.gains"])
+def test_a_network_with_a_gap_is_refused(trained: dict[str, Path], tmp_path: Path, name: str) -> None:
+    whole = read_checkpoint(trained["odeform"])
+    arrays = {key: array for key, array in whole.arrays.items() if key != name}
+    write_checkpoint(tmp_path / "gap.safetensors", replace(whole, arrays=arrays))
+    with pytest.raises(InputError, match=name.removeprefix("net.")):
+        load(tmp_path / "gap.safetensors")
+
+
+def test_the_same_content_is_the_same_file(trained: dict[str, Path], tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_checkpoint(tmp_path / name, read_checkpoint(trained["pod-rbf"]))
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()

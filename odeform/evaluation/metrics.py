@@ -65,7 +65,7 @@ def score(pairs: Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]) -> dict[s
         "mae_pooled_mm": float(mae.mean()),
         "mse_pooled_mm2": float(mse.mean()),
         "vertex_mm": float(np.concatenate(distance).mean()),
-        "relative": pooled / float(np.sqrt(np.concatenate(moved).mean())),
+        "relative": pooled / size if (size := float(np.sqrt(np.concatenate(moved).mean()))) else None,
         "deformation_relative": float(np.sqrt(residual / reference)) if reference else None,
         "off_grid_rmse_mm": float(np.sqrt(off_all.mean())) if off_all.size else None,
         "per_frame_rmse_mm": np.sqrt(np.mean(np.stack(frame_mse), axis=0)).tolist() if _even(frame_mse) else [],

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from odeform.model.reduced import POSE
+
 __all__ = ["ModelConfig"]
 
 
@@ -24,3 +26,21 @@ class ModelConfig:
     @property
     def state(self) -> int:
         return self.rigid_latent * self.rigid + self.local_latent
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        return ("rigid", "local") if self.rigid else ("local",)
+
+    def sizes(self, branch: str) -> dict[str, list[int]]:
+        """Widths of the layers of each part of a branch, inputs first."""
+        rigid = branch == "rigid"
+        latent, outputs = (self.rigid_latent, POSE) if rigid else (self.local_latent, self.modes)
+        seen = (self.rigid_latent if rigid else self.state) + self.parameters
+        width = self.rigid_width if rigid else self.local_width
+        return {
+            "encoder.points": [3, self.point_width, self.point_width],
+            "encoder.head": [self.point_width + self.parameters, self.encoder_width, self.encoder_width, latent],
+            "field": [seen, width, width, latent],
+            "decoder.net": [latent, self.decoder_width, self.decoder_width, outputs],
+            "decoder.linear": [latent, outputs],
+        }

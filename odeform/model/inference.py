@@ -5,6 +5,7 @@ more than the arithmetic (31 against 19 microseconds, torch eager against this, 
 network for training; a test holds both together.
 """
 
+import itertools
 import time
 from collections.abc import Callable
 from functools import cached_property
@@ -19,7 +20,7 @@ from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution
 from odeform.types import Arrays, Floats
 
-__all__ = ["LatentTrajectory", "encode", "make_decoder", "make_field", "pool_shape"]
+__all__ = ["LatentTrajectory", "check_weights", "encode", "make_decoder", "make_field", "pool_shape"]
 
 
 def _silu(x: Floats) -> Floats:
@@ -45,22 +46,39 @@ def _mlp(layers: list[tuple[Floats, Floats]], x: Floats, activation: Callable[[F
     return x @ matrix.T + bias
 
 
-def _branches(config: ModelConfig) -> list[str]:
-    return ["rigid", "local"] if config.rigid else ["local"]
+def check_weights(weights: Arrays, config: ModelConfig) -> None:
+    """KeyError or ValueError unless every array of the network is there, in its shape."""
+    wanted: dict[str, tuple[int, ...]] = {"gains": (POSE + config.modes,), "time_scale": ()}
+    for branch in config.branches:
+        for part, sizes in config.sizes(branch).items():
+            name = f"{branch}_{part}"
+            if part == "decoder.linear":
+                wanted[f"{name}.weight"] = (sizes[1], sizes[0])
+                continue
+            for layer, (before, after) in enumerate(itertools.pairwise(sizes)):
+                wanted[f"{name}.{2 * layer}.weight"] = (after, before)
+                wanted[f"{name}.{2 * layer}.bias"] = (after,)
+        for statistic in ("pooled_mean", "pooled_gain"):
+            wanted[f"{branch}_encoder.{statistic}"] = (config.point_width,)
+    for name, shape in wanted.items():
+        if weights[name].shape != shape:
+            raise ValueError(f"{name}: expected shape {shape}, got {weights[name].shape}")
+        if not np.isfinite(weights[name]).all():
+            raise ValueError(f"{name}: not finite")
 
 
 def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, shares: Floats) -> list[Floats]:
     """Features of a shape for each branch: points (N, 3) in units of the body's size, shares (N,) of its area."""
     return [
         shares @ _mlp(_layers(weights, f"{branch}_encoder.points", np.float64), points, _silu)
-        for branch in _branches(config)
+        for branch in config.branches
     ]
 
 
 def encode(weights: Arrays, config: ModelConfig, pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
     """The state at time 0 from pooled shape features and parameters in [-1, 1]."""
     parts = []
-    for branch, features in zip(_branches(config), pooled, strict=True):
+    for branch, features in zip(config.branches, pooled, strict=True):
         standard = (features - weights[f"{branch}_encoder.pooled_mean"]) * weights[f"{branch}_encoder.pooled_gain"]
         head = _layers(weights, f"{branch}_encoder.head", np.float64)
         parts.append(_mlp(head, np.concatenate([standard, theta]), _silu))
@@ -71,8 +89,8 @@ def make_field(weights: Arrays, config: ModelConfig, theta: Floats, dtype: type)
     """dz/dt = f(z) with the parameters, which do not change in time, folded into the first bias."""
     branches = []
     rate = 1.0 / float(weights["time_scale"])
-    for branch in _branches(config):
-        layers = _layers(weights, f"{branch}_field.net", dtype)
+    for branch in config.branches:
+        layers = _layers(weights, f"{branch}_field", dtype)
         (first, bias), (last, last_bias) = layers[0], layers[-1]
         size = first.shape[1] - len(theta)
         folded = bias + (first[:, size:].astype(np.float64) @ theta).astype(dtype)
@@ -110,7 +128,7 @@ def make_decoder(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[
             np.asfortranarray(weights[f"{branch}_decoder.linear.weight"].astype(dtype)),
             _layers(weights, f"{branch}_decoder.net", dtype),
         )
-        for branch in _branches(config)
+        for branch in config.branches
     ]
 
     def decode(states: Floats) -> Floats:
@@ -136,7 +154,8 @@ class LatentTrajectory:
     ) -> None:
         self._field, self._decode, self._quality, self._arm = field, decode, quality, arm
         begin = time.perf_counter()
-        self._solution = integrate(field, start, quality, until)
+        with np.errstate(all="ignore"):  # an overflow ends the integration with a status
+            self._solution = integrate(field, start, quality, until)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         self._origin = decode(start[None])
         self._span = until
@@ -159,8 +178,8 @@ class LatentTrajectory:
     def _error_mm(self) -> float | None:
         """Step doubling (Hairer, Norsett & Wanner, Solving ODEs I, II.4): largest error over the span, in RMS mm.
 
-        The same integration with twice the step (or ten times the tolerance) differs by about 2^p - 1 times
-        the error of this one; for a tolerance the difference itself is taken.
+        The same integration with twice the step differs by about 2^p - 1 times the error of this one; with ten times
+        the tolerance, which the error follows, by nine times.
         """
         from odeform.solver.tableau import get_method
 
@@ -171,7 +190,7 @@ class LatentTrajectory:
                 2.0 ** get_method(quality.method).order - 1.0,
             )
         else:
-            coarse, share = Quality(quality.method, tolerance=10.0 * (quality.tolerance or 0.0)), 1.0
+            coarse, share = Quality(quality.method, tolerance=10.0 * (quality.tolerance or 0.0)), 9.0
         other = integrate(self._field, self._solution.states[0], coarse, self._span)
         if other.status.name != "OK" or self._solution.status.name != "OK":
             return None

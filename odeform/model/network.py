@@ -32,14 +32,12 @@ class ShapeEncoder(nn.Module):
     pooled_mean: torch.Tensor
     pooled_gain: torch.Tensor
 
-    def __init__(self, config: ModelConfig, latent: int) -> None:
+    def __init__(self, sizes: dict[str, list[int]]) -> None:
         super().__init__()
-        width = config.point_width
-        self.points = mlp([3, width, width], nn.SiLU)
-        hidden = config.encoder_width
-        self.head = mlp([width + config.parameters, hidden, hidden, latent], nn.SiLU)
-        self.register_buffer("pooled_mean", torch.zeros(width))
-        self.register_buffer("pooled_gain", torch.zeros(width))
+        self.points = mlp(sizes["encoder.points"], nn.SiLU)
+        self.head = mlp(sizes["encoder.head"], nn.SiLU)
+        self.register_buffer("pooled_mean", torch.zeros(sizes["encoder.points"][-1]))
+        self.register_buffer("pooled_gain", torch.zeros(sizes["encoder.points"][-1]))
 
     def pool(self, points: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
         """(N, 3) points in units of the body's size and (N,) weights summing to 1 -> (width,)."""
@@ -60,24 +58,13 @@ class ShapeEncoder(nn.Module):
         return self.head(torch.cat([features, theta], dim=-1))
 
 
-class Field(nn.Module):
-    """dz/ds = f(z, theta), three tanh layers; its values are bounded, so states grow at most linearly in time."""
-
-    def __init__(self, inputs: int, width: int, latent: int) -> None:
-        super().__init__()
-        self.net = mlp([inputs, width, width, latent], nn.Tanh)
-
-    def forward(self, inputs: torch.Tensor) -> torch.Tensor:
-        return self.net(inputs)
-
-
 class Decoder(nn.Module):
     """Three layers beside a linear path; what a state moved since the start, so that y(0) = 0 exactly."""
 
-    def __init__(self, latent: int, width: int, outputs: int) -> None:
+    def __init__(self, sizes: dict[str, list[int]]) -> None:
         super().__init__()
-        self.linear = nn.Linear(latent, outputs, bias=False)
-        self.net = mlp([latent, width, width, outputs], nn.SiLU)
+        self.linear = nn.Linear(*sizes["decoder.linear"], bias=False)
+        self.net = mlp(sizes["decoder.net"], nn.SiLU)
 
     def forward(self, state: torch.Tensor) -> torch.Tensor:
         return self.linear(state) + self.net(state)
@@ -86,6 +73,7 @@ class Decoder(nn.Module):
 class ODeformNet(nn.Module):
     """theta, P0 -> state(0); state -> slope; state -> y in whitened units.
 
+    The fields end in a linear layer on tanh units: their values are bounded, so states grow at most linearly in time.
     `gains` (y,) turn whitened outputs to metres and radians; `time_scale` in seconds makes the field's unit of time.
     """
 
@@ -95,15 +83,16 @@ class ODeformNet(nn.Module):
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
         self.config = config
-        c = config
-        if c.rigid:
-            self.rigid_encoder = ShapeEncoder(c, c.rigid_latent)
-            self.rigid_field = Field(c.rigid_latent + c.parameters, c.rigid_width, c.rigid_latent)
-            self.rigid_decoder = Decoder(c.rigid_latent, c.decoder_width, POSE)
-        self.local_encoder = ShapeEncoder(c, c.local_latent)
-        self.local_field = Field(c.state + c.parameters, c.local_width, c.local_latent)
-        self.local_decoder = Decoder(c.local_latent, c.decoder_width, c.modes)
-        self.register_buffer("gains", torch.ones(POSE + c.modes))
+        if config.rigid:
+            sizes = config.sizes("rigid")
+            self.rigid_encoder = ShapeEncoder(sizes)
+            self.rigid_field = mlp(sizes["field"], nn.Tanh)
+            self.rigid_decoder = Decoder(sizes)
+        sizes = config.sizes("local")
+        self.local_encoder = ShapeEncoder(sizes)
+        self.local_field = mlp(sizes["field"], nn.Tanh)
+        self.local_decoder = Decoder(sizes)
+        self.register_buffer("gains", torch.ones(POSE + config.modes))
         self.register_buffer("time_scale", torch.ones(()))
 
     @property

@@ -5,7 +5,7 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
-from odeform.model.inference import LatentTrajectory, encode, make_decoder, make_field, pool_shape
+from odeform.model.inference import LatentTrajectory, check_weights, encode, make_decoder, make_field, pool_shape
 from odeform.model.motion import PlacedBasis
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
@@ -23,6 +23,7 @@ class ODeform(ReducedModel):
     def _read(self, checkpoint: Checkpoint) -> None:
         self.config = ModelConfig(**checkpoint.config["network"])
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
+        check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
         self._decoders = {dtype: make_decoder(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])

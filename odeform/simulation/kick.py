@@ -8,8 +8,8 @@ import trimesh
 from odeform.geometry.primitives import octasphere
 from odeform.geometry.rigid import rotation_z
 from odeform.schema import Parameter, Parameters, Schema, Window
+from odeform.simulation.material import Material, wall_thickness
 from odeform.simulation.scene import Scene
-from odeform.simulation.shell import Material, ShellBody, relax_sphere, run, wall_thickness
 from odeform.types import Floats, Mesh, Sequence
 
 __all__ = ["GRAVITY", "MATERIAL", "PULSE", "RADIUS", "SCENE", "STEP", "simulate"]
@@ -57,6 +57,9 @@ def simulate(parameters: Parameters, rate: float | None = None, step: float = ST
     The ball is an icosphere of 10 * 4^level + 2 vertices, oriented with the pulse: the heading is a symmetry of the
     scene, and a mesh that turns with it keeps this symmetry exact.
     """
+    # here, so that looking at a scene and training on its data need no simulator
+    from odeform.simulation.shell import ShellBody, relax_sphere, run
+
     window = SCHEMA.window
     thickness = wall_thickness(parameters["bending"], MATERIAL)
     sphere = trimesh.creation.icosphere(level, RADIUS)

@@ -4,36 +4,20 @@
 # pyright: reportAttributeAccessIssue=false
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
+from odeform.simulation.material import Material
 from odeform.types import Floats, Mesh
 
-__all__ = ["Material", "ShellBody", "SimulationError", "relax_sphere", "run", "wall_thickness"]
+__all__ = ["ShellBody", "SimulationError", "relax_sphere", "run"]
 
 CONTACT_RADIUS = 0.001  # MuJoCo's contact skin around each vertex; the floor lies this much below z = 0
 
 
 class SimulationError(RuntimeError):
     """The simulator reported a warning or produced something non-finite; the sequence is not to be used."""
-
-
-@dataclass(frozen=True)
-class Material:
-    """A shell's material and its contact, SI units."""
-
-    young: float  # Pa
-    poisson: float
-    damping: float  # s, stiffness-proportional
-    friction: float  # Coulomb coefficient against the floor
-    contact_time: float  # s, MuJoCo's solref time constant
-
-
-def wall_thickness(bending: float, material: Material) -> float:
-    """Thickness h in metres of a wall of bending stiffness EI = E h^3 / (12 (1 - nu^2)), in N m."""
-    return (12.0 * (1.0 - material.poisson**2) * bending / material.young) ** (1.0 / 3.0)
 
 
 def _xml(

@@ -71,7 +71,7 @@ def test_pooling_ignores_order_and_density() -> None:
 
 def test_shape_matters_only_where_shapes_varied() -> None:
     torch.manual_seed(0)
-    encoder = ShapeEncoder(ModelConfig(parameters=2, modes=3), latent=5)
+    encoder = ShapeEncoder(ModelConfig(parameters=2, modes=3).sizes("local"))
     ball, egg = shape(), shape(stretch=1.5)
     theta = torch.tensor([[0.1, -0.2]])
 

@@ -9,7 +9,8 @@ import trimesh
 
 from odeform.geometry.rigid import best_rigid
 from odeform.simulation.kick import GRAVITY, MATERIAL, RADIUS, STEP, simulate
-from odeform.simulation.shell import ShellBody, SimulationError, relax_sphere, run, wall_thickness
+from odeform.simulation.material import wall_thickness
+from odeform.simulation.shell import ShellBody, SimulationError, relax_sphere, run
 from odeform.types import Mesh
 
 MASS = 0.5

@@ -26,7 +26,7 @@ def silent(_: str) -> None: ...
 def test_a_seed_makes_one_network(data: TrainingData) -> None:
     one, two, other = (network_weights(build_network(data, seed)) for seed in (5, 5, 6))
     assert all(np.array_equal(one[name], two[name]) for name in one)
-    name = "local_field.net.0.weight"
+    name = "local_field.0.weight"
     assert not np.array_equal(one[name], other[name])
 
 
