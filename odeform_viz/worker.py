@@ -1,5 +1,6 @@
 """One thread that serves the newest wish. Callbacks only wake it, so nothing stale is ever shown."""
 
+import sys
 import threading
 import traceback
 from collections.abc import Callable
@@ -35,6 +36,7 @@ class Worker:
 
     def _loop(self) -> None:
         pause: float | None = None
+        said = ""
         while True:
             self._awake.wait(pause)
             self._awake.clear()  # before reading the wishes: one that comes later wakes the next round
@@ -43,6 +45,8 @@ class Worker:
             try:
                 pause = self._serve()
             except Exception:
-                # an internal error must not end the session; the last good frame stays
-                traceback.print_exc()
-                pause = None
+                # must not end the session: the last good frame stays. Said once, not 30 times a second
+                error = traceback.format_exc()
+                if error != said:
+                    print(error, file=sys.stderr)
+                said, pause = error, None

@@ -34,7 +34,7 @@ class DisplacementBasis:
         out = np.empty((len(points), 3, self.modes), dtype=np.float32)
         for at in range(0, len(points), CHUNK):
             chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
-            features = np.concatenate([_distances(chunk, self.centers) ** 3, np.ones((len(chunk), 1)), chunk], axis=1)
+            features = np.concatenate([_cubes(chunk, self.centers), np.ones((len(chunk), 1)), chunk], axis=1)
             value = features @ self.weights
             out[at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
         return out
@@ -45,7 +45,7 @@ class DisplacementBasis:
         count = len(self.centers)
         for at in range(0, len(points), CHUNK):
             chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
-            distance = _distances(chunk, self.centers)
+            distance = np.sqrt(_squares(chunk, self.centers))
             for axis in range(3):
                 slope = 3.0 * distance * (chunk[:, None, axis] - self.centers[None, :, axis])
                 value = slope @ self.weights[:count] + self.weights[count + 1 + axis]
@@ -53,15 +53,25 @@ class DisplacementBasis:
         return out / np.float32(self.scale)
 
 
-def _distances(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Float[np.ndarray, "points centers"]:
-    return np.sqrt(((points[:, None, :] - centers[None, :, :]) ** 2).sum(axis=-1))
+Pairs = Float[np.ndarray, "points centers"]
+
+
+def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
+    """Squared distances, by products: fast, and exact to rounding of the coordinates, which are of order one."""
+    squares = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2.0 * points @ centers.T
+    return np.maximum(squares, 0.0)
+
+
+def _cubes(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
+    squares = _squares(points, centers)
+    return squares * np.sqrt(squares)
 
 
 def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
     """The basis that takes the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
-    system = np.block([[_distances(centers, centers) ** 3, tail], [tail.T, np.zeros((4, 4))]])
+    system = np.block([[_cubes(centers, centers), tail], [tail.T, np.zeros((4, 4))]])
     values = np.asarray(modes, dtype=float).swapaxes(1, 2).reshape(len(centers), -1)
     # least squares rather than a solve: coplanar points leave part of the linear tail undetermined
     weights = np.linalg.lstsq(system, np.concatenate([values, np.zeros((4, values.shape[1]))]), rcond=None)[0]

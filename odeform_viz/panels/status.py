@@ -46,17 +46,17 @@ class StatusPanel:
         with server.gui.add_folder("Status"):
             self._moment = server.gui.add_markdown("")
             self._details = server.gui.add_markdown("")
-        self._said: dict[viser.GuiMarkdownHandle, str] = {}
 
     def show(self, frame: Frame) -> None:
         shown = zip(self._columns, frame.columns, strict=True)
-        self._say(self._moment, moment_in_words(frame))
-        self._say(self._details, "\n\n".join(describe(column, one) for column, one in shown if one is not None))
+        _say(self._moment, moment_in_words(frame))
+        _say(self._details, "\n\n".join(describe(column, one) for column, one in shown if one is not None))
 
     def show_error(self, message: str) -> None:
         """The last good frame stays on screen."""
-        self._say(self._moment, f"⚠ **{message}**")
+        _say(self._moment, f"⚠ **{message}**")
 
-    def _say(self, text: viser.GuiMarkdownHandle, content: str) -> None:
-        if self._said.get(text) != content:
-            self._said[text] = text.content = content
+
+def _say(text: viser.GuiMarkdownHandle, content: str) -> None:
+    if text.content != content:
+        text.content = content

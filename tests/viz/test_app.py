@@ -24,10 +24,11 @@ def port() -> int:
 
 
 @pytest.fixture
-def app(kick: Predictor, port: int) -> Iterator[App]:
+def app(kick: Predictor, port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[App]:
     app = App([Column("odeform", kick, kick.rest)], port=port)
     yield app
     app.close()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_has_the_sliders_of_the_scene_and_nothing_else_to_set(app: App, port: int) -> None:
