@@ -43,11 +43,16 @@ class Quality:
             raise InputError(f"quality: {self.method} cannot control its step with tolerance {self.tolerance}")
 
 
-def _stages(method: Tableau, field: Field, time: float, state: Any, slope: Any, step: float) -> list[Any]:
-    stages = [slope]
+def _step(method: Tableau, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, list[Any]]:
+    """The state after one step, and the stages; the last of these is the slope there, evaluated or "same as last"."""
+    stages, at = [slope], state
     for weights, node in zip(method.a[1:], method.c[1:], strict=True):
-        stages.append(field(time + node * step, state + _combine(weights, stages, step)))
-    return stages
+        at = state + _combine(weights, stages, step)
+        stages.append(field(time + node * step, at))
+    if not method.fsal:
+        at = state + _combine(method.b, stages, step)
+        stages.append(field(time + step, at))
+    return at, stages
 
 
 def _combine(weights: tuple[float, ...], stages: list[Any], step: float) -> Any:
@@ -65,8 +70,8 @@ def _finite(value: Any) -> bool:
 
 
 def _error_ratio(error: Any, before: Any, after: Any, tolerance: float) -> float:
-    scale = tolerance + tolerance * np.maximum(np.abs(before), np.abs(after))
-    return float(np.sqrt(np.mean((error / scale) ** 2)))
+    scaled = (error / (1.0 + np.maximum(np.abs(before), np.abs(after)))).ravel()
+    return math.sqrt(float(scaled @ scaled) / scaled.size) / tolerance
 
 
 def _first_step(method: Tableau, field: Field, time: float, state: Any, slope: Any, tolerance: float) -> float:
@@ -106,18 +111,15 @@ def _fixed(method: Tableau, field: Field, quality: Quality, solution: Solution, 
             solution.status = Status.MAX_STEPS
             return
         time, state, slope = solution.times[-1], solution.states[-1], solution.slopes[-1]
-        stages = _stages(method, field, time, state, slope, step)
-        after = state + _combine(method.b, stages, step)
-        # nodes are multiples of the step: no drift, however often the solution is continued
-        there = origin + (solution.steps + 1) * step
-        slope = field(there, after)
-        solution.evaluations += len(method.b)
-        if not (_finite(after) and _finite(slope)):
+        after, stages = _step(method, field, time, state, slope, step)
+        solution.evaluations += len(stages) - 1
+        if not _finite(after + stages[-1]):
             solution.status = Status.NON_FINITE
             return
-        solution.times.append(there)
+        # nodes are multiples of the step: no drift, however often the solution is continued
+        solution.times.append(origin + (solution.steps + 1) * step)
         solution.states.append(after)
-        solution.slopes.append(slope)
+        solution.slopes.append(stages[-1])
 
 
 def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solution, until: float) -> None:
@@ -135,9 +137,8 @@ def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solut
         if time + step <= time:
             solution.status = Status.UNDERFLOW
             return
-        stages = _stages(method, field, time, state, slope, step)
-        after = state + _combine(method.b, stages, step)
-        solution.evaluations += len(method.b) - 1
+        after, stages = _step(method, field, time, state, slope, step)
+        solution.evaluations += len(stages) - 1
         ratio = _error_ratio(_combine(method.error, stages, step), state, after, tolerance)
         if not math.isfinite(ratio):
             ratio = 1e6  # too far: try again closer

@@ -241,8 +241,8 @@ def test_solver_error_is_of_the_size_it_says(predictors: dict[str, Predictor], q
     error = 1e3 * np.sqrt(squared.max())
     said = solve(quality).stats.solver_error_mm
     assert said is not None
-    # step doubling is exact to leading order; an error only roughly follows a tolerance
-    low, high = (0.2, 5.0) if quality.step else (0.1, 10.0)
+    # divided by less than the theory of small steps asks for: up to 15 / 3 too much where that theory holds
+    low, high = (0.3, 8.0) if quality.step else (0.1, 10.0)
     assert low * error < said < high * error
 
 
