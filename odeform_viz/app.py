@@ -3,6 +3,7 @@
 import contextlib
 import io
 import socket
+import sys
 from collections.abc import Sequence
 
 import viser
@@ -14,12 +15,14 @@ from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.status import StatusPanel
 from odeform_viz.recorder import Recorder
 from odeform_viz.scene import SceneView
-from odeform_viz.session import Column, Frame, Session, Wish
+from odeform_viz.session import Column, Frame, Session, Wish, same_motions
 from odeform_viz.worker import Worker
 
 __all__ = ["App"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
+SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
+SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
 
 
 class App:
@@ -30,6 +33,8 @@ class App:
     ) -> None:
         self.session = Session(columns)
         _require_free(host, port)
+        # the worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
+        sys.setswitchinterval(SWITCH)
         self._recorder = Recorder(record, self.session.columns) if record else None
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -56,6 +61,7 @@ class App:
         follow.on_update(lambda event: self._set_follow(bool(event.target.value)))
         self.server.gui.add_command("Play or pause", hotkey="K").on_trigger(lambda _: self._playback.toggle())
         self._shown: Frame | None = None
+        self._settled = False
         self._dirty = False
         self.clock.play()
         self._worker.start()
@@ -86,21 +92,27 @@ class App:
         self._worker.wake()
 
     def _serve(self) -> float | None:
-        """One round of the worker: read the newest wish, show it."""
+        """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
         try:
             wish = self._wish()
             if self._shown is None or wish != self._shown.wish or self._dirty:
                 self._dirty = False
                 frame = self.session.frame(wish)
+                self._settled = self._shown is not None and same_motions(frame, self._shown)
                 self._scene.publish(frame)
                 self._playback.show(wish.time)
-                self._status.show(frame)
+                self._status.show(frame, self._settled)
                 self._shown = frame
                 if self._recorder:
                     self._recorder.log(frame)
+            elif not self._settled:
+                self._settled = True
+                self._status.show(self._shown, True)
         except InputError as error:
             self._status.show_error(str(error))
-        return TICK if self.clock.playing else None
+        if self.clock.playing:
+            return TICK
+        return None if self._settled else SETTLE
 
 
 def _about(session: Session) -> str:

@@ -172,21 +172,23 @@ class SceneView:
         )
 
     def publish(self, frame: Frame) -> None:
-        """Send one frame, whole: clients never see half of it."""
+        """Send one frame, whole: clients never see half of it. What only accompanies a motion follows it."""
         with self._server.atomic():
             for index, column in enumerate(frame.columns):
                 self._frames[index].visible = column is not None
                 if column is None:
                     continue
-                if self._motions[index] is not column.motion:
-                    self._motions[index] = column.motion
-                    self._views[index].show_path(column.motion)
-                    self._show_pulse(index, column.motion)
                 self._views[index].show(column)
                 if self._labels:
                     self._labels[index].position = _centre(column)
             self._world.position = self._offset(frame)
         self._server.flush()
+        for index, column in enumerate(frame.columns):
+            if column is not None and self._motions[index] is not column.motion:
+                self._motions[index] = column.motion
+                with self._server.atomic():
+                    self._views[index].show_path(column.motion)
+                    self._show_pulse(index, column.motion)
 
     def _offset(self, frame: Frame) -> tuple[float, float, float]:
         """Following moves the world past the camera, which stays in the user's hand."""

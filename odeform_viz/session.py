@@ -11,7 +11,7 @@ from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform.types import Floats, Geometry
 
-__all__ = ["Column", "ColumnFrame", "Frame", "Session", "Wish"]
+__all__ = ["Column", "ColumnFrame", "Frame", "Session", "Wish", "same_motions"]
 
 INVISIBLE = 5e-5  # m; a deformation below this cannot be seen on a ball of 0.1 m at any sensible zoom
 
@@ -58,6 +58,12 @@ class Frame:
 
     wish: Wish
     columns: tuple[ColumnFrame | None, ...]
+
+
+def same_motions(one: Frame, other: Frame) -> bool:
+    """Whether two frames differ in time alone."""
+    pairs = zip(one.columns, other.columns, strict=True)
+    return all(a is None or (b is not None and a.motion is b.motion) for a, b in pairs)
 
 
 class Session:

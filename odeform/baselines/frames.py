@@ -31,4 +31,4 @@ class FrameTrajectory:
 
     @property
     def stats(self) -> SolveStats:
-        return SolveStats(self._name, 0, 0, 0, "ok", self._wall_ms, None)
+        return SolveStats(self._name, 0, 0, 0, "ok", self._wall_ms, lambda: None)

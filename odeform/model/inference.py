@@ -18,6 +18,7 @@ from odeform.model.motion import SolveStats
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution, Status
+from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
 __all__ = ["LatentTrajectory", "check_weights", "encode", "make_decoder", "make_field", "pool_shape"]
@@ -182,11 +183,12 @@ class LatentTrajectory:
 
         The same integration with twice the step, or ten times the tolerance, differs from this one by a multiple of
         its error: 2^p - 1 or 9 in the limit of small steps, less where the field bends within a step, at the kick and
-        at landings. Divided by 3 or 6, it rather overstates than understates the error of such motions.
+        at landings. Divided by 3 (Euler: 1) or 6, it rather overstates than understates the error of such motions.
         """
         quality = self._quality
         if quality.step is not None:
-            coarse, share = Quality(quality.method, step=2.0 * quality.step), 3.0
+            coarse = Quality(quality.method, step=2.0 * quality.step)
+            share = min(3.0, 2.0 ** get_method(quality.method).order - 1.0)
         else:
             coarse, share = Quality(quality.method, tolerance=10.0 * (quality.tolerance or 0.0)), 6.0
         with np.errstate(all="ignore"):
@@ -210,5 +212,5 @@ class LatentTrajectory:
             rejected=solution.rejected,
             status=solution.status.value,
             wall_ms=self._wall_ms,
-            solver_error_mm=self._error_mm,
+            estimate=lambda: self._error_mm,
         )

@@ -1,6 +1,7 @@
 """A motion: any time in, poses and points out."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, runtime_checkable
 
@@ -17,7 +18,7 @@ __all__ = ["Motion", "PlacedBasis", "SolveStats", "Trajectory", "place"]
 
 @dataclass(frozen=True)
 class SolveStats:
-    """How a trajectory came about. `solver_error_mm` is the error of the integration alone, not of the model."""
+    """How a trajectory came about."""
 
     solver: str
     steps: int
@@ -25,7 +26,12 @@ class SolveStats:
     rejected: int
     status: str
     wall_ms: float
-    solver_error_mm: float | None
+    estimate: Callable[[], float | None] = field(repr=False, compare=False)
+
+    @property
+    def solver_error_mm(self) -> float | None:
+        """Estimated error of the integration alone, not of the model. Made when first read: it costs about a solve."""
+        return self.estimate()
 
 
 @runtime_checkable

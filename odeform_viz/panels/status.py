@@ -18,12 +18,17 @@ def moment_in_words(frame: Frame) -> str:
     return f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained" if beyond else "inside what was trained"
 
 
-def describe(column: Column, frame: ColumnFrame) -> str:
-    """Solver, work, solver error and the checkpoint's test error of one column, as Markdown."""
+def describe(column: Column, frame: ColumnFrame, settled: bool = True) -> str:
+    """Solver, work, solver error and the checkpoint's test error of one column, as Markdown.
+
+    The solver error costs as much as the solution: it is left open until the user's hand has `settled`.
+    """
     stats = frame.stats
     lines = [f"**{column.label}** · {len(column.geometry.points):,} points"]
     if stats.evaluations:
-        error = "unknown" if stats.solver_error_mm is None else f"{stats.solver_error_mm:.2g} mm"
+        error = "…" if not settled else "unknown"
+        if settled and stats.solver_error_mm is not None:
+            error = f"{stats.solver_error_mm:.2g} mm"
         lines.append(f"{stats.solver} · {stats.evaluations} evaluations · {stats.wall_ms:.1f} ms")
         lines.append(f"solver error ≈ {error} (step doubling)")
     else:
@@ -47,10 +52,10 @@ class StatusPanel:
             self._moment = server.gui.add_markdown("")
             self._details = server.gui.add_markdown("")
 
-    def show(self, frame: Frame) -> None:
+    def show(self, frame: Frame, settled: bool) -> None:
         shown = zip(self._columns, frame.columns, strict=True)
         _say(self._moment, moment_in_words(frame))
-        _say(self._details, "\n\n".join(describe(column, one) for column, one in shown if one is not None))
+        _say(self._details, "\n\n".join(describe(column, one, settled) for column, one in shown if one is not None))
 
     def show_error(self, message: str) -> None:
         """The last good frame stays on screen."""
