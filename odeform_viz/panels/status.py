@@ -30,7 +30,7 @@ def describe(column: Column, frame: ColumnFrame, settled: bool = True) -> str:
         if settled and stats.solver_error_mm is not None:
             error = f"{stats.solver_error_mm:.2g} mm"
         lines.append(f"{stats.solver} · {stats.evaluations} evaluations · {stats.wall_ms:.1f} ms")
-        lines.append(f"solver error ≈ {error} (step doubling)")
+        lines.append(f"solver error ≈ {error} (estimated)")
     else:
         lines.append(f"{stats.solver} · no ODE · {stats.wall_ms:.1f} ms")
     score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
