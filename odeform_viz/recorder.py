@@ -33,7 +33,6 @@ class Recorder:
         self._stream = rr.RecordingStream("odeform")
         self._stream.save(str(path), default_blueprint=_blueprint(columns))
         self._index = 0
-        self._poses: list[Floats | None] = [None] * len(columns)
         for index, column in enumerate(columns):
             self._log_static(index, column)
 

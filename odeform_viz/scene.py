@@ -15,7 +15,6 @@ __all__ = ["SceneView", "checker_parts"]
 
 COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (90, 90, 90))
 ARROW = (190, 20, 20)
-IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 
 def checker_parts(mesh: Mesh) -> list[tuple[Ints, Ints]]:

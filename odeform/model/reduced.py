@@ -35,10 +35,6 @@ class ReducedSpace:
     arm: float
     basis: DisplacementBasis
 
-    @property
-    def size(self) -> int:
-        return POSE + self.basis.modes
-
     def to_json(self) -> dict[str, object]:
         return {"anchor": [float(x) for x in self.anchor], "arm": self.arm, "basis_scale": self.basis.scale}
 
