@@ -48,6 +48,7 @@ def test_a_frame_is_what_the_predictor_says(kick: Predictor) -> None:
     session = Session([Column("odeform", kick, kick.rest)])
     shown = session.frame(Wish(session.schema.complete({}), 0.02, "balanced", (True,))).columns[0]
     assert shown is not None
+    assert shown.points is not None
     motion = kick.solve(kick.rest)
     np.testing.assert_array_equal(shown.points, motion.deformed(0.02))
     moved = shown.points @ shown.pose[:3, :3].T + shown.pose[:3, 3]
