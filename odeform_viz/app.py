@@ -110,6 +110,7 @@ class App:
                 self._status.show(self._shown, True)
         except InputError as error:
             self._status.show_error(str(error))
+            self._dirty, self._settled = True, True  # what is shown next replaces the message, whatever it is
         if self.clock.playing:
             return TICK
         return None if self._settled else SETTLE

@@ -26,6 +26,7 @@ class ODeform(ReducedModel):
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
         self._decoders = {dtype: make_decoder(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
+        self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
 
     def _pool(self, placed: PlacedBasis) -> list[Floats]:
@@ -39,5 +40,5 @@ class ODeform(ReducedModel):
     ) -> LatentTrajectory:
         assert quality is not None
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
-        field = make_field(self.weights, self.config, theta, dtype)
+        field = self._fields[dtype](theta)
         return LatentTrajectory(field, self._decoders[dtype], start, quality, until, self.space.arm)

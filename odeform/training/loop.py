@@ -1,7 +1,7 @@
 """Training of the ODeform network: multiple shooting first, whole roll-outs after.
 
 Segments of ten frames, each started by a small network from the observed motion, train in parallel and give the field
-its shape; roll-outs from the encoder alone then remove what adds up along the way. Either alone is far slower.
+its shape; roll-outs from the encoder alone, over a growing horizon, then do most of the work.
 """
 
 import time

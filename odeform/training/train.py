@@ -48,7 +48,7 @@ def _fit_odeform(
     step = float(data.times[1] - data.times[0])
     qualities = {
         "draft": {"method": "rk4", "step": 2.0 * step},
-        # controlled steps crowd around kick and landing: a third of the error of RK4 with a step a frame, for less work
+        # controlled steps crowd around kick and landing, where a step a frame errs most
         "balanced": {"method": "bosh3", "tolerance": 3e-3},
         "reference": {"method": "dopri5", "tolerance": 1e-7},
     }

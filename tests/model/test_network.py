@@ -48,7 +48,7 @@ def test_inference_equals_the_network(rigid: bool, dtype: type) -> None:
     start = encode(weights, config, pooled, vector, dtype)
     assert start.dtype == dtype
     assert np.allclose(start, state[0], rtol=1e-5, atol=1e-5)
-    field = make_field(weights, config, vector, dtype)(0.0, start)
+    field = make_field(weights, config, dtype)(vector)(0.0, start)
     assert field.dtype == dtype
     assert np.allclose(field, slope, rtol=1e-5, atol=1e-5 * float(slope.abs().max()))
     decoded = make_decoder(weights, config, dtype)(np.stack([start, start]))
