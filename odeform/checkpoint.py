@@ -10,8 +10,8 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from odeform.dataset.store import write_aside
 from odeform.errors import InputError
+from odeform.files import bundled, write_aside
 from odeform.schema import Schema
 from odeform.types import Arrays
 
@@ -89,15 +89,9 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
         raise InputError(f"checkpoint {path}: damaged metadata: {error}") from None
 
 
-def _bundle() -> Path:
-    here = Path(__file__).resolve().parent
-    installed = here / "assets" / "checkpoints"
-    return installed if installed.is_dir() else here.parent / "assets" / "checkpoints"
-
-
 def bundled_checkpoints() -> dict[str, Path]:
     """The checkpoints that travel with the package, by name SCENE/MODEL."""
-    return {f"{path.parent.name}/{path.stem}": path for path in sorted(_bundle().glob("*/*.safetensors"))}
+    return {f"{path.parent.name}/{path.stem}": path for path in sorted(bundled("checkpoints").glob("*/*.safetensors"))}
 
 
 def resolve_checkpoint(name: str) -> Path:

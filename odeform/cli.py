@@ -50,7 +50,7 @@ def parse_window(text: str | None) -> tuple[int, int] | None:
 
 
 def _emit(result: dict[str, Any], path: str | None) -> None:
-    from odeform.dataset.store import write_aside
+    from odeform.files import write_aside
 
     if path:
         write_aside(Path(path), json.dumps(result, indent=1).encode())
@@ -68,6 +68,20 @@ def _simulate(args: argparse.Namespace) -> None:
     dataset = simulate_dataset(args.scene, args.out, args.count, args.seed, args.workers, args.rate)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
+
+
+def _pack(args: argparse.Namespace) -> None:
+    from odeform.dataset.packed import SUFFIX, pack
+    from odeform.dataset.store import open_dataset
+
+    out = Path(args.out)
+    if out.suffix != SUFFIX:
+        raise InputError(f"--out: expected a name ending in {SUFFIX}, got {args.out!r}")
+    took = pack(open_dataset(args.dataset), out, 1e-3 * args.tolerance)
+    print(
+        f"{out}: {out.stat().st_size / 1e6:.2f} MB, {took['modes']} modes, RMSE of a sequence at most "
+        f"{1e3 * took['largest_rmse_m']:.4f} mm, error of a vertex at most {1e3 * took['largest_error_m']:.3f} mm"
+    )
 
 
 def _train(args: argparse.Namespace) -> None:
@@ -161,6 +175,11 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--seed", type=int, default=0, metavar="S")
     sub.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W")
     sub.add_argument("--rate", type=float, metavar="HZ", help="frames a second (default: the scene's)")
+
+    sub = command("pack", _pack, "write a small compressed copy of a data set")
+    sub.add_argument("dataset", metavar="DATASET")
+    sub.add_argument("--out", required=True, metavar="FILE")
+    sub.add_argument("--tolerance", type=float, default=0.02, metavar="MM", help="largest RMSE of a sequence (0.02)")
 
     sub = command("train", _train, "train a model on a data set and score it on the test split")
     sub.add_argument("dataset", metavar="DATASET")

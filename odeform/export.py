@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from odeform.dataset.store import write_aside
 from odeform.errors import InputError
+from odeform.files import write_aside
 from odeform.model.motion import Motion
 from odeform.types import Floats, GaussianSplats, Mesh
 

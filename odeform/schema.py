@@ -89,6 +89,8 @@ class Schema:
     parts: tuple[str, ...] = ("rigid", "local")
     needs_observations: bool = False
     notes: tuple[str, ...] = ()
+    impact: tuple[float, float] | None = None
+    """Half-open span of time in seconds that is scored apart: free flight and rest dilute every score."""
 
     @property
     def learned(self) -> tuple[Parameter, ...]:
@@ -129,6 +131,7 @@ class Schema:
                 parts=tuple(data["parts"]),
                 needs_observations=bool(data.get("needs_observations", False)),
                 notes=tuple(data.get("notes", ())),
+                impact=tuple(data["impact"]) if data.get("impact") else None,
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"schema: expected the fields of an ODeform scene, missing or wrong: {error}") from None

@@ -1,6 +1,6 @@
 """Value types shared by all layers. Lengths are metres, times seconds, masses kilograms."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -91,3 +91,10 @@ class Sequence:
     @property
     def rest(self) -> Mesh:
         return Mesh(self.vertices[0], self.faces)
+
+    def until(self, stop: float) -> "Sequence":
+        """The frames up to `stop` seconds. One that ended before, at rest, stays as it was."""
+        step = float(self.times[1] - self.times[0])
+        times = np.arange(round(stop / step) + 1) * step
+        kept = np.minimum(np.arange(len(times)), len(self.times) - 1)
+        return replace(self, times=times, vertices=self.vertices[kept])

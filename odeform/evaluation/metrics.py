@@ -5,20 +5,21 @@ sequences; the others average over coordinates of a frame first, then over frame
 that the mean RMSE squared lies below the mean MSE).
 """
 
-from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
 from odeform.predictor import Predictor
 from odeform.schema import Window
+from odeform.solver.integrate import Quality
 from odeform.types import Floats, Frames, Perpoint, Sequence
 
-__all__ = ["evaluate", "score"]
+__all__ = ["Scores", "evaluate"]
 
 
 def _deformation(vertices: Frames, weights: Perpoint) -> Frames:
@@ -30,83 +31,107 @@ def _deformation(vertices: Frames, weights: Perpoint) -> Frames:
     return back - (rest - centre)
 
 
-def score(pairs: Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]) -> dict[str, Any]:
-    """Scores of predictions (T, N, 3) metres against sequences, with a mask (T,) of the frames that count on-grid.
+Mask = NDArray[np.bool_]
 
-    `off_grid_rmse_mm` is the pooled RMSE over the frames that the mask leaves out (None without any).
-    """
-    frame_mse, frame_mae, distance, off, moved = [], [], [], [], []
-    residual = reference = 0.0
-    for predicted, truth, on_grid in pairs:
+
+class Scores:
+    """Collects predictions (T, N, 3) metres against sequences, one at a time."""
+
+    def __init__(self) -> None:
+        self._mse: list[Floats] = []
+        self._mae: list[Floats] = []
+        self._distance: list[Floats] = []
+        self._between: list[Floats] = []
+        self._moved: list[Floats] = []
+        self._residual = self._reference = 0.0
+
+    def add(self, predicted: Frames, truth: Sequence, counted: Mask, between: Mask) -> None:
+        """`counted` (T,) are the frames that scores average over, without frame 0, which is given; `between` those
+        off the frames that the model was trained on."""
         error = 1e3 * (predicted.astype(float) - truth.vertices)
-        grid = on_grid.copy()
+        grid = counted.copy()
         grid[0] = False
-        frame_mse.append((error**2).mean(axis=(1, 2))[grid])
-        frame_mae.append(np.abs(error).mean(axis=(1, 2))[grid])
-        distance.append(np.linalg.norm(error, axis=2).mean(axis=1)[grid])
-        off.append((error**2).mean(axis=(1, 2))[~on_grid])
-        moved.append(1e6 * ((truth.vertices - truth.vertices[0]).astype(float) ** 2).mean(axis=(1, 2))[grid])
+        squares = (error**2).mean(axis=(1, 2))
+        self._mse.append(squares[grid])
+        self._mae.append(np.abs(error).mean(axis=(1, 2))[grid])
+        self._distance.append(np.linalg.norm(error, axis=2).mean(axis=1)[grid])
+        self._between.append(squares[between])
+        self._moved.append(1e6 * ((truth.vertices - truth.vertices[0]).astype(float) ** 2).mean(axis=(1, 2))[grid])
         true_local = _deformation(truth.vertices, truth.weights)
         size = (true_local**2).sum(axis=2).mean(axis=1)
-        large = grid & (np.sqrt(size) > 0.1 * np.sqrt(size.max()))
+        large = grid & (np.sqrt(size) > 0.1 * np.sqrt(size[grid].max(initial=0.0)))
         difference = _deformation(predicted, truth.weights) - true_local
-        residual += float((difference[large] ** 2).sum(axis=2).mean(axis=1).sum())
-        reference += float(size[large].sum())
-    if not frame_mse:
-        raise InputError("evaluate: expected at least one sequence")
-    mse, mae = np.concatenate(frame_mse), np.concatenate(frame_mae)
-    off_all = np.concatenate(off)
-    pooled = float(np.sqrt(mse.mean()))
-    return {
-        "rmse_mm": float(np.sqrt(mse).mean()),
-        "mae_mm": float(mae.mean()),
-        "mse_mm2": float(mse.mean()),
-        "rmse_pooled_mm": pooled,
-        "mae_pooled_mm": float(mae.mean()),
-        "mse_pooled_mm2": float(mse.mean()),
-        "vertex_mm": float(np.concatenate(distance).mean()),
-        "relative": pooled / size if (size := float(np.sqrt(np.concatenate(moved).mean()))) else None,
-        "deformation_relative": float(np.sqrt(residual / reference)) if reference else None,
-        "off_grid_rmse_mm": float(np.sqrt(off_all.mean())) if off_all.size else None,
-        "per_frame_rmse_mm": np.sqrt(np.mean(np.stack(frame_mse), axis=0)).tolist() if _even(frame_mse) else [],
-        "sequences": len(frame_mse),
-    }
+        self._residual += float((difference[large] ** 2).sum(axis=2).mean(axis=1).sum())
+        self._reference += float(size[large].sum())
+
+    def result(self) -> dict[str, Any]:
+        """`off_grid_rmse_mm` is the pooled RMSE between the trained frames (None without any)."""
+        if not self._mse:
+            raise InputError("evaluate: expected at least one sequence")
+        mse, mae, between = (np.concatenate(rows) for rows in (self._mse, self._mae, self._between))
+        pooled, moved = float(np.sqrt(mse.mean())), float(np.sqrt(np.concatenate(self._moved).mean()))
+        even = len({len(row) for row in self._mse}) == 1
+        return {
+            "rmse_mm": float(np.sqrt(mse).mean()),
+            "mae_mm": float(mae.mean()),
+            "mse_mm2": float(mse.mean()),
+            "rmse_pooled_mm": pooled,
+            "mae_pooled_mm": float(mae.mean()),
+            "mse_pooled_mm2": float(mse.mean()),
+            "vertex_mm": float(np.concatenate(self._distance).mean()),
+            "relative": pooled / moved if moved else None,
+            "deformation_relative": float(np.sqrt(self._residual / self._reference)) if self._reference else None,
+            "off_grid_rmse_mm": float(np.sqrt(between.mean())) if between.size else None,
+            "per_frame_rmse_mm": np.sqrt(np.mean(np.stack(self._mse), axis=0)).tolist() if even else [],
+            "sequences": len(self._mse),
+        }
 
 
-def _even(rows: list[Floats]) -> bool:
-    return len({len(row) for row in rows}) == 1
-
-
-def _grid(times: Floats, window: Window) -> NDArray[np.bool_]:
+def _on_frames(times: Floats, window: Window) -> Mask:
     """Which times lie on the frames of a window's rate."""
     phase = (times - window.start) * window.rate
     return np.abs(phase - np.round(phase)) < 1e-3
 
 
 def evaluate(
-    predictor: Predictor, dataset: Dataset, split: str = "test", window: tuple[int, int] | None = None
+    predictor: Predictor,
+    dataset: Dataset,
+    split: str = "test",
+    window: tuple[int, int] | None = None,
+    quality: str | Quality = "balanced",
 ) -> dict[str, Any]:
-    """Scores of one model on a split, over frames `window` (half-open) of the data, at its `balanced` quality."""
-    if predictor.schema.scene != dataset.schema.scene:
-        raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {dataset.schema.scene}")
+    """Scores of one model on a split.
 
-    frames = range(*(window or (1, 2)))
-    if not any(frame > 0 for frame in frames):
+    Over the data's window, or its frames `window` (half-open; frames of the scene's rate, whatever that of the file).
+    A scene with an impact gets its scores apart, as `impact`, unless a window was asked for.
+    """
+    schema = dataset.schema
+    if predictor.schema.scene != schema.scene:
+        raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {schema.scene}")
+    rate, stop = schema.window.rate, schema.window.stop
+    begin, end = (0.0, stop + 1.0 / rate) if window is None else (window[0] / rate, window[1] / rate)
+    if end <= 1.0 / rate + 1e-9:
         raise InputError(f"window {window}: expected frames after frame 0, which is given")
-
-    def pairs() -> Iterable[tuple[Floats, Sequence, NDArray[np.bool_]]]:
-        for whole in dataset.sequences(split):
-            begin, end = window or (0, len(whole.times))
-            if begin >= len(whole.times):
-                raise InputError(f"window {window}: {whole.name} has {len(whole.times)} frames")
-            keep = np.unique(np.concatenate([[0], np.arange(begin, min(end, len(whole.times)))]))
-            truth = Sequence(
-                whole.times[keep], whole.vertices[keep], whole.faces, whole.weights, whole.parameters, whole.name
-            )
-            motion = predictor.solve(truth.rest, truth.parameters, until=float(truth.times[-1]))
-            yield motion.vertices(truth.times), truth, _grid(truth.times, predictor.schema.window)
-
-    scores = score(pairs())
-    scores["per_object"] = {}
-    scores["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith("rest."))
-    return scores
+    if begin > stop + 1e-9:
+        raise InputError(f"window {window}: scene {schema.scene} has {round(stop * rate) + 1} frames")
+    spans = {"whole": (begin, end)}
+    if schema.impact and window is None:
+        spans["impact"] = schema.impact
+    scores = {name: Scores() for name in spans}
+    for recorded in dataset.sequences(split):
+        truth = recorded.until(stop)
+        motion = predictor.solve(truth.rest, truth.parameters, quality, until=float(truth.times[-1]))
+        predicted = motion.vertices(truth.times)
+        on_frames = _on_frames(truth.times, schema.window)
+        between = ~_on_frames(truth.times, predictor.schema.window)
+        for name, (first, last) in spans.items():
+            inside = (truth.times > first - 1e-6) & (truth.times < last - 1e-6)
+            inside[0] = True
+            part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
+            scores[name].add(predicted[inside], part, on_frames[inside], between[inside])
+    result = scores["whole"].result()
+    if "impact" in scores:
+        result["impact"] = scores["impact"].result()
+    result["per_object"] = {}
+    result["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith("rest."))
+    return result

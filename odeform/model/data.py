@@ -1,10 +1,10 @@
 """From sequences to what the models learn from: one reduced trajectory for each."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.model.reduced import ReducedSpace, decompose, fit_space, to_canonical
 from odeform.schema import Schema, Window
@@ -38,7 +38,8 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
     rest = weights = anchor = times = None
     for split in ("train", "val"):
         poses[split], locals_[split], vectors = [], [], []
-        for sequence in dataset.sequences(split):
+        for recorded in dataset.sequences(split):
+            sequence = recorded.until(schema.window.stop)
             if anchor is None:
                 anchor = sequence.weights @ sequence.vertices[0].astype(float)
                 weights, times = sequence.weights, sequence.times
@@ -77,12 +78,5 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
         truncation[split] = float(1e3 * np.sqrt(max(total - kept, 0.0)))
     times = times[begin:end:every]
     rate = 1.0 / float(times[1] - times[0])
-    schema = Schema(
-        schema.scene,
-        schema.parameters,
-        Window(float(times[0]), float(times[-1]), rate),
-        schema.parts,
-        schema.needs_observations,
-        schema.notes,
-    )
+    schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
     return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation)

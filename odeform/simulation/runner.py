@@ -6,7 +6,8 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
-from odeform.dataset.store import Dataset, Entry, assign_splits, open_dataset, save_sequence, write_index
+from odeform.dataset.folder import INDEX, folder_reader, open_folder, save_sequence, write_index
+from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
 from odeform.progress import Progress
 from odeform.simulation.scene import Scene, get_scene
@@ -15,8 +16,12 @@ from odeform.simulation.shell import SimulationError
 __all__ = ["simulate_dataset"]
 
 
+TEST_RATE = 4  # test sequences have so many times the frames: people look between those that were learned
+
+
 def _one(scene_name: str, entry: Entry, root: Path, rate: float, step: float) -> Entry:
     try:
+        rate = rate * (TEST_RATE if entry.split == "test" else 1)
         sequence = get_scene(scene_name).simulate(entry.parameters, rate=rate, step=step)
     except SimulationError as error:
         return replace(entry, status=str(error))
@@ -25,9 +30,9 @@ def _one(scene_name: str, entry: Entry, root: Path, rate: float, step: float) ->
 
 def _finished(root: Path, plan: list[Entry], provenance: dict[str, object]) -> dict[str, Entry]:
     """Entries that an earlier, interrupted run of the same plan has completed."""
-    if not (root / "dataset.json").exists():
+    if not (root / INDEX).exists():
         return {}
-    old = open_dataset(root)
+    old = open_folder(root)
     if old.provenance != provenance:
         raise InputError(f"{root}: holds another data set ({old.provenance}); expected {provenance} or an empty folder")
     wanted = {entry.name: entry for entry in plan}
@@ -64,7 +69,7 @@ def simulate_dataset(
 
     def index() -> Dataset:
         entries = tuple(done[e.name] for e in plan if e.name in done)
-        dataset = Dataset(root, scene.schema, entries, scene.fixed, provenance)
+        dataset = Dataset(root, scene.schema, entries, folder_reader(root), scene.fixed, provenance)
         write_index(dataset)
         return dataset
 

@@ -17,7 +17,7 @@ __all__ = ["Scene", "get_scene"]
 class Scene:
     """A family of motions.
 
-    `simulate(parameters, rate, **numerics)` runs one motion over the schema's window; `rest_mesh()` is a fine
+    `simulate(parameters, rate, **numerics)` runs one motion; `rest_mesh()` is a fine
     mesh of the undeformed body, for display. `fixed` are the physical quantities that do not vary, with units in
     their names, kept with every data set.
     """
@@ -45,9 +45,9 @@ class Scene:
 
 def get_scene(name: str) -> Scene:
     """The scene of that name."""
-    from odeform.simulation import kick
+    from odeform.simulation import kick, mass_elastic
 
-    scenes = {"kick": kick.SCENE}
+    scenes = {scene.schema.scene: scene for scene in (mass_elastic.SCENE, kick.SCENE)}
     if name not in scenes:
         raise InputError(f"unknown scene {name!r}: expected one of {', '.join(scenes)}")
     return scenes[name]

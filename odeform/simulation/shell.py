@@ -3,17 +3,30 @@
 # MuJoCo is a compiled module without type stubs
 # pyright: reportAttributeAccessIssue=false
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from odeform.simulation.material import Material
+from odeform.simulation.material import Material, damping_time
 from odeform.types import Floats, Mesh
 
-__all__ = ["ShellBody", "SimulationError", "relax_sphere", "run"]
+__all__ = ["Rest", "ShellBody", "SimulationError", "relax_sphere", "run"]
 
 CONTACT_RADIUS = 0.001  # MuJoCo's contact skin around each vertex; the floor lies this much below z = 0
+
+
+ITERATIONS = 500  # of the constraint solver; the stiffest contacts take half as many
+
+
+@dataclass(frozen=True)
+class Rest:
+    """When a body counts as at rest: RMS speed over its mass below `speed` m/s for `time` seconds."""
+
+    speed: float
+    time: float
 
 
 class SimulationError(RuntimeError):
@@ -23,17 +36,20 @@ class SimulationError(RuntimeError):
 def _xml(
     mesh: Mesh, mass: float, thickness: float, material: Material, step: float, gravity: float, floor: bool
 ) -> str:
+    # the implicit step damps like `step` seconds of its own; taken off, a rebound depends on the step half as much
+    damping = max(damping_time(thickness, material) - step, 0.0)
     contact = f'friction="{material.friction} 0.005 0.0001" solref="{material.contact_time} 1"'
     plane = f'<geom type="plane" size="0 0 1" pos="0 0 {-CONTACT_RADIUS}" {contact}/>' if floor else ""
     points = " ".join(f"{x:.17g}" for x in np.asarray(mesh.points, dtype=float).ravel())
     elements = " ".join(map(str, np.asarray(mesh.faces).ravel()))
     return f"""<mujoco>
-  <option timestep="{step}" integrator="discrete" gravity="0 0 {-gravity}"/>
+  <option timestep="{step}" integrator="discrete" gravity="0 0 {-gravity}"
+    solver="CG" iterations="{ITERATIONS}"/>
   <worldbody>{plane}
     <body name="body"><flexcomp name="shell" type="direct" dim="2" mass="{mass}" radius="{CONTACT_RADIUS}"
       point="{points}" element="{elements}">
       <contact selfcollide="none" {contact}/>
-      <elasticity young="{material.young}" poisson="{material.poisson}" damping="{material.damping}"
+      <elasticity young="{material.young}" poisson="{material.poisson}" damping="{damping}"
         thickness="{thickness}" elastic2d="both"/>
     </flexcomp></body>
   </worldbody>
@@ -64,6 +80,7 @@ class ShellBody:
         self._reference = np.array(reference.points, dtype=float)
         self.masses = self.model.body_mass[-len(self._reference) :].copy()
         self.weights = self.masses / self.masses.sum()
+        self._converged = True
 
     @property
     def positions(self) -> Floats:
@@ -92,6 +109,7 @@ class ShellBody:
         before = self._centred()
         momentum = self._angular_momentum(before)
         mujoco.mj_step(self.model, self.data)
+        self._converged &= bool(self.data.solver_niter.max() < ITERATIONS)
         external = (self.data.qfrc_constraint + self.data.qfrc_applied).reshape(-1, 3)
         momentum = momentum + self.model.opt.timestep * np.cross(before, external).sum(axis=0)
         after = self._centred()
@@ -104,6 +122,8 @@ class ShellBody:
         warnings = [w.number for w in self.data.warning]
         if any(warnings):
             raise SimulationError(f"MuJoCo warnings (contact full, constraint full, ..., divergence): {warnings}")
+        if not self._converged:
+            raise SimulationError(f"the constraint solver has not converged in {ITERATIONS} iterations")
         if not np.isfinite(self.data.qpos).all():
             raise SimulationError("non-finite positions")
 
@@ -132,20 +152,29 @@ def relax_sphere(mesh: Mesh, radius: float, thickness: float, material: Material
 
 
 def run(
-    body: ShellBody, duration: float, rate: float, force: Callable[[float], Floats | None]
+    body: ShellBody,
+    until: float,
+    rate: float,
+    force: Callable[[float], Floats | None] = lambda _: None,
+    begin: float = 0.0,
+    rest: Rest | None = None,
 ) -> tuple[Floats, Floats]:
-    """Step the body for `duration` seconds; returns times (T,) and vertices (T, N, 3) at `rate` Hz, start included.
+    """Step the body from `begin` to `until` seconds, or till it rests.
+
+    Returns times (T,) on the grid k / rate and vertices (T, N, 3), those at both ends included.
 
     Frames fall between steps where the rate does not divide them: positions are then interpolated with the
     velocities of both sides (cubic Hermite), so that the step never depends on the frames asked for.
     """
     step = body.model.opt.timestep
-    times = np.arange(round(duration * rate) + 1) / rate
-    frames = [body.positions]
-    now, here, speed = 0.0, body.positions, body.velocities.copy()
-    for index in range(1, round(duration / step) + 1):
+    first = math.ceil(begin * rate - 1e-9)
+    times = np.arange(first, round(until * rate) + 1) / rate
+    frames = [body.positions] if times[0] <= begin + 1e-9 else []
+    now, here, speed = begin, body.positions, body.velocities.copy()
+    still = 0.0
+    for index in range(1, round((until - begin) / step) + 1):
         body.step(force(now + 0.5 * step))
-        after, there, speed_there = index * step, body.positions, body.velocities.copy()
+        after, there, speed_there = begin + index * step, body.positions, body.velocities.copy()
         while len(frames) < len(times) and times[len(frames)] <= after + 1e-9:
             s = (times[len(frames)] - now) / step
             frames.append(
@@ -155,5 +184,9 @@ def run(
                 + s**2 * (s - 1) * step * speed_there
             )
         now, here, speed = after, there, speed_there
+        if rest is not None:
+            still = still + step if body.weights @ (speed**2).sum(axis=1) < rest.speed**2 else 0.0
+            if still >= rest.time:
+                break
     body.check()
-    return times, np.stack(frames)
+    return times[: len(frames)], np.stack(frames)

@@ -12,7 +12,7 @@ import numpy as np
 from odeform.baselines.nearest import fit_nearest
 from odeform.baselines.pod_rbf import fit_pod_rbf
 from odeform.checkpoint import Checkpoint, write_checkpoint
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare

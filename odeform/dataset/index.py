@@ -1,0 +1,90 @@
+"""What a data set is: an index of sequences, and something that reads them one at a time."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.schema import Schema
+from odeform.types import Sequence
+
+__all__ = ["Dataset", "Entry", "Reader", "assign_splits", "index_from_json", "index_to_json"]
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One sequence of the index. `status` is "ok", or why the simulator gave none."""
+
+    name: str
+    split: str
+    parameters: dict[str, float]
+    sha256: str = ""
+    status: str = "ok"
+
+
+class Reader(Protocol):
+    """Reads one sequence of a data set; checks its SHA-256."""
+
+    def __call__(self, entry: Entry) -> Sequence: ...
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """An opened data set at `root`; holds the index, reads sequences when asked."""
+
+    root: Path
+    schema: Schema
+    entries: tuple[Entry, ...]
+    read: Reader = field(compare=False)
+    fixed: dict[str, float] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def select(self, split: str) -> list[Entry]:
+        """Sound entries of "train", "val", "test" or "all"."""
+        if split not in ("train", "val", "test", "all"):
+            raise InputError(f"split: expected train, val, test or all, got {split!r}")
+        return [e for e in self.entries if e.status == "ok" and split in ("all", e.split)]
+
+    def sequences(self, split: str) -> Iterator[Sequence]:
+        return (self.read(entry) for entry in self.select(split))
+
+
+def assign_splits(count: int, seed: int) -> list[str]:
+    """70 % train, 10 % val, 20 % test, drawn at random."""
+    train, val = round(0.7 * count), round(0.1 * count)
+    labels = np.array(["train"] * train + ["val"] * val + ["test"] * (count - train - val))
+    return [str(label) for label in np.random.default_rng(seed).permutation(labels)]
+
+
+def index_to_json(dataset: Dataset, **more: Any) -> bytes:
+    index = {
+        "format": FORMAT,
+        "schema": dataset.schema.to_json(),
+        "fixed": dataset.fixed,
+        "provenance": dataset.provenance,
+        **more,
+        "sequences": [asdict(entry) for entry in dataset.entries],
+    }
+    return json.dumps(index, indent=1).encode()
+
+
+def index_from_json(data: bytes, where: Path, root: Path, reader: Any) -> Dataset:
+    """`reader(index)` makes the reader from the whole index. `InputError` names `where` the index came from."""
+    try:
+        index = json.loads(data)
+    except ValueError:
+        raise InputError(f"{where}: not valid JSON") from None
+    if not isinstance(index, dict) or index.get("format") != FORMAT:
+        raise InputError(f"{where}: expected an index of format {FORMAT}")
+    try:
+        entries = tuple(Entry(**entry) for entry in index["sequences"])
+        schema = Schema.from_json(index["schema"])
+        return Dataset(root, schema, entries, reader(index), index["fixed"], index["provenance"])
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{where}: missing or wrong field {error}") from None

@@ -1,0 +1,206 @@
+"""Sequences in one small file: pose and POD coefficients of each, quantised, differenced in time and compressed.
+
+A zip archive of `dataset.json` (the index, as in a folder), `common.npz` (reference points, modes, faces, weights) and
+a member for each sequence, so that one is read without the others. Every frame is a best-fit rigid motion of the
+reference and a sum of modes that are orthonormal over the vertices: a coefficient is an RMS displacement, and steps of
+`quantum` metres leave a known error.
+"""
+
+import hashlib
+import io
+import lzma
+import struct
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odeform.dataset.index import Dataset, Entry, Reader, index_from_json, index_to_json
+from odeform.errors import InputError
+from odeform.files import write_aside
+from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
+from odeform.progress import Progress
+from odeform.types import Arrays, Floats, Sequence
+
+__all__ = ["SUFFIX", "open_packed", "pack"]
+
+SUFFIX = ".odp"
+HEADER = struct.Struct("<IId")  # frames, series, rate in Hz
+ORDERS = 4  # differences in time: none to third
+LIMIT = 1 << 28  # bytes of one sequence, decompressed
+POSE = 6
+
+
+def _squeeze(values: NDArray[np.int64], rate: float) -> bytes:
+    """(T, S) integers -> bytes: each series differenced as often as pays off, then byte planes, then LZMA."""
+    residuals = [values]
+    for _ in range(1, ORDERS):
+        residuals.append(np.diff(residuals[-1], axis=0, prepend=0))
+    cost = np.array([np.log2(1.0 + np.abs(r)).sum(axis=0) for r in residuals])
+    orders = cost.argmin(axis=0)
+    chosen = np.stack([residuals[order][:, s] for s, order in enumerate(orders)])
+    planes = chosen.astype("<i4").view(np.uint8).reshape(*chosen.shape, 4)
+    body = orders.astype(np.uint8).tobytes() + np.moveaxis(planes, -1, 0).tobytes()
+    return lzma.compress(HEADER.pack(*values.shape, rate) + body, preset=9)
+
+
+def _expand(data: bytes) -> tuple[NDArray[np.int64], float]:
+    body = lzma.LZMADecompressor(memlimit=1 << 28).decompress(data, max_length=LIMIT)
+    frames, series, rate = HEADER.unpack_from(body)
+    orders, planes = np.split(np.frombuffer(body, np.uint8, offset=HEADER.size), [series])
+    residuals = np.ascontiguousarray(np.moveaxis(planes.reshape(4, series, frames), 0, -1)).view("<i4")[..., 0]
+    values = residuals.astype(np.int64)
+    for s, order in enumerate(orders):
+        for _ in range(int(order)):
+            values[s] = np.cumsum(values[s])
+    return values.T, rate
+
+
+def _moving(sequence: Sequence, reference: Floats) -> tuple[Floats, Floats]:
+    """Pose (T, 6) of the reference in each frame, and what remains, (T, 3 N) in its own axes."""
+    even = np.full(len(reference), 1.0 / len(reference))
+    rotation, shift = best_rigid(reference, sequence.vertices, even)
+    centre = even @ reference
+    local = (sequence.vertices - (centre + shift)[:, None]) @ rotation - (reference - centre)
+    return np.concatenate([shift, unwrapped_vectors(rotation)], axis=1), local.reshape(len(local), -1)
+
+
+def _steps(common: Arrays, quantum: float) -> Floats:
+    """(6 + K,) quantisation steps: metres, and radians that move the farthest vertex by as much."""
+    points = common["points"]
+    reach = np.linalg.norm(points - points.mean(axis=0), axis=1).max()
+    return quantum / np.concatenate([np.ones(3), np.full(3, reach), np.ones(common["modes"].shape[1])])
+
+
+def _decode(data: bytes, common: Arrays, quantum: float) -> tuple[Floats, Floats]:
+    """Times (T,) and vertices (T, N, 3)."""
+    values, rate = _expand(data)
+    y = values * _steps(common, quantum)
+    points = common["points"]
+    centre = points.mean(axis=0)
+    local = (y[:, POSE:] @ common["modes"].T.astype(float)).reshape(len(y), -1, 3)
+    turned = (points - centre + local) @ rotation_from_vector(y[:, 3:POSE]).swapaxes(1, 2)
+    return np.arange(len(y)) / rate, (turned + (centre + y[:, :3])[:, None]).astype(np.float32)
+
+
+def _modes(dataset: Dataset, reference: Floats) -> tuple[Floats, Floats]:
+    """(3 N, 3 N) POD modes, orthonormal in the mean over vertices, and the mean square displacement each carries."""
+    total, frames = np.zeros((reference.size, reference.size)), 0
+    for sequence in dataset.sequences("all"):
+        _, local = _moving(sequence, reference)
+        total += local.T @ local
+        frames += len(local)
+    values, vectors = np.linalg.eigh(total / (frames * len(reference)))
+    return vectors[:, ::-1] * np.sqrt(len(reference)), np.maximum(values[::-1], 0.0)
+
+
+def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, float]:
+    """Write a compressed copy whose RMSE over coordinates is at most `tolerance` metres for every sequence.
+
+    Returns what it took: modes, quantum, largest RMSE of a sequence and largest error of a vertex, in metres.
+    """
+    first = next(dataset.sequences("all"), None)
+    if first is None:
+        raise InputError(f"{dataset.root}: no sequence to pack")
+    reference = first.vertices[0].astype(float)
+    modes, energy = _modes(dataset, reference)
+    for share in (0.4, 0.2, 0.1, 0.05):
+        # of the squared error, half to the modes left out on average; the worst sequence decides
+        left = energy.sum() - np.cumsum(energy)
+        count = int(np.argmax(left / 3.0 < share * tolerance**2)) + 1
+        quantum = 6.0 * np.sqrt(0.5 / (count + POSE)) * tolerance
+        common = {
+            "points": reference,
+            "modes": modes[:, :count].astype(np.float32),
+            "faces": first.faces.astype(np.int32),
+            "weights": first.weights,
+        }
+        blobs, rmse, worst = _encode(dataset, common, quantum)
+        if rmse <= tolerance:
+            break
+    else:
+        raise InputError(f"{dataset.root}: no compression within {1e3 * tolerance:g} mm")
+    buffer = io.BytesIO()
+    np.savez(buffer, **common)
+    entries = tuple(
+        replace(e, sha256=hashlib.sha256(blobs[e.name]).hexdigest()) if e.name in blobs else e for e in dataset.entries
+    )
+    codec = {"quantum_m": quantum, "modes": count, "largest_rmse_m": rmse, "largest_error_m": worst}
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w") as file:
+        for name, data, method in (
+            ("dataset.json", index_to_json(replace(dataset, entries=entries), codec=codec), zipfile.ZIP_LZMA),
+            ("common.npz", buffer.getvalue(), zipfile.ZIP_LZMA),
+            *((name, data, zipfile.ZIP_STORED) for name, data in blobs.items()),
+        ):
+            # a fixed date: the same data give the same file
+            file.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, method)
+    write_aside(out, archive.getvalue())
+    return codec
+
+
+def _encode(dataset: Dataset, common: Arrays, quantum: float) -> tuple[dict[str, bytes], float, float]:
+    """A blob for each sequence, the largest RMSE of a sequence and the largest error of a vertex, in metres."""
+    blobs: dict[str, bytes] = {}
+    rmse = worst = 0.0
+    selected = dataset.select("all")
+    progress = Progress(f"pack {dataset.schema.scene}", len(selected))
+    for entry in selected:
+        sequence = dataset.read(entry)
+        if sequence.vertices.shape[1:] != common["points"].shape:
+            raise InputError(f"{entry.name}: expected {len(common['points'])} vertices as in the others")
+        rate = (len(sequence.times) - 1) / float(sequence.times[-1])
+        if not np.allclose(sequence.times, np.arange(len(sequence.times)) / rate, atol=1e-9):
+            raise InputError(f"{entry.name}: expected evenly spaced frames from time 0")
+        pose, local = _moving(sequence, common["points"])
+        coefficients = local @ common["modes"].astype(float) / len(common["points"])
+        y = np.concatenate([pose, coefficients], axis=1)
+        blobs[entry.name] = _squeeze(np.rint(y / _steps(common, quantum)).astype(np.int64), rate)
+        error = _decode(blobs[entry.name], common, quantum)[1].astype(float) - sequence.vertices
+        rmse = max(rmse, float(np.sqrt((error**2).mean())))
+        worst = max(worst, float(np.linalg.norm(error, axis=-1).max()))
+        progress.advance()
+    progress.close()
+    return blobs, rmse, worst
+
+
+def open_packed(path: Path) -> Dataset:
+    """The data set in that file."""
+
+    def member(name: str) -> bytes:
+        try:
+            with zipfile.ZipFile(path) as file:
+                if file.getinfo(name).file_size > LIMIT:
+                    raise InputError(f"{path}: {name} is too large")
+                return file.read(name)
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror}") from None
+        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, lzma.LZMAError):
+            raise InputError(f"{path}: not a packed data set, or damaged: no readable {name}") from None
+
+    def reader(index: dict) -> Reader:  # pyright: ignore[reportMissingTypeArgument]
+        quantum = float(index["codec"]["quantum_m"])
+        with np.load(io.BytesIO(member("common.npz")), allow_pickle=False) as arrays:
+            common = {name: arrays[name] for name in ("points", "modes", "faces", "weights")}
+
+        def read(entry: Entry) -> Sequence:
+            data = member(entry.name)
+            if hashlib.sha256(data).hexdigest() != entry.sha256:
+                raise InputError(f"{path}: checksum of {entry.name} does not match; the file is damaged")
+            try:
+                times, vertices = _decode(data, common, quantum)
+            except (lzma.LZMAError, struct.error, ValueError):
+                raise InputError(f"{path}: {entry.name} cannot be decoded") from None
+            parameters = dict(entry.parameters)
+            return Sequence(times, vertices, common["faces"], common["weights"], parameters, entry.name)
+
+        return read
+
+    try:
+        return index_from_json(member("dataset.json"), path, path, reader)
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"{path}: damaged: {error}") from None

@@ -1,0 +1,28 @@
+"""Files: written whole or not at all, and those that travel with the package."""
+
+import os
+import tempfile
+from pathlib import Path
+
+__all__ = ["bundled", "write_aside"]
+
+
+def write_aside(path: Path, data: bytes) -> None:
+    """Write a file so that at any moment either the old or the new one is there, whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        os.chmod(aside, 0o644)
+        os.replace(aside, path)
+    except BaseException:
+        Path(aside).unlink(missing_ok=True)
+        raise
+
+
+def bundled(kind: str) -> Path:
+    """The folder of that kind among the assets, in a clone or in an installed wheel. It may be missing."""
+    here = Path(__file__).resolve().parent
+    installed = here / "assets" / kind
+    return installed if installed.is_dir() else here.parent / "assets" / kind
