@@ -91,7 +91,8 @@ def _train(args: argparse.Namespace) -> None:
 
     dataset = open_dataset(args.dataset)
     rest = get_scene(dataset.schema.scene).rest_mesh()
-    request = TrainRequest(args.model, args.seed, args.minutes, parse_window(args.window), args.every)
+    window = parse_window(args.window)
+    request = TrainRequest(args.model, args.seed, args.minutes, window, args.every, args.resume)
     train(dataset, rest, args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
 
 
@@ -189,6 +190,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--every", type=int, default=1, metavar="K", help="train on every k-th frame")
     sub.add_argument("--seed", type=int, default=0, metavar="S")
     sub.add_argument("--minutes", type=float, default=30.0, metavar="M", help="wall time (default 30)")
+    sub.add_argument("--resume", action="store_true", help="continue an interrupted training (FILE.part)")
 
     sub = command("evaluate", _evaluate, "score checkpoints on a data set")
     sub.add_argument("checkpoints", nargs="+", metavar="CKPT")

@@ -92,9 +92,9 @@ class Sequence:
     def rest(self) -> Mesh:
         return Mesh(self.vertices[0], self.faces)
 
-    def until(self, stop: float) -> "Sequence":
-        """The frames up to `stop` seconds. One that ended before, at rest, stays as it was."""
+    def until(self, stop: float, every: int = 1) -> "Sequence":
+        """Every k-th frame up to `stop` seconds. A sequence that ended before, at rest, stays as it was."""
         step = float(self.times[1] - self.times[0])
-        times = np.arange(round(stop / step) + 1) * step
-        kept = np.minimum(np.arange(len(times)), len(self.times) - 1)
+        times = np.arange(round(stop / step) + 1)[::every] * step
+        kept = np.minimum(np.arange(len(times)) * every, len(self.times) - 1)
         return replace(self, times=times, vertices=self.vertices[kept])

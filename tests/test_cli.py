@@ -6,7 +6,8 @@ import pytest
 import trimesh
 
 from odeform.cli import main, run_guarded
-from odeform.dataset.store import Dataset, open_dataset
+from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
 from odeform.predictor import Predictor, load
 
 
@@ -106,14 +107,45 @@ def test_train(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert load(out).schema.window.stop == pytest.approx(0.5)
 
 
+@pytest.mark.usefixtures("coarse")
 def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("simulate", "kick", "--out", tmp_path / "new", "--count", 1, "--seed", 2, "--workers", 1, "--rate", 30)
     assert run(*arguments) == 0
     assert "1 sequences" in capsys.readouterr().out
     made = open_dataset(tmp_path / "new")
     sequence = made.read(made.entries[0])
-    assert sequence.vertices.shape == (31, 162, 3)
-    assert made.provenance["rate_hz"] == 30.0
+    assert sequence.vertices.shape == (31, 66, 3)
+    assert made.provenance["rate_hz"] == made.schema.window.rate == 30.0
+
+
+def test_pack(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "kick.odp"
+    assert run("pack", dataset.root, "--out", out, "--tolerance", 0.1) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{out}: {out.stat().st_size / 1e6:.2f} MB, ")
+    largest = float(said.split("RMSE of a sequence at most ")[1].split(" mm")[0])
+    errors = []
+    packed = open_dataset(out)
+    for one, two in zip(dataset.sequences("all"), packed.sequences("all"), strict=True):
+        errors.append(1e3 * np.sqrt(((one.vertices.astype(float) - two.vertices) ** 2).mean()))
+    assert largest == pytest.approx(max(errors), abs=1e-4)
+    assert 0.01 < largest <= 0.1
+
+
+def test_a_packed_data_set_serves_as_its_folder(
+    trained: dict[str, Path], dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "kick.odp"
+    assert run("pack", dataset.root, "--out", out) == 0
+    scores = {}
+    for data in (dataset.root, out):
+        assert run("evaluate", trained["pod-rbf"], "--data", data, "--json", tmp_path / "scores.json") == 0
+        scores[data] = json.loads((tmp_path / "scores.json").read_text())["models"]["pod-rbf"]
+    for name, close in (("rmse_pooled_mm", 1e-3), ("off_grid_rmse_mm", 1e-3), ("deformation_relative", 2e-2)):
+        assert scores[out][name] == pytest.approx(scores[dataset.root][name], rel=close)
+    assert run("train", out, "--out", tmp_path / "a.safetensors", "--model", "nearest") == 0
+    assert load(tmp_path / "a.safetensors").schema == load(trained["nearest"]).schema
+    capsys.readouterr()
 
 
 BAD = {
@@ -140,6 +172,11 @@ BAD = {
     "train: no data set": "train {empty} --out {empty}/a.safetensors",
     "train: unknown model": "train {data} --out {empty}/a.safetensors --model oracle",
     "train: window": "train {data} --out {empty}/a.safetensors --window 0:b",
+    "pack: no data set": "pack {empty} --out {empty}/a.odp",
+    "pack: ending": "pack {data} --out {empty}/a.zip",
+    "pack: no such file": "pack {empty}/a.odp --out {empty}/b.odp",
+    "pack: not a data set": "pack {text} --out {empty}/a.odp",
+    "evaluate: not a data set": "evaluate {nearest} --data {text}",
     "simulate: unknown scene": "simulate throw --out {empty}",
     "simulate: another data set": "simulate kick --out {data} --count 2",
     "simulate: count": "simulate kick --out {empty} --count 0",

@@ -31,8 +31,14 @@ def folder_reader(root: Path) -> Reader:
         if hashlib.sha256(data).hexdigest() != entry.sha256:
             raise InputError(f"{path}: checksum does not match {INDEX}; the file is damaged or was changed")
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            names = ("times", "vertices", "faces", "weights")
-            return Sequence(*(arrays[name] for name in names), dict(entry.parameters), entry.name)
+            return Sequence(
+                arrays["times"],
+                arrays["vertices"],
+                arrays["faces"],
+                arrays["weights"],
+                dict(entry.parameters),
+                entry.name,
+            )
 
     return read
 

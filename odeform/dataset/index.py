@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -28,6 +28,7 @@ class Entry:
     status: str = "ok"
 
 
+@runtime_checkable
 class Reader(Protocol):
     """Reads one sequence of a data set; checks its SHA-256."""
 

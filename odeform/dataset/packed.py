@@ -11,6 +11,7 @@ import io
 import lzma
 import struct
 import zipfile
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -89,6 +90,8 @@ def _modes(dataset: Dataset, reference: Floats) -> tuple[Floats, Floats]:
     """(3 N, 3 N) POD modes, orthonormal in the mean over vertices, and the mean square displacement each carries."""
     total, frames = np.zeros((reference.size, reference.size)), 0
     for sequence in dataset.sequences("all"):
+        if sequence.vertices.shape[1:] != reference.shape:
+            raise InputError(f"{sequence.name}: expected {len(reference)} vertices as in the others")
         _, local = _moving(sequence, reference)
         total += local.T @ local
         frames += len(local)
@@ -149,8 +152,9 @@ def _encode(dataset: Dataset, common: Arrays, quantum: float) -> tuple[dict[str,
     progress = Progress(f"pack {dataset.schema.scene}", len(selected))
     for entry in selected:
         sequence = dataset.read(entry)
-        if sequence.vertices.shape[1:] != common["points"].shape:
-            raise InputError(f"{entry.name}: expected {len(common['points'])} vertices as in the others")
+        same_weights = np.allclose(sequence.weights, common["weights"], rtol=0.0, atol=1e-9)
+        if not (np.array_equal(sequence.faces, common["faces"]) and same_weights):
+            raise InputError(f"{entry.name}: expected the same mesh as in the others")
         rate = (len(sequence.times) - 1) / float(sequence.times[-1])
         if not np.allclose(sequence.times, np.arange(len(sequence.times)) / rate, atol=1e-9):
             raise InputError(f"{entry.name}: expected evenly spaced frames from time 0")
@@ -176,8 +180,8 @@ def open_packed(path: Path) -> Dataset:
                     raise InputError(f"{path}: {name} is too large")
                 return file.read(name)
         except OSError as error:
-            raise InputError(f"{path}: {error.strerror}") from None
-        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, lzma.LZMAError):
+            raise InputError(f"{path}: {error.strerror or error}") from None
+        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error, lzma.LZMAError):
             raise InputError(f"{path}: not a packed data set, or damaged: no readable {name}") from None
 
     def reader(index: dict) -> Reader:  # pyright: ignore[reportMissingTypeArgument]

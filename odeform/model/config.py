@@ -15,13 +15,13 @@ class ModelConfig:
     modes: int
     rigid: bool = True
     """Whether the scene has rigid motion; without, there is no rigid branch."""
-    rigid_latent: int = 32
-    local_latent: int = 128
+    rigid_latent: int = 16
+    local_latent: int = 48
     point_width: int = 32
     encoder_width: int = 128
-    rigid_width: int = 128
-    local_width: int = 256
-    decoder_width: int = 128
+    rigid_width: int = 64
+    local_width: int = 128
+    decoder_widths: tuple[int, ...] = (192,)
 
     @property
     def state(self) -> int:
@@ -31,16 +31,19 @@ class ModelConfig:
     def branches(self) -> tuple[str, ...]:
         return ("rigid", "local") if self.rigid else ("local",)
 
+    def latent(self, branch: str) -> int:
+        return self.rigid_latent if branch == "rigid" else self.local_latent
+
     def sizes(self, branch: str) -> dict[str, list[int]]:
         """Widths of the layers of each part of a branch, inputs first."""
         rigid = branch == "rigid"
-        latent, outputs = (self.rigid_latent, POSE) if rigid else (self.local_latent, self.modes)
+        latent, outputs = self.latent(branch), POSE if rigid else self.modes
         seen = (self.rigid_latent if rigid else self.state) + self.parameters
         width = self.rigid_width if rigid else self.local_width
         return {
             "encoder.points": [3, self.point_width, self.point_width],
             "encoder.head": [self.point_width + self.parameters, self.encoder_width, self.encoder_width, latent],
             "field": [seen, width, width, latent],
-            "decoder.net": [latent, self.decoder_width, self.decoder_width, outputs],
-            "decoder.linear": [latent, outputs],
+            "decoder.hidden": [latent + self.parameters, *self.decoder_widths],
+            "decoder.readout": [latent + self.decoder_widths[-1], outputs],
         }

@@ -6,11 +6,14 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.model.reduced import ReducedSpace, decompose, fit_space, to_canonical
+from odeform.model.reduced import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
 from odeform.types import Floats
 
 __all__ = ["TrainingData", "prepare"]
+
+TRUNCATION = 5e-3
+MOST_MODES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +32,26 @@ class TrainingData:
     """RMS of the deformation that the modes leave out, for each split."""
 
 
-def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None, every: int = 1) -> TrainingData:
-    """Decompose all training and validation sequences; fit the deformation basis on the training ones alone."""
+def prepare(
+    dataset: Dataset, modes: int | None = None, window: tuple[int, int] | None = None, every: int = 1
+) -> TrainingData:
+    """Decompose all training and validation sequences; fit the deformation basis on the training ones alone.
+
+    Without `modes`, as few as leave `TRUNCATION` of the RMS deformation of the validation sequences.
+    """
     schema = dataset.schema
     if window is not None and window[0] != 0:
         raise InputError(f"window {window[0]}:{window[1]}: expected to start at frame 0, where the body is at rest")
+    stop = schema.window.stop if window is None else min((window[1] - 1) / schema.window.rate, schema.window.stop)
+    count = round(stop * schema.window.rate) + 1
+    if every < 1 or len(range(0, count, every)) < 4:
+        raise InputError(f"every {every}: expected at least 4 frames to learn from among {count}")
     poses, locals_, theta = {}, {}, {}
     rest = weights = anchor = times = None
     for split in ("train", "val"):
         poses[split], locals_[split], vectors = [], [], []
         for recorded in dataset.sequences(split):
-            sequence = recorded.until(schema.window.stop)
+            sequence = recorded.until(stop, every)
             if anchor is None:
                 anchor = sequence.weights @ sequence.vertices[0].astype(float)
                 weights, times = sequence.weights, sequence.times
@@ -58,25 +70,22 @@ def prepare(dataset: Dataset, modes: int, window: tuple[int, int] | None = None,
     assert weights is not None
     assert anchor is not None
     assert times is not None
-    space, train = fit_space(rest, locals_["train"], weights, anchor, modes)
-    shapes = space.basis.values(rest)
+    shapes = fit_modes(locals_["train"], weights, modes or MOST_MODES)
     root = weights[:, None]
-    coefficients = {"train": train, "val": [np.einsum("tni,nik->tk", local * root, shapes) for local in locals_["val"]]}
+    coefficients = {
+        split: [np.einsum("tni,nik->tk", local * root, shapes) for local in locals_[split]] for split in locals_
+    }
+    total = {split: np.mean([(root * x**2).sum(axis=(1, 2)).mean() for x in locals_[split]]) for split in locals_}
+    kept = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in locals_}
+    if modes is None:
+        enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
+        modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
+    space = make_space(rest, shapes[..., :modes], weights, anchor)
     reduced, truncation = {}, {}
-    begin, end = window or (0, len(times))
-    if every < 1 or len(times[begin:end:every]) < 4:
-        raise InputError(f"every {every}: expected at least 4 frames to learn from among {len(times[begin:end])}")
     for split in ("train", "val"):
-        reduced[split] = np.stack(
-            [
-                np.concatenate(pair, axis=1)[begin:end:every]
-                for pair in zip(poses[split], coefficients[split], strict=True)
-            ]
-        )
-        total = np.mean([(root * local**2).sum(axis=(1, 2)).mean() for local in locals_[split]])
-        kept = np.mean([(c**2).sum(axis=1).mean() for c in coefficients[split]])
-        truncation[split] = float(1e3 * np.sqrt(max(total - kept, 0.0)))
-    times = times[begin:end:every]
+        pairs = zip(poses[split], coefficients[split], strict=True)
+        reduced[split] = np.stack([np.concatenate([pose, c[:, :modes]], axis=1) for pose, c in pairs])
+        truncation[split] = float(1e3 * np.sqrt(max(total[split] - kept[split][:modes].sum(), 0.0)))
     rate = 1.0 / float(times[1] - times[0])
     schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
     return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation)

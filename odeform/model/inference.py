@@ -1,8 +1,7 @@
 """Fast inference of the ODeform network for one object: numpy, a small state, no autograd.
 
 At batch size one a field evaluation is a handful of small matrix-vector products, where a framework's dispatch costs
-more than the arithmetic. `network.py` is the same
-network for training; a test holds both together.
+more than the arithmetic. `network.py` is the same network for training; a test holds both together.
 """
 
 import itertools
@@ -53,7 +52,7 @@ def check_weights(weights: Arrays, config: ModelConfig) -> None:
     for branch in config.branches:
         for part, sizes in config.sizes(branch).items():
             name = f"{branch}_{part}"
-            if part == "decoder.linear":
+            if part == "decoder.readout":
                 wanted[f"{name}.weight"] = (sizes[1], sizes[0])
                 continue
             for layer, (before, after) in enumerate(itertools.pairwise(sizes)):
@@ -132,26 +131,40 @@ def _field(branches: list[tuple[int, list[tuple[Floats, Floats]]]]) -> Field:
     return field
 
 
-def make_decoder(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Floats]:
-    """(T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start."""
-    split = config.rigid_latent if config.rigid else 0
+Decoder = Callable[[Floats], Floats]
+
+
+def make_decoder(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Decoder]:
+    """theta (P,) -> the decoder: (T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start."""
     gains = weights["gains"].astype(np.float64)
-    parts = [
-        (
-            slice(0, split) if branch == "rigid" else slice(split, None),
-            np.asfortranarray(weights[f"{branch}_decoder.linear.weight"].astype(dtype)),
-            _layers(weights, f"{branch}_decoder.net", dtype),
-        )
-        for branch in config.branches
-    ]
+    parts = []
+    for branch in config.branches:
+        place = slice(0, config.rigid_latent) if branch == "rigid" else slice(config.state - config.local_latent, None)
+        (first, bias), *others = _layers(weights, f"{branch}_decoder.hidden", dtype)
+        seen = config.latent(branch)
+        readout = np.asfortranarray(weights[f"{branch}_decoder.readout.weight"].astype(dtype))
+        parts.append((place, np.asfortranarray(first[:, :seen]), first[:, seen:].astype(float), bias, others, readout))
 
-    def decode(states: Floats) -> Floats:
-        out = [states[:, at] @ linear.T + _mlp(layers, states[:, at], _silu) for at, linear, layers in parts]
-        if not config.rigid:
-            out.insert(0, np.zeros((len(states), POSE), dtype=dtype))
-        return np.concatenate(out, axis=1) * gains
+    def fold(theta: Floats) -> Decoder:
+        folded = [
+            (place, [(first, bias + (seeing @ theta).astype(dtype)), *others], readout)
+            for place, first, seeing, bias, others, readout in parts
+        ]
 
-    return decode
+        def decode(states: Floats) -> Floats:
+            out = []
+            for place, layers, readout in folded:
+                x = features = states[:, place]
+                for matrix, bias in layers:
+                    x = _silu(x @ matrix.T + bias)
+                out.append(np.concatenate([features, x], axis=1) @ readout.T)
+            if not config.rigid:
+                out.insert(0, np.zeros((len(states), POSE), dtype=dtype))
+            return np.concatenate(out, axis=1) * gains
+
+        return decode
+
+    return fold
 
 
 class LatentTrajectory:

@@ -1,16 +1,18 @@
 """The ODeform network (paper, Section III) in whitened reduced coordinates, for training and encoding.
 
 Dual encoders of P0 and theta, two neural ODEs of which the local one sees the global state, and two decoders. One
-state of 32 + 128 numbers per object, whatever the number of its points.
+state per object, whatever the number of its points.
 """
 
 import itertools
+from collections.abc import Sequence
 
 import torch
 from torch import nn
 
 from odeform.model.config import ModelConfig
 from odeform.model.reduced import POSE
+from odeform.solver.rollout import Branch, roll_out
 
 __all__ = ["ODeformNet", "ShapeEncoder", "mlp"]
 
@@ -59,19 +61,30 @@ class ShapeEncoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """Three layers beside a linear path; what a state moved since the start, so that y(0) = 0 exactly."""
+    """Features of a state, and their linear readout, which training solves for rather than descends to.
+
+    Motion is what the features moved since the start, so that y(0) = 0 exactly and no bias is needed.
+    """
 
     def __init__(self, sizes: dict[str, list[int]]) -> None:
         super().__init__()
-        self.linear = nn.Linear(*sizes["decoder.linear"], bias=False)
-        self.net = mlp(sizes["decoder.net"], nn.SiLU)
+        layers = [
+            layer
+            for before, after in itertools.pairwise(sizes["decoder.hidden"])
+            for layer in (nn.Linear(before, after), nn.SiLU())
+        ]
+        self.hidden = nn.Sequential(*layers)
+        self.readout = nn.Linear(*sizes["decoder.readout"], bias=False)
 
-    def forward(self, state: torch.Tensor) -> torch.Tensor:
-        return self.linear(state) + self.net(state)
+    def features(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(T, B, latent), (B, P) -> (T, B, F), relative to the first of the T."""
+        seen = torch.cat([states, theta.expand(*states.shape[:-1], -1)], dim=-1)
+        features = torch.cat([states, self.hidden(seen)], dim=-1)
+        return features - features[:1]
 
 
 class ODeformNet(nn.Module):
-    """theta, P0 -> state(0); state -> slope; state -> y in whitened units.
+    """theta, P0 -> state(0); state -> slope; states -> y in whitened units.
 
     The fields end in a linear layer on tanh units: their values are bounded, so states grow at most linearly in time.
     `gains` (y,) turn whitened outputs to metres and radians; `time_scale` in seconds makes the field's unit of time.
@@ -99,6 +112,16 @@ class ODeformNet(nn.Module):
     def encoders(self) -> list[ShapeEncoder]:
         return ([self.rigid_encoder] if self.config.rigid else []) + [self.local_encoder]
 
+    @property
+    def decoders(self) -> list[Decoder]:
+        return ([self.rigid_decoder] if self.config.rigid else []) + [self.local_decoder]
+
+    @property
+    def places(self) -> list[slice]:
+        """Where in the state each branch lives."""
+        split = self.config.rigid_latent
+        return [slice(0, split), slice(split, None)] if self.config.rigid else [slice(0, None)]
+
     def encode(self, shape: tuple[torch.Tensor, torch.Tensor], theta: torch.Tensor) -> torch.Tensor:
         """One shape (points (N, 3), weights (N,)) and (B, P) parameters -> (B, state)."""
         return torch.cat(
@@ -106,18 +129,27 @@ class ODeformNet(nn.Module):
             dim=-1,
         )
 
-    def slope(self, state: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(B, state), (B, P) -> d state / dt in 1/s. The local field sees the global state (paper, III-C)."""
-        slopes = [self.local_field(torch.cat([state, theta], dim=-1))]
-        if self.config.rigid:
-            rigid = state[..., : self.config.rigid_latent]
-            slopes.insert(0, self.rigid_field(torch.cat([rigid, theta], dim=-1)))
-        return torch.cat(slopes, dim=-1) / self.time_scale
+    def roll_out(self, start: torch.Tensor, theta: torch.Tensor, steps: Sequence[float]) -> torch.Tensor:
+        """States (T + 1, B, state) after RK4 steps of those seconds. The local field sees the global state (paper,
+        III-C); parameters enter as a bias."""
+        fields = [self.rigid_field, self.local_field] if self.config.rigid else [self.local_field]
+        branches = []
+        for field, place in zip(fields, self.places, strict=True):
+            first, second, last = (layer for layer in field if isinstance(layer, nn.Linear))
+            seen = first.in_features - self.config.parameters
+            seeing, bias = first.weight[:, :seen], first.bias + theta @ first.weight[:, seen:].T
+            rate = 1.0 / self.time_scale
+            branches.append(
+                Branch(seen, place, seeing, bias, second.weight, second.bias, last.weight * rate, last.bias * rate)
+            )
+        return roll_out(start, steps, branches)
 
-    def decode(self, state: torch.Tensor) -> torch.Tensor:
-        """(..., state) -> (..., 6 + K) whitened, not yet relative to the start."""
+    def decode(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(T, B, state), (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""
+        out = [
+            decoder.readout(decoder.features(states[..., place], theta))
+            for decoder, place in zip(self.decoders, self.places, strict=True)
+        ]
         if not self.config.rigid:
-            local = self.local_decoder(state)
-            return torch.cat([torch.zeros_like(local[..., :1]).expand(*local.shape[:-1], POSE), local], dim=-1)
-        split = self.config.rigid_latent
-        return torch.cat([self.rigid_decoder(state[..., :split]), self.local_decoder(state[..., split:])], dim=-1)
+            out.insert(0, states.new_zeros(*states.shape[:-1], POSE))
+        return torch.cat(out, dim=-1)

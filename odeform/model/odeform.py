@@ -21,7 +21,8 @@ class ODeform(ReducedModel):
     model = "odeform"
 
     def _read(self, checkpoint: Checkpoint) -> None:
-        self.config = ModelConfig(**checkpoint.config["network"])
+        network = checkpoint.config["network"]
+        self.config = ModelConfig(**{**network, "decoder_widths": tuple(network["decoder_widths"])})
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
@@ -41,4 +42,4 @@ class ODeform(ReducedModel):
         assert quality is not None
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
-        return LatentTrajectory(field, self._decoders[dtype], start, quality, until, self.space.arm)
+        return LatentTrajectory(field, self._decoders[dtype](theta), start, quality, until, self.space.arm)

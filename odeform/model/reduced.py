@@ -15,9 +15,9 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Arrays, Floats, Frames, Perpoint, Points, Rotations, Sequence, Vector, Vectors
+from odeform.types import Arrays, Basis, Frames, Perpoint, Points, Rotations, Sequence, Vector, Vectors
 
-__all__ = ["POSE", "ReducedSpace", "decompose", "fit_space", "rotation_of", "to_canonical"]
+__all__ = ["POSE", "ReducedSpace", "decompose", "fit_modes", "make_space", "rotation_of", "to_canonical"]
 
 POSE = 6  # numbers of the rigid part of y
 
@@ -68,22 +68,21 @@ def decompose(sequence: Sequence, anchor: Vector, azimuth: float) -> tuple[Float
     return pose, local
 
 
-def fit_space(
-    rest: Points, locals_: list[Frames], weights: Perpoint, anchor: Vector, modes: int
-) -> tuple[ReducedSpace, list[Floats]]:
-    """POD of the training deformations (T, N, 3) over one topology, and its coordinate basis.
-
-    `rest` (N, 3) is canonical. Returns the space, and the coefficients (T, K) of each sequence.
-    """
+def fit_modes(locals_: list[Frames], weights: Perpoint, modes: int) -> Basis:
+    """POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the weights."""
     root = np.sqrt(weights)[:, None]
-    snapshots = np.concatenate([(local * root).reshape(len(local), -1) for local in locals_])
-    covariance = snapshots.T @ snapshots
+    covariance = np.zeros((3 * len(weights), 3 * len(weights)))
+    for local in locals_:
+        snapshots = (local * root).reshape(len(local), -1)
+        covariance += snapshots.T @ snapshots
     _, vectors = np.linalg.eigh(covariance)
-    vectors = vectors[:, ::-1][:, :modes]
-    shapes = vectors.reshape(len(rest), 3, -1) / root[..., None]
-    scale = float(np.sqrt((weights[:, None] * rest**2).sum()))
-    coefficients = [(local * root).reshape(len(local), -1) @ vectors for local in locals_]
-    return ReducedSpace(np.asarray(anchor, dtype=float), scale, fit_basis(rest, shapes, scale)), coefficients
+    return vectors[:, ::-1][:, :modes].reshape(len(weights), 3, -1) / root[..., None]
+
+
+def make_space(rest: Points, shapes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
+    """The space of the modes `shapes` (N, 3, K) at the canonical points `rest` (N, 3)."""
+    arm = float(np.sqrt((weights[:, None] * rest**2).sum()))
+    return ReducedSpace(np.asarray(anchor, dtype=float), arm, fit_basis(rest, shapes, arm))
 
 
 def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Rotations, Vectors]:

@@ -56,6 +56,7 @@ def simulate_dataset(
     root = Path(out)
     rate = rate or scene.schema.window.rate
     step = step or scene.step
+    schema = replace(scene.schema, window=replace(scene.schema.window, rate=rate))
     provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
     plan = [
         Entry(f"{scene_name}_{index:05d}", split, parameters)
@@ -69,7 +70,7 @@ def simulate_dataset(
 
     def index() -> Dataset:
         entries = tuple(done[e.name] for e in plan if e.name in done)
-        dataset = Dataset(root, scene.schema, entries, folder_reader(root), scene.fixed, provenance)
+        dataset = Dataset(root, schema, entries, folder_reader(root), scene.fixed, provenance)
         write_index(dataset)
         return dataset
 

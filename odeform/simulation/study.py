@@ -74,8 +74,8 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
 
     jobs = [(p, scene.step) for p in settings] + [(p, 0.5 * scene.step) for p in settings]
     jobs += [(nudge(p, q, by), scene.step) for p in settings for q in learned for by in (-NUDGE, NUDGE)]
-    motions = Parallel(n_jobs=workers, verbose=5)(delayed(_run)(scene, *job) for job in jobs)
-    assert motions is not None
+    parallel: Any = Parallel(n_jobs=workers, verbose=5)
+    motions: list[Sequence] = parallel(delayed(_run)(scene, *job) for job in jobs)
     coarse, fine = motions[:count], motions[count : 2 * count]
     nudged = [motions[at : at + 2 * len(learned)] for at in range(2 * count, len(motions), 2 * len(learned))]
     rows = []

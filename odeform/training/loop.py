@@ -1,27 +1,35 @@
-"""Training of the ODeform network: multiple shooting first, whole roll-outs after.
+"""Training of the ODeform network by whole roll-outs and variable projection.
 
-Segments of ten frames, each started by a small network from the observed motion, train in parallel and give the field
-its shape; roll-outs from the encoder alone, over a growing horizon, then do most of the work.
+The readout of the decoders is linear, so its best value for any states is known: a least-squares solve. Each step
+solves for it on its batch and descends in everything else (variable projection, Golub & Pereyra 1973): descent shapes
+the states, and the last millimetres, which it would take hours for, come from the solve.
 """
 
+import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
 from torch import nn
 
+from odeform.errors import InputError
+from odeform.files import write_aside
 from odeform.model.config import ModelConfig
 from odeform.model.data import TrainingData
-from odeform.model.network import ODeformNet, mlp
+from odeform.model.network import ODeformNet
 from odeform.model.reduced import POSE
-from odeform.solver.adjoint import solve_backprop
-from odeform.solver.integrate import Quality
-from odeform.training.losses import AutomaticWeights, Metric
+from odeform.training.losses import Metric, balanced
 from odeform.types import Arrays
 
 __all__ = ["TrainConfig", "build_network", "network_weights", "train_network"]
+
+CHUNK = 64  # sequences rolled out at once where no gradients are wanted
 
 
 @dataclass(frozen=True)
@@ -31,23 +39,16 @@ class TrainConfig:
     minutes: float = 30.0
     """Wall time."""
     seed: int = 0
-    batch: int = 60
+    batch: int = 64
     """Sequences in a step."""
-    segment: int = 10
-    """Frames of a shooting segment."""
-    shooting: float = 0.05
-    """Share of the time for multiple shooting."""
     rate: float = 2e-3
-    """Learning rate at the start of each phase; falls by a cosine to nothing."""
-    tie: float = 0.1
-    """Weight of the gap between a segment's end and the next one's start."""
-    change: float = 3.0
-    """Frames for which an error of the speed counts as if it went on."""
-    floor: float = 0.1
-    """Frames count by 1 / (their displacement + this share of the largest): the kick itself moves little, but is
-    what people look at."""
+    """Learning rate at the start; falls by a cosine to nothing."""
+    horizon: tuple[float, float] = (0.25, 0.33)
+    """Share of the motion that is rolled out at first, and share of the time in which it grows to the whole."""
+    ridge: float = 1e-6
+    """Of the readout's least squares, relative to the mean square of a feature."""
     report: float = 20.0
-    """Seconds between lines of progress."""
+    """Seconds between lines of progress, and between saved states."""
 
 
 def build_network(data: TrainingData, seed: int) -> ODeformNet:
@@ -61,9 +62,18 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
     gains = np.concatenate(
         [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
     )
-    net.gains.copy_(torch.as_tensor(np.maximum(gains, 1e-9)))
+    # what does not move, as the turn of a ball that falls straight, is not blown up to size one
+    floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.arm, 1.0], [3, 3, len(gains) - POSE])
+    floor[POSE:] = 1e-9
+    net.gains.copy_(torch.as_tensor(np.maximum(gains, floor)))
     # fields of order one should cross the latent space in a few frames, not in a second
     net.time_scale.fill_(0.05)
+    for decoder in net.decoders:
+        for layer in decoder.hidden:
+            if isinstance(layer, nn.Linear):
+                # features have to differ before a readout can make use of them
+                layer.weight.data *= 2.0
+                nn.init.uniform_(layer.bias, -1.0, 1.0)
     shape = _shape(data)
     for encoder in net.encoders:
         encoder.standardise([shape])
@@ -74,118 +84,186 @@ def _shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.as_tensor(data.rest / data.space.arm).float(), torch.as_tensor(data.weights).float()
 
 
+class _Readout:
+    """Normal equations of one decoder's readout, in double precision; features may come in chunks."""
+
+    def __init__(self) -> None:
+        self._gram: torch.Tensor | None = None
+
+    def add(self, features: torch.Tensor, truth: torch.Tensor) -> None:
+        """(T, B, F) and (T, B, outputs), without frame 0, where features and truth vanish."""
+        x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
+        gram, cross = x.T @ x, x.T @ y
+        self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)
+
+    def solve(self, ridge: float) -> torch.Tensor:
+        """(outputs, F)."""
+        assert self._gram is not None
+        gram = self._gram.clone()
+        gram.diagonal().add_(ridge * gram.diagonal().mean() + 1e-30)
+        return torch.linalg.solve(gram, self._cross).T.float()
+
+
 class _Trainer:
-    def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig) -> None:
-        self.net, self.config = net, config
+    def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device) -> None:
+        self.net, self.config, self.device = net.to(device), config, device
         self.metric = Metric(net.gains, data.space.arm)
-        self.balance = AutomaticWeights(2)
-        gains = net.gains.double().numpy()
-        self.truth = {k: torch.as_tensor(v / gains).float() for k, v in data.reduced.items()}
-        self.theta = {k: torch.as_tensor(v).float() for k, v in data.theta.items()}
+        gains = net.gains.cpu().double().numpy()
+        # frames first, as roll-outs have them
+        self.truth = {
+            k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
+            for k, v in data.reduced.items()
+        }
+        self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.step = float(data.times[1] - data.times[0])
-        self.quality = Quality("rk4", step=self.step)
-        size = np.linalg.norm(data.reduced["train"][..., :3], axis=-1).mean(axis=0)
-        emphasis = 1.0 / (size + config.floor * size.max())
-        self.emphasis = torch.as_tensor(emphasis / emphasis.mean()).float()
-        speed = np.gradient(data.reduced["train"], self.step, axis=1)
-        self.speed = torch.as_tensor(speed / np.sqrt((speed**2).mean(axis=(0, 1)) + 1e-12)).float()
-        outputs = self.truth["train"].shape[-1]
-        self.starter = mlp([2 * outputs + net.config.parameters, 256, 256, net.config.state], nn.SiLU)
-        self.shape = _shape(data)
+        points, shares = _shape(data)
+        self.shape = points.to(device), shares.to(device)
+        self.frames = len(self.truth["train"]) - 1
         self.generator = torch.Generator().manual_seed(config.seed)
+        self.weights = [w for name, w in net.named_parameters() if not name.endswith("readout.weight")]
+        self.optimiser = torch.optim.AdamW(self.weights, lr=config.rate, weight_decay=1e-4)
+        self.outputs = [slice(0, POSE), slice(POSE, None)] if net.config.rigid else [slice(POSE, None)]
+        self.done = 0
+        self.elapsed = 0.0
 
-    def _roll(self, start: torch.Tensor, theta: torch.Tensor, frames: int) -> torch.Tensor:
-        return solve_backprop(lambda _, z: self.net.slope(z, theta), start, self.quality, frames)
+    def states(self, theta: torch.Tensor, frames: int) -> torch.Tensor:
+        return self.net.roll_out(self.net.encode(self.shape, theta), theta, [self.step] * frames)
 
-    def shooting_loss(self, rows: torch.Tensor) -> torch.Tensor:
-        truth, theta, length = self.truth["train"][rows], self.theta["train"][rows], self.config.segment
-        first = self.net.encode(self.shape, theta)
-        at = torch.arange(length, truth.shape[1] - 1, length)
-        at = at[at + length < truth.shape[1]]
-        cues = torch.cat([truth[:, at], self.speed[rows][:, at], theta[:, None].expand(-1, len(at), -1)], dim=-1)
-        starts = torch.cat([first[:, None], self.starter(cues)], dim=1)
-        count = starts.shape[1]
-        states = self._roll(starts.flatten(0, 1), theta.repeat_interleave(count, dim=0), length)
-        states = states.unflatten(1, (len(rows), count))
-        predicted = self.net.decode(states) - self.net.decode(first)[None, :, None]
-        frames = torch.arange(count)[None] * length + torch.arange(length + 1)[:, None]
-        rigid, points = self.metric(predicted, truth[:, frames].transpose(0, 1))
-        gap = ((states[-1, :, :-1] - starts[:, 1:]) ** 2).mean()
-        return self.balance(rigid, points) + self.config.tie * gap
+    def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
+        """Of a batch, after its readout has been solved for."""
+        theta, truth = self.theta["train"][rows], self.truth["train"][: frames + 1, rows]
+        states = self.states(theta, frames)
+        predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
+        for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
+            features = decoder.features(states[..., place], theta)
+            readout = _Readout()
+            readout.add(features.detach(), truth[..., out])
+            decoder.readout.weight.data = readout.solve(self.config.ridge)
+            predicted.append(decoder.readout(features))
+        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:])[-len(self.outputs) :])
 
-    def rollout(
-        self, split: str, rows: torch.Tensor, frames: int, plain: bool = False
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """L_rigid and L_points over the first `frames`; `plain` without emphasis and changes, as scores are."""
-        truth, theta = self.truth[split][rows][:, : frames + 1], self.theta[split][rows]
-        first = self.net.encode(self.shape, theta)
-        states = self._roll(first, theta, frames)
-        predicted = (self.net.decode(states) - self.net.decode(first)).transpose(0, 1)
-        if plain:
-            return self.metric(predicted, truth)
-        return self.metric(predicted, truth, self.emphasis[: frames + 1], self.config.change)
+    def advance(self, share: float) -> None:
+        """One step of descent."""
+        config = self.config
+        start, grown = config.horizon
+        frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
+        warm = min(1.0, (self.done + 1) / 20.0)
+        self.optimiser.param_groups[0]["lr"] = warm * config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
+        rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: config.batch]
+        self.optimiser.zero_grad()
+        self.loss(rows.to(self.device), max(frames, 2)).backward()
+        norm = nn.utils.clip_grad_norm_(self.weights, 1.0)
+        if torch.isfinite(norm):
+            self.optimiser.step()
+        self.done += 1
+
+    @torch.no_grad()
+    def solve_readout(self, ridge: float) -> None:
+        """The readout of all training sequences."""
+        readouts = [_Readout() for _ in self.net.decoders]
+        for rows in torch.arange(len(self.theta["train"])).split(CHUNK):
+            theta = self.theta["train"][rows]
+            states = self.states(theta, self.frames)
+            for readout, decoder, place, out in zip(
+                readouts, self.net.decoders, self.net.places, self.outputs, strict=True
+            ):
+                readout.add(decoder.features(states[..., place], theta), self.truth["train"][:, rows][..., out])
+        for readout, decoder in zip(readouts, self.net.decoders, strict=True):
+            decoder.readout.weight.data = readout.solve(ridge)
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
-        rows = torch.arange(len(self.theta[split]))
-        losses = self.rollout(split, rows, self.truth[split].shape[1] - 1, plain=True)
-        return tuple(float((loss / 3.0).sqrt()) for loss in losses)  # pyright: ignore[reportReturnType]
+        total = torch.zeros(2, device=self.device)
+        for rows in torch.arange(len(self.theta[split])).split(CHUNK):
+            theta = self.theta[split][rows]
+            predicted = self.net.decode(self.states(theta, self.frames), theta)
+            total += len(rows) * torch.stack(self.metric(predicted[1:], self.truth[split][1:, rows]))
+        rigid, local = (total / len(self.theta[split]) / 3.0).sqrt().tolist()
+        return rigid, local
 
-    def phase(self, seconds: float, shooting: bool, report: Callable[[str], None]) -> None:
-        modules = [self.net, *([self.starter] if shooting else [])]
-        weights = [p for module in modules for p in module.parameters()]
-        balance = {"params": list(self.balance.parameters()), "weight_decay": 0.0}
-        optimiser = torch.optim.AdamW([{"params": weights}, balance], lr=self.config.rate, weight_decay=1e-4)
-        total = self.truth["train"].shape[1] - 1
-        begin = printed = time.monotonic()
-        steps = 0
-        while (elapsed := time.monotonic() - begin) < seconds:
-            share = elapsed / seconds
-            warm = min(1.0, steps / 20.0)
-            rate = warm * self.config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
-            optimiser.param_groups[0]["lr"] = rate
-            optimiser.param_groups[1]["lr"] = rate * AutomaticWeights.RATE
-            rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.config.batch]
-            if shooting:
-                loss = self.shooting_loss(rows)
-            else:
-                # the horizon grows over the first third of the phase
-                frames = min(total, round(total * (0.25 + 2.25 * share)))
-                loss = self.balance(*self.rollout("train", rows, frames))
-            optimiser.zero_grad()
-            loss.backward()
-            norm = nn.utils.clip_grad_norm_(weights, 1.0)
-            if torch.isfinite(norm):
-                optimiser.step()
-            steps += 1
-            now = time.monotonic()
-            if now - printed > self.config.report:
-                printed = now
-                rigid, local = self.errors_mm("val")
-                name = "shooting" if shooting else "roll-out"
-                trained, _ = self.errors_mm("train")
-                report(
-                    f"{name} {100 * share:.0f} %, step {steps}: val rigid {rigid:.2f} mm (train {trained:.2f}), "
-                    f"deformation {local:.3f} mm"
-                )
+    def save(self, path: Path) -> None:
+        tensors = {f"net.{name}": value for name, value in self.net.state_dict().items()}
+        for index, state in self.optimiser.state_dict()["state"].items():
+            tensors |= {f"adam.{index}.{name}": value for name, value in state.items()}
+        tensors["generator"] = self.generator.get_state()
+        meta = {"config": asdict(self.config), "done": self.done, "elapsed": self.elapsed}
+        tensors = {name: value.contiguous() for name, value in tensors.items()}
+        write_aside(path, save(tensors, {"training": json.dumps(meta)}))
+
+    def restore(self, path: Path) -> None:
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"--resume: {path}: {error.strerror}; expected what an interrupted run left") from None
+        try:
+            tensors = load(data)
+            header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+            meta: dict[str, Any] = json.loads(header["__metadata__"]["training"])
+            weights = {k.removeprefix("net."): v for k, v in tensors.items() if k.startswith("net.")}
+            states: dict[int, dict[str, torch.Tensor]] = {}
+            for key, value in tensors.items():
+                if key.startswith("adam."):
+                    _, index, name = key.split(".")
+                    states.setdefault(int(index), {})[name] = value
+            self.net.load_state_dict(weights)
+            groups = self.optimiser.state_dict()["param_groups"]
+            self.optimiser.load_state_dict({"state": states, "param_groups": groups})
+            self.generator.set_state(tensors["generator"])
+            self.done, self.elapsed = int(meta["done"]), float(meta["elapsed"])
+        except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
+            raise InputError(f"--resume: {path}: not the state of this training: {error}") from None
 
 
 def train_network(
-    net: ODeformNet, data: TrainingData, config: TrainConfig, report: Callable[[str], None] = print
+    net: ODeformNet,
+    data: TrainingData,
+    config: TrainConfig,
+    report: Callable[[str], None] = print,
+    part: Path | None = None,
+    resume: bool = False,
 ) -> dict[str, float]:
-    """Train in place; returns validation errors in mm.
+    """Train in place, on a GPU where there is one; returns validation errors in mm and the number of steps.
 
-    Denormal numbers slow such a run thirty-fold on some processors, so they are flushed.
+    The state goes to the file `part` at every report and when interrupted; `resume` continues from there.
     """
+    # on the processor one thread: batches are small, and results do not depend on the number of cores. Denormal
+    # numbers slow such a run thirty-fold on some processors.
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
     torch.set_flush_denormal(True)
-    torch.manual_seed(config.seed)
-    trainer = _Trainer(net, data, config)
+    trainer = _Trainer(net, data, config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
+    if resume and part is not None:
+        trainer.restore(part)
+        report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
     seconds = 60.0 * config.minutes
-    trainer.phase(config.shooting * seconds, True, report)
-    trainer.phase((1.0 - config.shooting) * seconds, False, report)
+    begin, printed = time.monotonic() - trainer.elapsed, trainer.elapsed
+    try:
+        while (elapsed := time.monotonic() - begin) < seconds:
+            trainer.advance(elapsed / seconds)
+            trainer.elapsed = elapsed
+            if elapsed - printed > config.report:
+                printed = elapsed
+                trainer.solve_readout(config.ridge)
+                rigid, local = trainer.errors_mm("val")
+                trained, trained_local = trainer.errors_mm("train")
+                report(
+                    f"{100 * elapsed / seconds:.0f} %, step {trainer.done}: rigid {rigid:.3f} mm "
+                    f"(train {trained:.3f}), deformation {local:.4f} mm (train {trained_local:.4f})"
+                )
+                if part is not None:
+                    trainer.save(part)
+    except KeyboardInterrupt:
+        if part is not None:
+            trainer.save(part)
+            report(f"interrupted; --resume continues from {part}")
+        raise
+    finally:
+        torch.set_num_threads(threads)
+    trainer.solve_readout(config.ridge)
     rigid, local = trainer.errors_mm("val")
-    return {"val_rigid_rmse_mm": rigid, "val_deformation_rmse_mm": local}
+    net.cpu()
+    return {"val_rigid_rmse_mm": rigid, "val_deformation_rmse_mm": local, "steps": trainer.done}
 
 
 def network_weights(net: ODeformNet) -> Arrays:

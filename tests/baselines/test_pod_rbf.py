@@ -3,7 +3,7 @@ import pytest
 
 from odeform.baselines.nearest import fit_nearest
 from odeform.baselines.pod_rbf import fit_pod_rbf
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.model.data import TrainingData, prepare
 from odeform.predictor import Predictor
 

@@ -1,140 +1,41 @@
-import hashlib
-import json
-import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
-from odeform.dataset.store import (
-    Dataset,
-    Entry,
-    assign_splits,
-    open_dataset,
-    save_sequence,
-    write_aside,
-    write_index,
-)
+from odeform.dataset import store
+from odeform.dataset.index import Dataset
+from odeform.dataset.packed import pack
+from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
-from odeform.simulation.scene import get_scene
-from odeform.types import Sequence
-
-
-def sequence(seed: int = 0) -> Sequence:
-    vertices = np.random.default_rng(seed).normal(size=(5, 4, 3)).astype(np.float32)
-    faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-    return Sequence(np.arange(5) / 10.0, vertices, faces, np.full(4, 0.25))
 
 
 @pytest.fixture
-def small(tmp_path: Path) -> Dataset:
-    """Three sequences, of which the simulator gave up one."""
-    entries = [
-        Entry(f"s{k}", split, {"mass": 0.5}, save_sequence(tmp_path, f"s{k}", sequence(k)))
-        for k, split in enumerate(("train", "train", "test"))
-    ]
-    entries[1] = replace(entries[1], status="diverged")
-    dataset = Dataset(tmp_path, get_scene("kick").schema, tuple(entries), {"radius_m": 0.1}, {"seed": 3})
-    write_index(dataset)
-    return dataset
+def shipped(dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of assets that holds the kicks, packed, and a file of another kind."""
+    monkeypatch.setattr(store, "bundled", lambda kind: tmp_path / "assets" / kind)
+    few = replace(dataset, entries=dataset.entries[:2])
+    pack(few, tmp_path / "assets" / "datasets" / "kick.odp", tolerance=1e-3)
+    (tmp_path / "assets" / "datasets" / "README.md").write_text("kicks")
+    return tmp_path / "assets" / "datasets"
 
 
-def test_comes_back_as_written(small: Dataset) -> None:
-    again = open_dataset(small.root)
-    assert again == small
-    read, true = again.read(again.entries[2]), sequence(2)
-    assert read.name == "s2"
-    assert read.parameters == {"mass": 0.5}
-    for name in ("times", "vertices", "faces", "weights"):
-        assert np.array_equal(getattr(read, name), getattr(true, name))
-    assert read.vertices.dtype == np.float32
+def test_finds_what_is_bundled(shipped: Path) -> None:
+    assert bundled_datasets() == {"kick": shipped / "kick.odp"}
+    assert open_dataset("kick") == open_dataset(shipped / "kick.odp")
+    assert [e.name for e in open_dataset("kick").entries] == ["kick_00000", "kick_00001"]
 
 
-def test_splits_leave_out_what_failed(small: Dataset) -> None:
-    assert [e.name for e in small.select("train")] == ["s0"]
-    assert [e.name for e in small.select("val")] == []
-    assert [s.name for s in small.sequences("all")] == ["s0", "s2"]
-    with pytest.raises(InputError, match="split"):
-        small.select("tset")
+def test_nothing_need_be_bundled(shipped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "bundled", lambda kind: tmp_path / "nowhere")
+    assert bundled_datasets() == {}
+    with pytest.raises(InputError, match="kick"):
+        open_dataset("kick")
 
 
-def test_shares_of_the_splits() -> None:
-    labels = assign_splits(200, seed=4)
-    assert [labels.count(split) for split in ("train", "val", "test")] == [140, 20, 40]
-    assert labels == assign_splits(200, seed=4)
-    assert labels != assign_splits(200, seed=5)
-    assert labels != sorted(labels)
-
-
-def test_changed_files_are_noticed(small: Dataset) -> None:
-    path = small.root / "s0.npz"
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 1
-    path.write_bytes(data)
-    with pytest.raises(InputError, match="checksum"):
-        small.read(small.entries[0])
-    path.write_bytes(data[:100])
-    with pytest.raises(InputError, match="checksum"):
-        small.read(small.entries[0])
-    path.unlink()
-    with pytest.raises(InputError, match="No such file"):
-        small.read(small.entries[0])
-
-
-def test_nothing_is_unpickled(small: Dataset) -> None:
-    path = small.root / "s0.npz"
-    np.savez(path, times=np.array([{"a": 1}], dtype=object))
-    entry = replace(small.entries[0], sha256=hashlib.sha256(path.read_bytes()).hexdigest())
-    with pytest.raises(ValueError, match="pickle"):
-        small.read(entry)
-
-
-DAMAGE: dict[str, Callable[[dict[str, Any]], Any]] = {
-    "another format": lambda index: {**index, "format": 2},
-    "no format": lambda index: {k: v for k, v in index.items() if k != "format"},
-    "a list": lambda index: [index],
-    "a number": lambda index: 7,
-    "no schema": lambda index: {k: v for k, v in index.items() if k != "schema"},
-    "no sequences": lambda index: {k: v for k, v in index.items() if k != "sequences"},
-    "strange entry": lambda index: {**index, "sequences": [{"name": "s0", "color": "red"}]},
-    "strange schema": lambda index: {**index, "schema": {**index["schema"], "window": {"start": 0.0}}},
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGE)
-def test_refuses_an_index(small: Dataset, damage: str) -> None:
-    path = small.root / "dataset.json"
-    path.write_text(json.dumps(DAMAGE[damage](json.loads(path.read_text()))))
-    with pytest.raises(InputError):
-        open_dataset(small.root)
-
-
-def test_refuses_what_is_no_index(small: Dataset, tmp_path: Path) -> None:
-    path = small.root / "dataset.json"
-    for content in (b"", b"{", b"\xff\xfe\x00", path.read_bytes()[:-20]):
-        path.write_bytes(content)
-        with pytest.raises(InputError):
-            open_dataset(small.root)
+def test_opens_folders_and_files(dataset: Dataset, shipped: Path) -> None:
+    for name in (dataset.root, str(dataset.root)):
+        assert open_dataset(name) == dataset
+    assert open_dataset(str(shipped / "kick.odp")).root == shipped / "kick.odp"
     with pytest.raises(InputError, match=r"dataset\.json"):
-        open_dataset(tmp_path / "nowhere")
-
-
-def test_writing_is_all_or_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "deep" / "file.bin"
-    write_aside(path, b"old")
-
-    def interrupted(source: str, target: Path) -> None:
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "replace", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            write_aside(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert list(path.parent.iterdir()) == [path]
-    write_aside(path, b"new")
-    assert path.read_bytes() == b"new"
-    assert list(path.parent.iterdir()) == [path]
+        open_dataset(shipped)

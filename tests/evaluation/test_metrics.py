@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import Scores, evaluate
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
@@ -125,11 +125,57 @@ def test_a_window_without_frames(dataset: Dataset, predictors: dict[str, Predict
         evaluate(predictors["nearest"], dataset, "test", window)
 
 
+def test_the_impact_is_scored_as_a_window_of_its_span(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    with_impact = replace(dataset, schema=replace(dataset.schema, impact=(0.25, 0.75)))
+    whole = evaluate(predictors["pod-rbf"], with_impact, "test")
+    part = evaluate(predictors["pod-rbf"], dataset, "test", window=(30, 90))
+    assert len(part["per_frame_rmse_mm"]) == 60
+    assert whole["impact"] == {name: part[name] for name in whole["impact"]}
+    assert {name: whole[name] for name in part} == evaluate(predictors["pod-rbf"], dataset, "test")
+    # neither a scene without an impact has it, nor a window that was asked for
+    assert "impact" not in part
+    assert "impact" not in evaluate(predictors["pod-rbf"], with_impact, "test", window=(30, 90))
+
+
+def test_frames_between_the_learned_ones_count_apart(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    """Test sequences have four times the rate: every fourth frame counts, the others are off the grid."""
+    every_fourth = replace(dataset, read=lambda entry: dataset.read(entry).until(1.0, every=4))
+    fine = evaluate(predictors["pod-rbf"], dataset, "test")
+    coarse = evaluate(predictors["pod-rbf"], every_fourth, "test")
+    assert coarse.pop("off_grid_rmse_mm") is None
+    for name, value in coarse.items():
+        # rounding alone differs: 1 / 120 is not quite four times 1 / 480
+        assert fine[name] == (pytest.approx(value, rel=1e-9) if value else value)
+    squares = []
+    for sequence in dataset.sequences("test"):
+        motion = predictors["pod-rbf"].solve(sequence.rest, sequence.parameters)
+        between = np.arange(481) % 4 != 0
+        error = motion.vertices(sequence.times[between]) - sequence.vertices[between].astype(float)
+        squares.append(1e6 * (error**2).mean())
+    assert fine["off_grid_rmse_mm"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
+
+
+def test_a_sequence_that_ended_is_scored_where_it_lies(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    """Cut at 0.5 s, as if at rest: the frames after are held up against the last one."""
+    cut = replace(dataset, read=lambda entry: dataset.read(entry).until(0.5))
+    scores = evaluate(predictors["nearest"], cut, "train")
+    by_frame = np.array(scores["per_frame_rmse_mm"])
+    assert by_frame.shape == (120,)
+    assert by_frame[:60].max() < 0.2
+    squares = []
+    for sequence in dataset.sequences("train"):
+        motion = predictors["nearest"].solve(sequence.rest, sequence.parameters)
+        squares.append(1e6 * ((motion.vertices(0.9) - sequence.vertices[60].astype(float)) ** 2).mean())
+    # frame 0 has no score, so frame 108 is number 107
+    assert by_frame[107] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
+    assert by_frame[107] > 10.0
+
+
 def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, Predictor], kick: Predictor) -> None:
     train = [s.vertices @ rotation_z(s.parameters["azimuth"]) for s in dataset.sequences("train")]
     mean = np.mean(train, axis=0)
     guesses = [
-        (mean @ rotation_z(s.parameters["azimuth"]).T, s, np.ones(len(s.times), dtype=bool))
+        (mean @ rotation_z(s.parameters["azimuth"]).T, s.until(1.0, every=4), np.ones(len(mean), dtype=bool))
         for s in dataset.sequences("test")
     ]
     by_mean = score(*guesses)["rmse_pooled_mm"]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.model.data import prepare
 from odeform.model.reduced import POSE, ReducedSpace, decompose, rotation_of, to_canonical

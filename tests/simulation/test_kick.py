@@ -1,9 +1,10 @@
 import numpy as np
 import trimesh
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_z
-from odeform.simulation.kick import RADIUS, pulse_direction, pulse_weights
+from odeform.simulation.ball import RADIUS
+from odeform.simulation.kick import pulse_direction, pulse_weights
 from odeform.simulation.scene import get_scene
 
 

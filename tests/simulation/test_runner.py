@@ -1,14 +1,23 @@
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from odeform.dataset.store import Dataset, open_dataset
+from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
+from odeform.schema import Parameters, Window
+from odeform.simulation import kick
 from odeform.simulation.runner import simulate_dataset
+from odeform.simulation.scene import get_scene
+from odeform.simulation.shell import SimulationError
+from odeform.types import Sequence
 
 
+@pytest.mark.usefixtures("coarse")
 def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path: Path) -> None:
     """Two workers made the data set; one makes again what an interruption lost, bit for bit."""
     root = tmp_path / "kick"
@@ -20,12 +29,56 @@ def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path:
         (root / f"{name}.npz").unlink()
     kept = {path: path.stat().st_mtime_ns for path in root.glob("*.npz")}
     made = dataset.provenance
-    again = simulate_dataset("kick", root, made["count"], made["seed"], workers=1, step=made["step_s"])
+    again = simulate_dataset("kick", root, made["count"], made["seed"], workers=1)
     assert len(kept) == made["count"] - 2
     assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     assert again.entries == dataset.entries
     assert open_dataset(root).entries == dataset.entries
     assert (root / "dataset.json").read_text() == (dataset.root / "dataset.json").read_text()
+
+
+def test_another_process_makes_the_same_data(tmp_path: Path) -> None:
+    """With all vertices: what this process makes coarser, others do not."""
+    made = simulate_dataset("kick", tmp_path, count=1, workers=2, rate=30.0, step=4e-3)
+    again = get_scene("kick").simulate(made.entries[0].parameters, rate=30.0, step=4e-3)
+    assert again.vertices.shape == (31, 402, 3)
+    assert np.array_equal(made.read(made.entries[0]).vertices, again.vertices)
+
+
+def test_test_sequences_have_four_times_the_frames(dataset: Dataset) -> None:
+    for split, rate in (("train", 120.0), ("val", 120.0), ("test", 480.0)):
+        sequences = list(dataset.sequences(split))
+        assert sequences
+        for sequence in sequences:
+            assert np.allclose(sequence.times, np.arange(round(rate) + 1) / rate, rtol=0.0, atol=1e-12)
+            assert len(sequence.vertices) == len(sequence.times)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_frames_of_a_rate_asked_for(tmp_path: Path) -> None:
+    """The schema says it: what is learned and scored are frames of this rate."""
+    made = simulate_dataset("kick", tmp_path, count=2, rate=30.0)
+    assert made.schema.window == Window(0.0, 1.0, 30.0)
+    assert open_dataset(tmp_path) == made
+    assert {e.split: len(made.read(e).times) for e in made.entries} == {"train": 31, "test": 121}
+
+
+def test_what_failed_is_listed_and_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    def fragile(parameters: Parameters, rate: float, step: float) -> Sequence:
+        tried.append(parameters)
+        if len(tried) == 2:
+            raise SimulationError("it broke")
+        return Sequence(np.arange(3) / rate, np.zeros((3, 4, 3)), np.array([[0, 1, 2]]), np.full(4, 0.25))
+
+    monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=fragile))
+    made = simulate_dataset("kick", tmp_path, count=3)
+    assert [e.status for e in made.entries] == ["ok", "it broke", "ok"]
+    assert [e.name for e in made.select("all")] == ["kick_00000", "kick_00002"]
+    assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["kick_00000.npz", "kick_00002.npz"]
+    assert simulate_dataset("kick", tmp_path, count=3) == made
+    assert len(tried) == 3
 
 
 def test_refuses_a_folder_with_another_data_set(dataset: Dataset) -> None:

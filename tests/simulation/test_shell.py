@@ -9,9 +9,11 @@ import pytest
 import trimesh
 
 from odeform.geometry.rigid import best_rigid
-from odeform.simulation.kick import GRAVITY, MATERIAL, RADIUS, STEP, simulate
+from odeform.simulation import shell
+from odeform.simulation.ball import GRAVITY, MATERIAL, RADIUS, STEP, stress_free
+from odeform.simulation.kick import simulate
 from odeform.simulation.material import wall_thickness
-from odeform.simulation.shell import ShellBody, SimulationError, relax_sphere, run
+from odeform.simulation.shell import Rest, ShellBody, SimulationError, relax_sphere, run
 from odeform.types import Mesh
 
 MASS = 0.5
@@ -37,11 +39,6 @@ def ball(bending: float, gravity: float = 0.0, step: float = STEP) -> ShellBody:
 def momentum(body: ShellBody) -> np.ndarray:
     lever = body.positions - body.weights @ body.positions
     return np.cross(lever, body.masses[:, None] * body.velocities).sum(axis=0)
-
-
-def test_wall_has_the_stiffness_asked_for() -> None:
-    thickness = wall_thickness(0.6, MATERIAL)
-    assert MATERIAL.young * thickness**3 / (12.0 * (1.0 - MATERIAL.poisson**2)) == pytest.approx(0.6)
 
 
 @soft_and_stiff
@@ -116,4 +113,55 @@ def test_a_diverging_run_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)  # MuJoCo leaves a log where it runs
     parameters = {"mass": 0.3, "bending": 3.0, "force": 1e12, "azimuth": 0.0, "elevation": 0.6}
     with pytest.raises(SimulationError):
-        simulate(parameters, rate=120.0, step=5e-3)
+        simulate(parameters, rate=120.0, step=5e-3, segments=4)
+
+
+def test_an_unconverged_contact_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    body, _, _ = stress_free({"mass": MASS, "bending": 0.6}, 1e-3, segments=4)
+    monkeypatch.setattr(shell, "ITERATIONS", 2)
+    with pytest.raises(SimulationError, match="converged"):
+        run(body, 0.1, 100.0)
+
+
+def test_begins_later() -> None:
+    """The clock starts at `begin`: for the frames, and for the force."""
+    body, asked = ball(0.6), []
+    start = body.positions
+    body.velocities[:] = [1.0, 0.0, 0.0]
+
+    def force(time: float) -> None:
+        asked.append(time)
+
+    times, frames = run(body, 0.05, 100.0, force, begin=0.012)
+    assert np.allclose(times, [0.02, 0.03, 0.04, 0.05], atol=1e-12)
+    assert np.allclose(asked, 0.012 + STEP * (np.arange(76) + 0.5), atol=1e-9)
+    centres = np.einsum("n,tni->ti", body.weights, frames - start)
+    assert np.allclose(centres, (times - 0.012)[:, None] * [1.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_begins_on_a_frame() -> None:
+    body = ball(0.6)
+    start = body.positions
+    times, frames = run(body, 0.05, 100.0, begin=0.02)
+    assert np.allclose(times, [0.02, 0.03, 0.04, 0.05], atol=1e-12)
+    assert np.array_equal(frames[0], start)
+
+
+def drifting(speed: float, slowing: float = 0.0) -> int:
+    """Frames at 100 Hz of a run of 0.3 s, which ends after 0.05 s below 0.01 m/s. `slowing` is in m/s^2."""
+    body = ball(0.6)
+    body.velocities[:] = [speed, 0.0, 0.0]
+    load = -slowing * body.masses[:, None] * [1.0, 0.0, 0.0]
+    return len(run(body, 0.3, 100.0, lambda _: load, rest=Rest(0.01, 0.05))[0])
+
+
+def test_ends_at_rest() -> None:
+    assert drifting(0.009) == 6
+    assert drifting(0.011) == 31
+    # slow enough after 0.145 s, and at rest 0.05 s later
+    assert drifting(0.01145, 0.01) == 20
+
+
+def test_a_turn_is_no_rest() -> None:
+    """Slow for 0.02 s only, on the way back."""
+    assert drifting(0.15, 1.0) == 31

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from odeform.dataset.store import Dataset
+from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.model.data import TrainingData, prepare
 from odeform.model.reduced import POSE

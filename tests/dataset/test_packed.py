@@ -1,0 +1,321 @@
+import hashlib
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odeform.dataset.index import Dataset, Entry
+from odeform.dataset.packed import _expand, _squeeze, open_packed, pack
+from odeform.errors import InputError
+from odeform.geometry.rigid import rotation_from_vector
+from odeform.simulation.scene import get_scene
+from odeform.types import Sequence
+
+TOLERANCE = 2e-5  # m
+FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+
+
+def tumbling(seed: int, frames: int = 31, rate: float = 120.0) -> Sequence:
+    """A cloud of twelve points that flies, makes turns and wobbles in three modes."""
+    rng, shape = np.random.default_rng(seed), np.random.default_rng(0)
+    times = np.arange(frames) / rate
+    rest, modes = 0.1 * shape.normal(size=(12, 3)), shape.normal(size=(3, 12, 3))
+    local = rest + np.einsum("kt,kni->tni", 0.01 * np.sin(np.outer(rng.uniform(5.0, 30.0, 3), times)), modes)
+    turned = local @ rotation_from_vector(times[:, None] * rng.normal(size=3) * 20.0).swapaxes(1, 2)
+    vertices = turned + times[:, None, None] * rng.normal(size=3)
+    return Sequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
+
+
+def holding(*sequences: Sequence) -> Dataset:
+    """A data set in memory: s0, s1, ..."""
+    held = {f"s{k}": replace(sequence, name=f"s{k}") for k, sequence in enumerate(sequences)}
+    entries = tuple(Entry(name, "train", {"mass": 0.5}) for name in held)
+    return Dataset(Path("memory"), get_scene("kick").schema, entries, lambda entry: held[entry.name])
+
+
+def rmse(a: Sequence, b: Sequence) -> float:
+    return float(np.sqrt(((a.vertices.astype(float) - b.vertices) ** 2).mean()))
+
+
+@pytest.fixture(scope="module")
+def path(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("packed") / "kick.odp"
+    pack(dataset, path, TOLERANCE)
+    return path
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """Three tumbling clouds in one file."""
+    pack(holding(*map(tumbling, range(3))), tmp_path / "small.odp", TOLERANCE)
+    return tmp_path / "small.odp"
+
+
+def test_motions_come_back_within_the_tolerance(dataset: Dataset, path: Path) -> None:
+    packed = open_packed(path)
+    for true, read in zip(dataset.sequences("all"), packed.sequences("all"), strict=True):
+        assert rmse(true, read) <= TOLERANCE
+        # the modes left out are those of few frames, in which a vertex is off by more
+        assert np.linalg.norm(read.vertices - true.vertices, axis=2).max() < 50.0 * TOLERANCE
+    assert path.stat().st_size < 0.1 * sum(file.stat().st_size for file in dataset.root.glob("*.npz"))
+
+
+def test_all_else_comes_back_as_it_was(dataset: Dataset, path: Path) -> None:
+    packed = open_packed(path)
+    assert (packed.schema, packed.fixed, packed.provenance) == (dataset.schema, dataset.fixed, dataset.provenance)
+    assert [replace(e, sha256="") for e in packed.entries] == [replace(e, sha256="") for e in dataset.entries]
+    for true, read in zip(dataset.sequences("all"), packed.sequences("all"), strict=True):
+        assert (read.name, read.parameters) == (true.name, true.parameters)
+        assert np.allclose(read.times, true.times, rtol=0.0, atol=1e-12)
+        assert np.array_equal(read.faces, true.faces)
+        assert np.allclose(read.weights, true.weights, rtol=0.0, atol=1e-12)
+        assert read.vertices.dtype == np.float32
+
+
+def test_sequences_keep_their_rate(path: Path) -> None:
+    packed = open_packed(path)
+    frames = {split: {len(s.times) for s in packed.sequences(split)} for split in ("train", "val", "test")}
+    assert frames == {"train": {121}, "val": {121}, "test": {481}}
+
+
+def test_lengths_may_differ(tmp_path: Path) -> None:
+    """Scenes that end at rest end at different times."""
+    made = [tumbling(0), tumbling(1, frames=57), tumbling(2, frames=4, rate=480.0)]
+    pack(holding(*made), tmp_path / "a.odp", TOLERANCE)
+    for true, read in zip(made, open_packed(tmp_path / "a.odp").sequences("all"), strict=True):
+        assert np.allclose(read.times, true.times, rtol=0.0, atol=1e-12)
+        assert rmse(true, read) <= TOLERANCE
+
+
+def test_turns_are_counted_through(tmp_path: Path) -> None:
+    """Where a rotation vector is at pi its representation jumps; the motion does not."""
+    times = np.arange(121) / 120.0
+    rest = tumbling(0).vertices[0].astype(float)
+    vertices = rest @ rotation_from_vector(times[:, None] * [0.0, 30.0, 0.0]).swapaxes(1, 2)
+    rolling = Sequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
+    pack(holding(rolling), tmp_path / "a.odp", TOLERANCE)
+    assert rmse(rolling, next(open_packed(tmp_path / "a.odp").sequences("all"))) <= TOLERANCE
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6])
+def test_a_tolerance_is_kept_and_used(tmp_path: Path, tolerance: float) -> None:
+    made = [tumbling(seed) for seed in range(4)]
+    took = pack(holding(*made), tmp_path / "a.odp", tolerance)
+    pairs = list(zip(made, open_packed(tmp_path / "a.odp").sequences("all"), strict=True))
+    errors = [rmse(true, read) for true, read in pairs]
+    assert 0.2 * tolerance < max(errors) <= tolerance
+    assert took["largest_rmse_m"] == pytest.approx(max(errors))
+    worst = max(np.linalg.norm(read.vertices.astype(float) - true.vertices, axis=2).max() for true, read in pairs)
+    assert took["largest_error_m"] == pytest.approx(worst)
+
+
+def test_a_looser_tolerance_takes_less_space(tmp_path: Path) -> None:
+    sizes = []
+    for tolerance in (1e-6, 1e-5, 1e-4):
+        pack(holding(tumbling(0), tumbling(1)), tmp_path / "a.odp", tolerance)
+        sizes.append((tmp_path / "a.odp").stat().st_size)
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+def test_beyond_the_precision_of_the_data(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no compression within 1e-09 mm"):
+        pack(holding(*map(tumbling, range(3))), tmp_path / "a.odp", 1e-12)
+    assert not (tmp_path / "a.odp").exists()
+
+
+def test_the_same_data_is_the_same_file(dataset: Dataset, path: Path, tmp_path: Path) -> None:
+    pack(dataset, tmp_path / "again.odp", TOLERANCE)
+    assert (tmp_path / "again.odp").read_bytes() == path.read_bytes()
+
+
+def test_packs_what_is_packed(path: Path, tmp_path: Path) -> None:
+    once = open_packed(path)
+    pack(once, tmp_path / "twice.odp", TOLERANCE)
+    twice = open_packed(tmp_path / "twice.odp")
+    assert [e.name for e in twice.select("test")] == [e.name for e in once.select("test")]
+    for one, two in zip(once.sequences("all"), twice.sequences("all"), strict=True):
+        assert rmse(one, two) <= TOLERANCE
+        assert len(one.times) == len(two.times)
+
+
+def test_a_file_may_replace_itself(small: Path) -> None:
+    before = list(open_packed(small).sequences("all"))
+    pack(open_packed(small), small, 1e-4)
+    for one, two in zip(before, open_packed(small).sequences("all"), strict=True):
+        assert rmse(one, two) <= 1e-4
+
+
+def test_what_failed_stays_listed(tmp_path: Path) -> None:
+    made = holding(*map(tumbling, range(3)))
+    failed = replace(made.entries[1], status="diverged")
+    made = replace(made, entries=(made.entries[0], failed, made.entries[2]))
+    pack(made, tmp_path / "a.odp", TOLERANCE)
+    packed = open_packed(tmp_path / "a.odp")
+    assert packed.entries[1] == failed
+    assert [s.name for s in packed.sequences("all")] == ["s0", "s2"]
+    with zipfile.ZipFile(tmp_path / "a.odp") as file:
+        assert file.namelist() == ["dataset.json", "common.npz", "s0", "s2"]
+
+
+def test_one_is_read_without_the_others(small: Path) -> None:
+    packed = open_packed(small)
+    true = packed.read(packed.entries[1])
+    with zipfile.ZipFile(small) as file:
+        spans = {i.filename: (i.header_offset + 30 + len(i.filename), i.compress_size) for i in file.infolist()}
+    data = bytearray(small.read_bytes())
+    for name in ("s0", "s2"):
+        begin, size = spans[name]
+        data[begin : begin + size] = bytes(size)
+    small.write_bytes(data)
+    damaged = open_packed(small)
+    assert np.array_equal(damaged.read(damaged.entries[1]).vertices, true.vertices)
+    for row in (0, 2):
+        with pytest.raises(InputError):
+            damaged.read(damaged.entries[row])
+
+
+def refused(path: Path) -> str:
+    """The line that says why reading fails, opening the file or one of its sequences."""
+    with pytest.raises(InputError) as error:
+        list(open_packed(path).sequences("all"))
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_flipped_bytes_are_noticed(small: Path) -> None:
+    """Wherever they are: either an error in one line, or a byte that says nothing."""
+    whole, true = small.read_bytes(), [s.vertices for s in open_packed(small).sequences("all")]
+    said = []
+    for at in range(0, len(whole), 23):
+        data = bytearray(whole)
+        data[at] ^= 1 << at % 8
+        small.write_bytes(data)
+        try:
+            read = [s.vertices for s in open_packed(small).sequences("all")]
+        except InputError as error:
+            said.append(str(error))
+        else:
+            assert all(np.array_equal(one, two) for one, two in zip(read, true, strict=True))
+    assert all(line.startswith(f"{small}: ") and not line.endswith("None") for line in said)
+    assert sum("damaged" in line for line in said) > 0.8 * len(range(0, len(whole), 23))
+
+
+def test_an_exchanged_sequence_is_noticed(small: Path, tmp_path: Path) -> None:
+    """Sound in itself, but not that which the index tells of."""
+    with zipfile.ZipFile(small) as file, zipfile.ZipFile(tmp_path / "other.odp", "w") as other:
+        for name in file.namelist():
+            other.writestr(name, file.read("s2" if name == "s0" else name))
+    assert "checksum of s0" in refused(tmp_path / "other.odp")
+
+
+@pytest.mark.parametrize("keep", [0, 1, 30, 0.5, -22, -1])
+def test_truncated(small: Path, keep: float) -> None:
+    data = small.read_bytes()
+    small.write_bytes(data[: round(keep * len(data)) if 0.0 < keep < 1.0 else int(keep)])
+    assert "not a packed data set, or damaged" in refused(small)
+
+
+def blob(content: bytes) -> Callable[[dict[str, bytes]], dict[str, bytes]]:
+    """What replaces the first sequence by such bytes, with a checksum to match."""
+
+    def change(members: dict[str, bytes]) -> dict[str, bytes]:
+        old, new = (hashlib.sha256(data).hexdigest().encode() for data in (members["s0"], content))
+        return {**members, "dataset.json": members["dataset.json"].replace(old, new), "s0": content}
+
+    return change
+
+
+DAMAGE: dict[str, Callable[[dict[str, bytes]], dict[str, bytes]]] = {
+    "no index": lambda members: {k: v for k, v in members.items() if k != "dataset.json"},
+    "no common part": lambda members: {k: v for k, v in members.items() if k != "common.npz"},
+    "no sequence": lambda members: {k: v for k, v in members.items() if k != "s0"},
+    "nothing": lambda members: {},
+    "index is no JSON": lambda members: {**members, "dataset.json": b"{"},
+    "index of a folder": lambda members: {**members, "dataset.json": members["dataset.json"].replace(b"codec", b"x")},
+    "common part is no archive": lambda members: {**members, "common.npz": b"hello"},
+    "sequence of nothing": blob(b""),
+    "sequence of text": blob(b"hello"),
+    "sequence of another shape": blob(_squeeze(np.zeros((5, 3), dtype=np.int64), 120.0)),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_refuses_an_archive(small: Path, damage: str) -> None:
+    with zipfile.ZipFile(small) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(small, "w") as file:
+        for name, data in DAMAGE[damage](members).items():
+            file.writestr(name, data)
+    refused(small)
+
+
+def test_refuses_what_is_no_archive(tmp_path: Path) -> None:
+    (tmp_path / "a.odp").write_text("hello")
+    assert "not a packed data set" in refused(tmp_path / "a.odp")
+    assert "No such file" in refused(tmp_path / "nothing.odp")
+    assert "directory" in refused(tmp_path)
+
+
+def smaller(sequence: Sequence) -> Sequence:
+    return replace(sequence, vertices=sequence.vertices[:, :11], weights=np.full(11, 1.0 / 11.0))
+
+
+def uneven(sequence: Sequence) -> Sequence:
+    times = sequence.times.copy()
+    times[3] += 1e-4
+    return replace(sequence, times=times)
+
+
+MISFITS: dict[str, tuple[Callable[[Sequence], Sequence], str]] = {
+    "uneven frames": (uneven, "evenly spaced"),
+    "late": (lambda s: replace(s, times=s.times + 0.1), "from time 0"),
+    "fewer vertices": (smaller, "expected 12 vertices"),
+    "other faces": (lambda s: replace(s, faces=s.faces[:, ::-1]), "same mesh"),
+    "other weights": (lambda s: replace(s, weights=np.arange(1.0, 13.0) / 78.0), "same mesh"),
+}
+
+
+@pytest.mark.parametrize("misfit", MISFITS)
+def test_refuses_a_misfit(tmp_path: Path, misfit: str) -> None:
+    change, reason = MISFITS[misfit]
+    with pytest.raises(InputError, match=f"s1: .*{reason}"):
+        pack(holding(tumbling(0), change(tumbling(1)), tumbling(2)), tmp_path / "a.odp", TOLERANCE)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_to_pack(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no sequence"):
+        pack(holding(), tmp_path / "a.odp")
+
+
+STEPS = np.arange(400)
+SERIES: dict[str, np.ndarray] = {
+    "walk": np.cumsum(np.random.default_rng(0).integers(-9, 10, size=(400, 5)), axis=0),
+    "noise": np.random.default_rng(1).integers(-(2**20), 2**20, size=(400, 3)),
+    "large": np.random.default_rng(2).integers(-(2**31), 2**31, size=(50, 2)),
+    "smooth": np.rint(1e5 * np.sin(np.outer(STEPS, [0.01, 0.05, 0.3]))).astype(np.int64),
+    "large and smooth": np.rint(2.0**28 * np.cos(np.outer(STEPS, [0.01, 0.02]))).astype(np.int64),
+    "each of another kind": np.stack([STEPS, STEPS**2, STEPS**3 // 50, 7 - 0 * STEPS, STEPS % 2], axis=1),
+    "at rest": np.zeros((400, 4), dtype=np.int64),
+    "one frame": np.array([[3, -4, 2**31 - 1, -(2**31)]]),
+    "one series": STEPS[:, None] ** 2,
+}
+
+
+@pytest.mark.parametrize("kind", SERIES)
+def test_integers_come_back_exactly(kind: str) -> None:
+    values = SERIES[kind].astype(np.int64)
+    again, rate = _expand(_squeeze(values, 123.25))
+    assert np.array_equal(again, values)
+    assert rate == 123.25
+
+
+def test_smooth_series_take_little_space() -> None:
+    """Differenced as often as pays off: the third difference of a slow sine is next to nothing."""
+    smooth = SERIES["smooth"][:, :1]
+    shuffled = np.random.default_rng(0).permutation(smooth)
+    assert len(_squeeze(smooth, 120.0)) < 0.5 * len(_squeeze(shuffled, 120.0))
