@@ -180,7 +180,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("pack", _pack, "write a small compressed copy of a data set")
     sub.add_argument("dataset", metavar="DATASET")
     sub.add_argument("--out", required=True, metavar="FILE")
-    sub.add_argument("--tolerance", type=float, default=0.02, metavar="MM", help="largest RMSE of a sequence (0.02)")
+    sub.add_argument("--tolerance", type=float, default=0.02, metavar="MM", help="largest error of a vertex (0.02)")
 
     sub = command("train", _train, "train a model on a data set and score it on the test split")
     sub.add_argument("dataset", metavar="DATASET")

@@ -42,6 +42,9 @@ def _squeeze(values: NDArray[np.int64], rate: float) -> bytes:
     cost = np.array([np.log2(1.0 + np.abs(r)).sum(axis=0) for r in residuals])
     orders = cost.argmin(axis=0)
     chosen = np.stack([residuals[order][:, s] for s, order in enumerate(orders)])
+    limits = np.iinfo(np.int32)
+    if chosen.min() < limits.min or chosen.max() > limits.max:
+        raise InputError("pack: no compression within so small a tolerance for motions so large")
     planes = chosen.astype("<i4").view(np.uint8).reshape(*chosen.shape, 4)
     body = orders.astype(np.uint8).tobytes() + np.moveaxis(planes, -1, 0).tobytes()
     return lzma.compress(HEADER.pack(*values.shape, rate) + body, preset=9)
@@ -99,30 +102,42 @@ def _modes(dataset: Dataset, reference: Floats) -> tuple[Floats, Floats]:
     return vectors[:, ::-1] * np.sqrt(len(reference)), np.maximum(values[::-1], 0.0)
 
 
+class _TooCoarse(Exception):
+    """With its share of the error that no finer quantum would mend."""
+
+
 def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, float]:
-    """Write a compressed copy whose RMSE over coordinates is at most `tolerance` metres for every sequence.
+    """Write a compressed copy in which no vertex of any frame is off by more than `tolerance` metres.
 
     Returns what it took: modes, quantum, largest RMSE of a sequence and largest error of a vertex, in metres.
     """
+    if not 0.0 < tolerance < float("inf"):
+        raise InputError(f"pack: expected a positive tolerance, got {tolerance:g} m")
     first = next(dataset.sequences("all"), None)
     if first is None:
         raise InputError(f"{dataset.root}: no sequence to pack")
     reference = first.vertices[0].astype(float)
     modes, energy = _modes(dataset, reference)
-    for share in (0.4, 0.2, 0.1, 0.05):
-        # of the squared error, half to the modes left out on average; the worst sequence decides
-        left = energy.sum() - np.cumsum(energy)
-        count = int(np.argmax(left / 3.0 < share * tolerance**2)) + 1
-        quantum = 6.0 * np.sqrt(0.5 / (count + POSE)) * tolerance
+    left = np.sqrt((energy.sum() - np.cumsum(energy)).clip(0.0) / 3.0)
+    truncation, noise = 0.2 * tolerance, 0.6 * tolerance
+    for _ in range(12):
+        count = int(np.argmax(left <= truncation)) + 1 if left.min() <= truncation else len(left)
+        # errors of the rounded coefficients add up at a vertex like noise; six deviations are rarely left
+        quantum = noise * np.sqrt(12.0 / (count + POSE)) / 6.0
         common = {
             "points": reference,
             "modes": modes[:, :count].astype(np.float32),
             "faces": first.faces.astype(np.int32),
             "weights": first.weights,
         }
-        blobs, rmse, worst = _encode(dataset, common, quantum)
-        if rmse <= tolerance:
+        try:
+            blobs, rmse, worst = _encode(dataset, common, quantum, tolerance)
             break
+        except _TooCoarse as error:
+            if error.args[0] > 0.6:
+                truncation *= 0.5
+            else:
+                noise *= 0.8
     else:
         raise InputError(f"{dataset.root}: no compression within {1e3 * tolerance:g} mm")
     buffer = io.BytesIO()
@@ -144,27 +159,34 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
     return codec
 
 
-def _encode(dataset: Dataset, common: Arrays, quantum: float) -> tuple[dict[str, bytes], float, float]:
+def _encode(
+    dataset: Dataset, common: Arrays, quantum: float, tolerance: float
+) -> tuple[dict[str, bytes], float, float]:
     """A blob for each sequence, the largest RMSE of a sequence and the largest error of a vertex, in metres."""
     blobs: dict[str, bytes] = {}
     rmse = worst = 0.0
     selected = dataset.select("all")
     progress = Progress(f"pack {dataset.schema.scene}", len(selected))
+    steps = _steps(common, quantum)
     for entry in selected:
         sequence = dataset.read(entry)
         same_weights = np.allclose(sequence.weights, common["weights"], rtol=0.0, atol=1e-9)
         if not (np.array_equal(sequence.faces, common["faces"]) and same_weights):
             raise InputError(f"{entry.name}: expected the same mesh as in the others")
-        rate = (len(sequence.times) - 1) / float(sequence.times[-1])
-        if not np.allclose(sequence.times, np.arange(len(sequence.times)) / rate, atol=1e-9):
+        count = len(sequence.times)
+        rate = (count - 1) / float(sequence.times[-1]) if count > 1 else dataset.schema.window.rate
+        if not np.allclose(sequence.times, np.arange(count) / rate, atol=1e-9):
             raise InputError(f"{entry.name}: expected evenly spaced frames from time 0")
         pose, local = _moving(sequence, common["points"])
         coefficients = local @ common["modes"].astype(float) / len(common["points"])
         y = np.concatenate([pose, coefficients], axis=1)
-        blobs[entry.name] = _squeeze(np.rint(y / _steps(common, quantum)).astype(np.int64), rate)
+        blobs[entry.name] = _squeeze(np.rint(y / steps).astype(np.int64), rate)
         error = _decode(blobs[entry.name], common, quantum)[1].astype(float) - sequence.vertices
-        rmse = max(rmse, float(np.sqrt((error**2).mean())))
-        worst = max(worst, float(np.linalg.norm(error, axis=-1).max()))
+        largest = float(np.linalg.norm(error, axis=-1).max())
+        if largest > tolerance:
+            missed = (local - coefficients @ common["modes"].T).reshape(count, -1, 3)
+            raise _TooCoarse(float(np.linalg.norm(missed, axis=-1).max()) / tolerance)
+        rmse, worst = max(rmse, float(np.sqrt((error**2).mean()))), max(worst, largest)
         progress.advance()
     progress.close()
     return blobs, rmse, worst

@@ -134,8 +134,12 @@ def _field(branches: list[tuple[int, list[tuple[Floats, Floats]]]]) -> Field:
 Decoder = Callable[[Floats], Floats]
 
 
-def make_decoder(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Decoder]:
-    """theta (P,) -> the decoder: (T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start."""
+def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Decoder]:
+    """theta (P,) -> the decoder: (T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start.
+
+    In double precision: a readout solved for by least squares has large weights that cancel.
+    """
+    dtype = np.float64
     gains = weights["gains"].astype(np.float64)
     parts = []
     for branch in config.branches:

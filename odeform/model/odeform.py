@@ -26,7 +26,7 @@ class ODeform(ReducedModel):
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
-        self._decoders = {dtype: make_decoder(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
+        self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
 
@@ -42,4 +42,4 @@ class ODeform(ReducedModel):
         assert quality is not None
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
-        return LatentTrajectory(field, self._decoders[dtype](theta), start, quality, until, self.space.arm)
+        return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)

@@ -62,6 +62,8 @@ class _RollOut(torch.autograd.Function):
     def backward(ctx: Any, *grads: torch.Tensor) -> tuple[Any, ...]:
         of_states, places, nets, hidden = grads[0], ctx.places, ctx.nets, ctx.hidden
         errors = [[torch.empty_like(h1), torch.empty_like(h2)] for h1, h2 in hidden]
+        # tanh' = 1 - tanh^2
+        bends = [[torch.addcmul(h.new_ones(()), h, h, value=-1.0) for h in pair] for pair in hidden]
         of_slopes = torch.empty_like(ctx.inputs)
         grad = of_states[-1].clone()
         for i in range(len(ctx.steps) - 1, -1, -1):
@@ -70,11 +72,9 @@ class _RollOut(torch.autograd.Function):
                 share, ahead = STAGES[j]
                 of_slope = torch.mul(grad, step * share, out=of_slopes[i, j]).add_(pulled, alpha=step * ahead)
                 pulled = torch.zeros_like(grad)
-                for (seen, out), net, (h1, h2), (e1, e2) in zip(places, nets, hidden, errors, strict=True):
-                    second = torch.mm(of_slope[:, out], net[4], out=e2[i, j])
-                    second.addcmul_(second * h2[i, j], h2[i, j], value=-1.0)  # tanh' = 1 - tanh^2
-                    first = torch.mm(second, net[2], out=e1[i, j])
-                    first.addcmul_(first * h1[i, j], h1[i, j], value=-1.0)
+                for (seen, out), net, (d1, d2), (e1, e2) in zip(places, nets, bends, errors, strict=True):
+                    second = torch.mm(of_slope[:, out], net[4], out=e2[i, j]).mul_(d2[i, j])
+                    first = torch.mm(second, net[2], out=e1[i, j]).mul_(d1[i, j])
                     pulled[:, :seen].addmm_(first, net[0])
                 total += pulled
             grad = total + of_states[i]

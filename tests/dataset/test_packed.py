@@ -36,8 +36,9 @@ def holding(*sequences: Sequence) -> Dataset:
     return Dataset(Path("memory"), get_scene("kick").schema, entries, lambda entry: held[entry.name])
 
 
-def rmse(a: Sequence, b: Sequence) -> float:
-    return float(np.sqrt(((a.vertices.astype(float) - b.vertices) ** 2).mean()))
+def largest(a: Sequence, b: Sequence) -> float:
+    """Error of the worst vertex of the worst frame."""
+    return float(np.linalg.norm(a.vertices.astype(float) - b.vertices, axis=2).max())
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +58,7 @@ def small(tmp_path: Path) -> Path:
 def test_motions_come_back_within_the_tolerance(dataset: Dataset, path: Path) -> None:
     packed = open_packed(path)
     for true, read in zip(dataset.sequences("all"), packed.sequences("all"), strict=True):
-        assert rmse(true, read) <= TOLERANCE
-        # the modes left out are those of few frames, in which a vertex is off by more
-        assert np.linalg.norm(read.vertices - true.vertices, axis=2).max() < 50.0 * TOLERANCE
+        assert largest(true, read) <= TOLERANCE
     assert path.stat().st_size < 0.1 * sum(file.stat().st_size for file in dataset.root.glob("*.npz"))
 
 
@@ -87,7 +86,7 @@ def test_lengths_may_differ(tmp_path: Path) -> None:
     pack(holding(*made), tmp_path / "a.odp", TOLERANCE)
     for true, read in zip(made, open_packed(tmp_path / "a.odp").sequences("all"), strict=True):
         assert np.allclose(read.times, true.times, rtol=0.0, atol=1e-12)
-        assert rmse(true, read) <= TOLERANCE
+        assert largest(true, read) <= TOLERANCE
 
 
 def test_turns_are_counted_through(tmp_path: Path) -> None:
@@ -97,7 +96,7 @@ def test_turns_are_counted_through(tmp_path: Path) -> None:
     vertices = rest @ rotation_from_vector(times[:, None] * [0.0, 30.0, 0.0]).swapaxes(1, 2)
     rolling = Sequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
     pack(holding(rolling), tmp_path / "a.odp", TOLERANCE)
-    assert rmse(rolling, next(open_packed(tmp_path / "a.odp").sequences("all"))) <= TOLERANCE
+    assert largest(rolling, next(open_packed(tmp_path / "a.odp").sequences("all"))) <= TOLERANCE
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5, 1e-6])
@@ -105,11 +104,11 @@ def test_a_tolerance_is_kept_and_used(tmp_path: Path, tolerance: float) -> None:
     made = [tumbling(seed) for seed in range(4)]
     took = pack(holding(*made), tmp_path / "a.odp", tolerance)
     pairs = list(zip(made, open_packed(tmp_path / "a.odp").sequences("all"), strict=True))
-    errors = [rmse(true, read) for true, read in pairs]
-    assert 0.2 * tolerance < max(errors) <= tolerance
-    assert took["largest_rmse_m"] == pytest.approx(max(errors))
-    worst = max(np.linalg.norm(read.vertices.astype(float) - true.vertices, axis=2).max() for true, read in pairs)
-    assert took["largest_error_m"] == pytest.approx(worst)
+    errors = [largest(true, read) for true, read in pairs]
+    assert 0.1 * tolerance < max(errors) <= tolerance
+    assert took["largest_error_m"] == pytest.approx(max(errors))
+    rmse = max(np.sqrt(((read.vertices.astype(float) - true.vertices) ** 2).mean()) for true, read in pairs)
+    assert took["largest_rmse_m"] == pytest.approx(rmse)
 
 
 def test_a_looser_tolerance_takes_less_space(tmp_path: Path) -> None:
@@ -121,7 +120,7 @@ def test_a_looser_tolerance_takes_less_space(tmp_path: Path) -> None:
 
 
 def test_beyond_the_precision_of_the_data(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no compression within 1e-09 mm"):
+    with pytest.raises(InputError, match="no compression within"):
         pack(holding(*map(tumbling, range(3))), tmp_path / "a.odp", 1e-12)
     assert not (tmp_path / "a.odp").exists()
 
@@ -137,7 +136,7 @@ def test_packs_what_is_packed(path: Path, tmp_path: Path) -> None:
     twice = open_packed(tmp_path / "twice.odp")
     assert [e.name for e in twice.select("test")] == [e.name for e in once.select("test")]
     for one, two in zip(once.sequences("all"), twice.sequences("all"), strict=True):
-        assert rmse(one, two) <= TOLERANCE
+        assert largest(one, two) <= TOLERANCE
         assert len(one.times) == len(two.times)
 
 
@@ -145,7 +144,7 @@ def test_a_file_may_replace_itself(small: Path) -> None:
     before = list(open_packed(small).sequences("all"))
     pack(open_packed(small), small, 1e-4)
     for one, two in zip(before, open_packed(small).sequences("all"), strict=True):
-        assert rmse(one, two) <= 1e-4
+        assert largest(one, two) <= 1e-4
 
 
 def test_what_failed_stays_listed(tmp_path: Path) -> None:

@@ -42,7 +42,8 @@ def test_inference_equals_the_network(rigid: bool, dtype: type) -> None:
     theta = torch.tensor([[0.3, -0.8, 1.2, 0.0]])
     with torch.no_grad():
         state = net.encode((points, shares), theta)
-        slope, output = net.slope(state, theta)[0], (net.decode(state) * net.gains)[0]
+        states = net.roll_out(state, theta, [1e-4])
+        slope = (states[1] - states[0])[0] / 1e-4
     vector = theta[0].double().numpy()
     pooled = pool_shape(weights, config, points.double().numpy(), shares.double().numpy())
     start = encode(weights, config, pooled, vector, dtype)
@@ -50,9 +51,13 @@ def test_inference_equals_the_network(rigid: bool, dtype: type) -> None:
     assert np.allclose(start, state[0], rtol=1e-5, atol=1e-5)
     field = make_field(weights, config, dtype)(vector)(0.0, start)
     assert field.dtype == dtype
-    assert np.allclose(field, slope, rtol=1e-5, atol=1e-5 * float(slope.abs().max()))
-    decoded = make_decoder(weights, config, dtype)(np.stack([start, start]))
-    assert np.allclose(decoded, output[None], rtol=1e-5, atol=1e-5)
+    # a difference quotient of the roll-out: single precision leaves three digits of it
+    assert np.allclose(field, slope, rtol=1e-2, atol=1e-2 * float(slope.abs().max()))
+    far = torch.stack([state, state + 0.7])
+    with torch.no_grad():
+        moved = (net.decode(far, theta) * net.gains)[:, 0]
+    decoded = make_decoder(weights, config)(vector)(far[:, 0].numpy())
+    assert np.allclose(decoded - decoded[0], moved, rtol=1e-4, atol=1e-5)
 
 
 def test_pooling_ignores_order_and_density() -> None:
@@ -101,7 +106,7 @@ def test_global_motion_drives_the_local_one_and_not_the_reverse() -> None:
     net = network(True)
     split, theta = net.config.rigid_latent, torch.zeros(1, 4)
     state = torch.randn(1, net.config.state, generator=torch.Generator().manual_seed(0))
-    jacobian = torch.autograd.functional.jacobian(lambda z: net.slope(z, theta)[0], state)[:, 0]
+    jacobian = torch.autograd.functional.jacobian(lambda z: net.roll_out(z, theta, [0.01])[1, 0], state)[:, 0]
     assert not jacobian[:split, split:].any()
     assert jacobian[split:, :split].abs().max() > 0.0
-    assert jacobian[:split, :split].abs().max() > 0.0
+    assert (jacobian[:split, :split] - torch.eye(split)).abs().max() > 0.0

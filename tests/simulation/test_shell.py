@@ -1,6 +1,7 @@
 """Physics that a free ball has to obey, whatever its wall."""
 
 import functools
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
@@ -147,21 +148,22 @@ def test_begins_on_a_frame() -> None:
     assert np.array_equal(frames[0], start)
 
 
-def drifting(speed: float, slowing: float = 0.0) -> int:
-    """Frames at 100 Hz of a run of 0.3 s, which ends after 0.05 s below 0.01 m/s. `slowing` is in m/s^2."""
+def drifting(speed: float, push: Callable[[float], float] = lambda _: 0.0) -> int:
+    """Frames at 100 Hz of a run of 0.3 s, which ends after 0.05 s below 0.01 m/s. `push` is in m/s^2."""
     body = ball(0.6)
     body.velocities[:] = [speed, 0.0, 0.0]
-    load = -slowing * body.masses[:, None] * [1.0, 0.0, 0.0]
-    return len(run(body, 0.3, 100.0, lambda _: load, rest=Rest(0.01, 0.05))[0])
+    along = body.masses[:, None] * [1.0, 0.0, 0.0]
+    return len(run(body, 0.3, 100.0, lambda time: push(time) * along, rest=Rest(0.01, 0.05))[0])
 
 
 def test_ends_at_rest() -> None:
     assert drifting(0.009) == 6
     assert drifting(0.011) == 31
     # slow enough after 0.145 s, and at rest 0.05 s later
-    assert drifting(0.01145, 0.01) == 20
+    assert drifting(0.01145, lambda _: -0.01) == 20
 
 
-def test_a_turn_is_no_rest() -> None:
-    """Slow for 0.02 s only, on the way back."""
-    assert drifting(0.15, 1.0) == 31
+def test_turns_are_no_rest() -> None:
+    """To and fro at 0.03 m/s, four times slow for 0.016 s: together longer than a rest, and none."""
+    beat = 2.0 * np.pi / 0.15
+    assert drifting(0.03, lambda time: -0.03 * beat * np.sin(beat * time)) == 31

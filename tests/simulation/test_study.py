@@ -33,6 +33,8 @@ def test_rebound_of_a_drop_is_above_where_it_comes_to_rest() -> None:
 def test_rebound_of_a_kick_is_after_its_first_landing() -> None:
     """It starts on the floor, which is no landing."""
     assert _rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 0.0)) == pytest.approx(0.06)
+    # and need not have come down again when the window ends
+    assert _rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 50.0)) == pytest.approx(0.06)
 
 
 def test_rebound_is_that_of_the_centre_of_mass() -> None:

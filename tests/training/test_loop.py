@@ -11,7 +11,7 @@ from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
-from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
+from odeform.training.loop import TrainConfig, _Trainer, build_network, network_weights, train_network
 from odeform.training.train import TrainRequest, train
 
 
@@ -44,6 +44,66 @@ def test_seconds_of_training_lower_the_error(data: TrainingData) -> None:
     before = train_network(build_network(data, 0), data, TrainConfig(minutes=0.0), silent)
     after = train_network(build_network(data, 0), data, TrainConfig(minutes=0.1), silent)
     assert after["val_rigid_rmse_mm"] < 0.75 * before["val_rigid_rmse_mm"]
+
+
+def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
+    """No small change of the readout lowers the training error."""
+    net = build_network(data, 0)
+    train_network(net, data, TrainConfig(minutes=0.0), silent)
+    trainer = _Trainer(net, data, TrainConfig(), torch.device("cpu"))
+    best = np.square(trainer.errors_mm("train"))
+    generator = torch.Generator().manual_seed(0)
+    for index, decoder in enumerate(net.decoders):
+        solved = decoder.readout.weight.data.clone()
+        for _ in range(3):
+            change = torch.randn(solved.shape, generator=generator) * solved.abs().mean()
+            for sign in (-0.02, 0.02):
+                decoder.readout.weight.data = solved + sign * change
+                assert trainer.errors_mm("train")[index] ** 2 > best[index]
+        decoder.readout.weight.data = solved
+
+
+def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) -> None:
+    """Steps in two sittings are the steps of one, bit for bit."""
+    part = tmp_path / "a.part"
+
+    def steps(count: int, resume: bool) -> dict[str, np.ndarray]:
+        net = build_network(data, 0)
+        trainer = _Trainer(net, data, TrainConfig(batch=8), torch.device("cpu"))
+        if resume:
+            trainer.restore(part)
+        for _ in range(count):
+            trainer.advance(0.5)
+        trainer.save(part)
+        return network_weights(net)
+
+    whole = steps(4, resume=False)
+    steps(2, resume=False)
+    again = steps(2, resume=True)
+    assert all(np.array_equal(whole[name], again[name]) for name in whole)
+
+
+def test_an_interruption_leaves_what_resume_wants(data: TrainingData, tmp_path: Path) -> None:
+    part = tmp_path / "a.part"
+
+    def interrupt(line: str) -> None:
+        if "step" in line:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train_network(build_network(data, 0), data, TrainConfig(minutes=1.0, report=0.0), interrupt, part)
+    lines: list[str] = []
+    config = TrainConfig(minutes=0.0)
+    train_network(build_network(data, 0), data, config, lines.append, part, resume=True)
+    assert "continues after" in lines[0]
+    part.write_bytes(part.read_bytes()[:200])
+    with pytest.raises(InputError, match="resume"):
+        train_network(build_network(data, 0), data, config, silent, part, resume=True)
+
+
+def test_resume_without_a_trace(dataset: Dataset, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="part"):
+        train(dataset, get_scene("kick").rest_mesh(), tmp_path / "a", TrainRequest(resume=True), silent)
 
 
 def test_training_does_not_look_at_val(data: TrainingData) -> None:
