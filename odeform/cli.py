@@ -61,11 +61,13 @@ def _emit(result: dict[str, Any], path: str | None) -> None:
 def _simulate(args: argparse.Namespace) -> None:
     try:
         from odeform.simulation.runner import simulate_dataset
+        from odeform.simulation.scene import get_scene
     except ModuleNotFoundError as error:
         raise InputError(f"simulation needs {error.name}: pip install 'odeform[simulate]'") from None
-    if args.count < 1 or args.workers < 1 or (args.rate is not None and not args.rate > 0):
+    count = get_scene(args.scene).count if args.count is None else args.count
+    if count < 1 or args.workers < 1 or (args.rate is not None and not args.rate > 0):
         raise InputError("simulate: expected --count and --workers of at least 1 and a positive --rate")
-    dataset = simulate_dataset(args.scene, args.out, args.count, args.seed, args.workers, args.rate)
+    dataset = simulate_dataset(args.scene, args.out, count, args.seed, args.workers, args.rate)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
 
@@ -106,15 +108,17 @@ def _evaluate(args: argparse.Namespace) -> None:
     for name in args.checkpoints:
         predictor = load(name)
         key = predictor.model if predictor.model not in models else name
-        models[key] = evaluate(predictor, dataset, args.split, window)
+        models[key] = evaluate(predictor, dataset, args.split, window, args.quality)
     result = {"data": args.data, "split": args.split, "window": window, "models": models}
     if args.json:
         _emit(result, args.json)
-    columns = ("rmse_pooled_mm", "rmse_mm", "mae_mm", "vertex_mm", "relative", "deformation_relative")
-    print(f"{'model':<16}" + "".join(f"{column:>22}" for column in columns))
-    for key, scores in models.items():
+    columns = ("rmse_pooled_mm", "rmse_mm", "mae_mm", "relative", "deformation_relative", "off_grid_rmse_mm")
+    rows = dict(models)
+    rows |= {f"{key} (impact)": scores["impact"] for key, scores in models.items() if "impact" in scores}
+    print(f"{'model':<24}" + "".join(f"{column:>22}" for column in columns))
+    for key, scores in rows.items():
         cells = ("-" if scores[column] is None else f"{scores[column]:.4g}" for column in columns)
-        print(f"{key:<16}" + "".join(f"{cell:>22}" for cell in cells))
+        print(f"{key:<24}" + "".join(f"{cell:>22}" for cell in cells))
 
 
 def _predict(args: argparse.Namespace) -> None:
@@ -172,7 +176,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("simulate", _simulate, "simulate a data set of a scene (needs odeform[simulate])")
     sub.add_argument("scene", help="kick")
     sub.add_argument("--out", required=True, metavar="DIR")
-    sub.add_argument("--count", type=int, default=256, metavar="N", help="sequences (default 256)")
+    sub.add_argument("--count", type=int, metavar="N", help="sequences (default: the scene's)")
     sub.add_argument("--seed", type=int, default=0, metavar="S")
     sub.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W")
     sub.add_argument("--rate", type=float, metavar="HZ", help="frames a second (default: the scene's)")
@@ -197,6 +201,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--data", required=True, metavar="DATASET")
     sub.add_argument("--split", default="test", choices=("train", "val", "test", "all"))
     sub.add_argument("--window", metavar="A:B", help="frames to score, half-open")
+    sub.add_argument("--quality", default="balanced", metavar="NAME", help="draft, balanced (default), reference")
     sub.add_argument("--json", metavar="FILE")
 
     sub = command("predict", _predict, "predict one motion and write it to a file")

@@ -24,7 +24,7 @@ __all__ = ["PodRbf", "fit_pod_rbf"]
 
 ENERGY = 0.999999
 KERNELS = ("linear", "thin_plate_spline", "cubic", "quintic")
-SMOOTHINGS = (0.0, 1e-6, 1e-4, 1e-2)
+SMOOTHINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
 
 
 class PodRbf(ReducedModel):

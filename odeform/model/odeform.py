@@ -37,9 +37,15 @@ class ODeform(ReducedModel):
         return self._pooled[1]
 
     def _trajectory(
-        self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float, dtype: type = np.float32
+        self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float
     ) -> LatentTrajectory:
         assert quality is not None
+        return self.integrate(theta, placed, quality, until)
+
+    def integrate(
+        self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float, dtype: type = np.float32
+    ) -> LatentTrajectory:
+        """The solved latent motion for parameters in [-1, 1], in single or double precision."""
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
         return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)

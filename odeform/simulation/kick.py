@@ -71,5 +71,6 @@ SCENE = Scene(
     simulate=simulate,
     rest_mesh=rest_mesh,
     step=STEP,
+    count=700,
     fixed={**FIXED, "pulse_s": PULSE, "pulse_spread_rad": SPREAD},
 )

@@ -67,5 +67,6 @@ SCENE = Scene(
     simulate=simulate,
     rest_mesh=_mesh,
     step=STEP,
+    count=500,
     fixed={**FIXED, "height_m": HEIGHT, "rest_speed_m_s": REST_SPEED, "rest_time_s": REST_TIME},
 )

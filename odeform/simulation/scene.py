@@ -27,6 +27,8 @@ class Scene:
     rest_mesh: Callable[[], Mesh]
     step: float
     """The simulator's time step in seconds that this scene calls its truth."""
+    count: int
+    """Sequences of its own data set."""
     fixed: dict[str, float] = field(default_factory=dict)
 
     def sample(self, count: int, seed: int) -> list[dict[str, float]]:

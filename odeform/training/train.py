@@ -1,11 +1,13 @@
 """From a data set to a checkpoint, for every model that learns from parameters."""
 
+import math
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +18,9 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare
-from odeform.model.odeform import PREFIX
+from odeform.model.odeform import PREFIX, ODeform
 from odeform.predictor import load
+from odeform.training.qualities import choose_qualities
 from odeform.types import Arrays, Mesh
 
 __all__ = ["MODELS", "TrainRequest", "train"]
@@ -39,20 +42,13 @@ class TrainRequest:
 
 def _fit_odeform(
     data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path
-) -> tuple[Arrays, dict[str, object]]:
+) -> tuple[Arrays, dict[str, Any]]:
     from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
 
     net = build_network(data, request.seed)
     config = TrainConfig(minutes=request.minutes, seed=request.seed)
     val = train_network(net, data, config, report, part, request.resume)
-    step = float(data.times[1] - data.times[0])
-    qualities = {
-        "draft": {"method": "rk4", "step": 2.0 * step},
-        # controlled steps crowd around kick and landing, where a step a frame errs most
-        "balanced": {"method": "bosh3", "tolerance": 3e-3},
-        "reference": {"method": "dopri5", "tolerance": 1e-7},
-    }
-    settings = {"network": asdict(net.config), "qualities": qualities, "training": asdict(config), "val": val}
+    settings = {"network": asdict(net.config), "qualities": {}, "training": asdict(config), "val": val}
     return {PREFIX + name: value for name, value in network_weights(net).items()}, settings
 
 
@@ -101,9 +97,14 @@ def train(
         },
         provenance=provenance,
     )
+    if request.model == "odeform":
+        # the solver may add to the model's error, not more
+        error = math.hypot(*(settings["val"][f"val_{part}_rmse_mm"] for part in ("rigid", "deformation")))
+        qualities = choose_qualities(ODeform(checkpoint), data, error)
+        checkpoint = replace(checkpoint, config={**checkpoint.config, "qualities": qualities})
     write_checkpoint(out, checkpoint)
     scores = evaluate(load(out), dataset, "test")
-    scored = Checkpoint(**{**checkpoint.__dict__, "scores": scores})
+    scored = replace(checkpoint, scores=scores)
     write_checkpoint(out, scored)
     part.unlink(missing_ok=True)
     report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
