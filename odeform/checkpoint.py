@@ -96,10 +96,10 @@ def bundled_checkpoints() -> dict[str, Path]:
 
 def resolve_checkpoint(name: str) -> Path:
     """A path as it is; SCENE or SCENE/MODEL as the bundled checkpoint of that name."""
-    bundled = bundled_checkpoints()
+    known = bundled_checkpoints()
     for key in (name, f"{name}/odeform"):
-        if key in bundled:
-            return bundled[key]
+        if key in known:
+            return known[key]
     if not Path(name).exists():
-        raise InputError(f"checkpoint {name!r}: neither a file nor bundled; bundled are {', '.join(bundled) or 'none'}")
+        raise InputError(f"checkpoint {name!r}: neither a file nor bundled; bundled are {', '.join(known) or 'none'}")
     return Path(name)

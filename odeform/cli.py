@@ -94,6 +94,8 @@ def _train(args: argparse.Namespace) -> None:
     dataset = open_dataset(args.dataset)
     rest = get_scene(dataset.schema.scene).rest_mesh()
     window = parse_window(args.window)
+    if not 0.0 < args.minutes < float("inf"):
+        raise InputError(f"--minutes: expected a positive number, got {args.minutes:g}")
     request = TrainRequest(args.model, args.seed, args.minutes, window, args.every, args.resume)
     train(dataset, rest, args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
 
@@ -107,6 +109,9 @@ def _evaluate(args: argparse.Namespace) -> None:
     models = {}
     for name in args.checkpoints:
         predictor = load(name)
+        taught = predictor.checkpoint.provenance.get("fixed")
+        if taught != dataset.fixed:
+            print(f"note: {name} was trained on other physics: {taught}, not {dataset.fixed}", file=sys.stderr)
         key = predictor.model if predictor.model not in models else name
         models[key] = evaluate(predictor, dataset, args.split, window, args.quality)
     result = {"data": args.data, "split": args.split, "window": window, "models": models}
@@ -174,7 +179,7 @@ def _parser() -> argparse.ArgumentParser:
         return sub
 
     sub = command("simulate", _simulate, "simulate a data set of a scene (needs odeform[simulate])")
-    sub.add_argument("scene", help="kick")
+    sub.add_argument("scene", metavar="SCENE", help="mass-elastic or kick")
     sub.add_argument("--out", required=True, metavar="DIR")
     sub.add_argument("--count", type=int, metavar="N", help="sequences (default: the scene's)")
     sub.add_argument("--seed", type=int, default=0, metavar="S")

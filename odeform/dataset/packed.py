@@ -1,9 +1,9 @@
 """Sequences in one small file: pose and POD coefficients of each, quantised, differenced in time and compressed.
 
-A zip archive of `dataset.json` (the index, as in a folder), `common.npz` (reference points, modes, faces, weights) and
-a member for each sequence, so that one is read without the others. Every frame is a best-fit rigid motion of the
-reference and a sum of modes that are orthonormal over the vertices: a coefficient is an RMS displacement, and steps of
-`quantum` metres leave a known error.
+A zip archive of stored members: `dataset.json` (the index, as in a folder; LZMA), `common.safetensors` (reference
+points, modes, faces, weights) and one for each sequence, so that one is read without the others. Every frame is a
+best-fit rigid motion of the reference and a sum of modes that are orthonormal over the vertices: a coefficient is an
+RMS displacement, and steps of `quantum` metres leave a known error.
 """
 
 import hashlib
@@ -11,12 +11,14 @@ import io
 import lzma
 import struct
 import zipfile
-import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 
 from odeform.dataset.index import Dataset, Entry, Reader, index_from_json, index_to_json
 from odeform.errors import InputError
@@ -30,7 +32,8 @@ __all__ = ["SUFFIX", "open_packed", "pack"]
 SUFFIX = ".odp"
 HEADER = struct.Struct("<IId")  # frames, series, rate in Hz
 ORDERS = 4  # differences in time: none to third
-LIMIT = 1 << 28  # bytes of one sequence, decompressed
+INDEX, COMMON = "dataset.json", "common.safetensors"
+LIMIT = 1 << 28  # bytes of one member, decompressed
 POSE = 6
 
 
@@ -50,10 +53,18 @@ def _squeeze(values: NDArray[np.int64], rate: float) -> bytes:
     return lzma.compress(HEADER.pack(*values.shape, rate) + body, preset=9)
 
 
+def _decompress(data: bytes) -> bytes:
+    return lzma.LZMADecompressor(memlimit=LIMIT).decompress(data, max_length=LIMIT)
+
+
 def _expand(data: bytes) -> tuple[NDArray[np.int64], float]:
-    body = lzma.LZMADecompressor(memlimit=1 << 28).decompress(data, max_length=LIMIT)
+    body = _decompress(data)
     frames, series, rate = HEADER.unpack_from(body)
+    if not (frames and series and 0.0 < rate < float("inf")):
+        raise ValueError("no frames, or no rate")
     orders, planes = np.split(np.frombuffer(body, np.uint8, offset=HEADER.size), [series])
+    if orders.max() >= ORDERS:
+        raise ValueError("differences of an order that is never written")
     residuals = np.ascontiguousarray(np.moveaxis(planes.reshape(4, series, frames), 0, -1)).view("<i4")[..., 0]
     values = residuals.astype(np.int64)
     for s, order in enumerate(orders):
@@ -81,7 +92,10 @@ def _steps(common: Arrays, quantum: float) -> Floats:
 def _decode(data: bytes, common: Arrays, quantum: float) -> tuple[Floats, Floats]:
     """Times (T,) and vertices (T, N, 3)."""
     values, rate = _expand(data)
-    y = values * _steps(common, quantum)
+    steps = _steps(common, quantum)
+    if values.shape[1] != len(steps):
+        raise ValueError(f"expected {len(steps)} series, got {values.shape[1]}")
+    y = values * steps
     points = common["points"]
     centre = points.mean(axis=0)
     local = (y[:, POSE:] @ common["modes"].T.astype(float)).reshape(len(y), -1, 3)
@@ -140,21 +154,16 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
                 noise *= 0.8
     else:
         raise InputError(f"{dataset.root}: no compression within {1e3 * tolerance:g} mm")
-    buffer = io.BytesIO()
-    np.savez(buffer, **common)
     entries = tuple(
         replace(e, sha256=hashlib.sha256(blobs[e.name]).hexdigest()) if e.name in blobs else e for e in dataset.entries
     )
     codec = {"quantum_m": quantum, "modes": count, "largest_rmse_m": rmse, "largest_error_m": worst}
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w") as file:
-        for name, data, method in (
-            ("dataset.json", index_to_json(replace(dataset, entries=entries), codec=codec), zipfile.ZIP_LZMA),
-            ("common.npz", buffer.getvalue(), zipfile.ZIP_LZMA),
-            *((name, data, zipfile.ZIP_STORED) for name, data in blobs.items()),
-        ):
+        index = lzma.compress(index_to_json(replace(dataset, entries=entries), codec=codec), preset=9)
+        for name, data in ((INDEX, index), (COMMON, save(common)), *blobs.items()):
             # a fixed date: the same data give the same file
-            file.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data, method)
+            file.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
     write_aside(out, archive.getvalue())
     return codec
 
@@ -198,18 +207,24 @@ def open_packed(path: Path) -> Dataset:
     def member(name: str) -> bytes:
         try:
             with zipfile.ZipFile(path) as file:
-                if file.getinfo(name).file_size > LIMIT:
-                    raise InputError(f"{path}: {name} is too large")
+                info = file.getinfo(name)
+                # members are stored as they are: nothing inflates before its size is known
+                if info.compress_type != zipfile.ZIP_STORED or info.file_size > LIMIT:
+                    raise InputError(f"{path}: {name} is not as `odeform pack` writes it")
                 return file.read(name)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}") from None
-        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, zlib.error, lzma.LZMAError):
+        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError):
             raise InputError(f"{path}: not a packed data set, or damaged: no readable {name}") from None
 
-    def reader(index: dict) -> Reader:  # pyright: ignore[reportMissingTypeArgument]
+    def reader(index: dict[str, Any]) -> Reader:
         quantum = float(index["codec"]["quantum_m"])
-        with np.load(io.BytesIO(member("common.npz")), allow_pickle=False) as arrays:
-            common = {name: arrays[name] for name in ("points", "modes", "faces", "weights")}
+        common = load(member(COMMON))
+        count = len(common["weights"])
+        shapes = {name: common[name].shape for name in ("points", "modes", "faces", "weights")}
+        wanted = {"points": (count, 3), "modes": (3 * count, shapes["modes"][-1]), "faces": (len(common["faces"]), 3)}
+        if shapes != {**wanted, "weights": (count,)} or not 0.0 < quantum < 1.0:
+            raise ValueError(f"arrays of shapes {shapes}, quantum {quantum}")
 
         def read(entry: Entry) -> Sequence:
             data = member(entry.name)
@@ -217,16 +232,16 @@ def open_packed(path: Path) -> Dataset:
                 raise InputError(f"{path}: checksum of {entry.name} does not match; the file is damaged")
             try:
                 times, vertices = _decode(data, common, quantum)
-            except (lzma.LZMAError, struct.error, ValueError):
-                raise InputError(f"{path}: {entry.name} cannot be decoded") from None
+            except (lzma.LZMAError, struct.error, ValueError) as error:
+                raise InputError(f"{path}: {entry.name} cannot be decoded: {error}") from None
             parameters = dict(entry.parameters)
             return Sequence(times, vertices, common["faces"], common["weights"], parameters, entry.name)
 
         return read
 
     try:
-        return index_from_json(member("dataset.json"), path, path, reader)
+        return index_from_json(_decompress(member(INDEX)), path, path, reader)
     except InputError:
         raise
-    except ValueError as error:
+    except (ValueError, IndexError, SafetensorError, lzma.LZMAError, EOFError) as error:
         raise InputError(f"{path}: damaged: {error}") from None

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from odeform.dataset.folder import open_folder
+from odeform.dataset.folder import INDEX, open_folder
 from odeform.dataset.index import Dataset
 from odeform.dataset.packed import SUFFIX, open_packed
 from odeform.files import bundled
@@ -16,6 +16,8 @@ def bundled_datasets() -> dict[str, Path]:
 
 
 def open_dataset(name: str | Path) -> Dataset:
-    """The data set of that path, or the bundled copy of that scene."""
-    path = bundled_datasets().get(str(name), Path(name))
+    """The data set of that path, or else the bundled copy of that scene."""
+    path = Path(name)
+    if not path.is_file() and not (path / INDEX).exists():
+        path = bundled_datasets().get(str(name), path)
     return open_packed(path) if path.is_file() else open_folder(path)

@@ -123,7 +123,8 @@ def evaluate(
         motion = predictor.solve(truth.rest, truth.parameters, quality, until=float(truth.times[-1]))
         predicted = motion.vertices(truth.times)
         on_frames = _on_frames(truth.times, schema.window)
-        between = ~_on_frames(truth.times, predictor.schema.window)
+        trained = predictor.schema.window
+        between = ~_on_frames(truth.times, trained) & (truth.times < trained.stop)
         for name, (first, last) in spans.items():
             inside = (truth.times > first - 1e-6) & (truth.times < last - 1e-6)
             inside[0] = True

@@ -1,5 +1,7 @@
 """From sequences to what the models learn from: one reduced trajectory for each."""
 
+import hashlib
+import json
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +32,8 @@ class TrainingData:
     reduced: dict[str, Floats]
     truncation_mm: dict[str, float]
     """RMS of the deformation that the modes leave out, for each split."""
+    identity: str
+    """SHA-256 of all that went in: the sequences, the frames, the number of modes."""
 
 
 def prepare(
@@ -71,11 +75,11 @@ def prepare(
     assert anchor is not None
     assert times is not None
     shapes = fit_modes(locals_["train"], weights, modes or MOST_MODES)
-    root = weights[:, None]
+    shares = weights[:, None]
     coefficients = {
-        split: [np.einsum("tni,nik->tk", local * root, shapes) for local in locals_[split]] for split in locals_
+        split: [np.einsum("tni,nik->tk", local * shares, shapes) for local in locals_[split]] for split in locals_
     }
-    total = {split: np.mean([(root * x**2).sum(axis=(1, 2)).mean() for x in locals_[split]]) for split in locals_}
+    total = {split: np.mean([(shares * x**2).sum(axis=(1, 2)).mean() for x in locals_[split]]) for split in locals_}
     kept = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in locals_}
     if modes is None:
         enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
@@ -88,4 +92,6 @@ def prepare(
         truncation[split] = float(1e3 * np.sqrt(max(total[split] - kept[split][:modes].sum(), 0.0)))
     rate = 1.0 / float(times[1] - times[0])
     schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
-    return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation)
+    used = [[entry.name, entry.sha256] for split in ("train", "val") for entry in dataset.select(split)]
+    identity = hashlib.sha256(json.dumps([used, count, every, modes]).encode()).hexdigest()
+    return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation, identity)

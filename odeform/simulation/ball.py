@@ -46,6 +46,7 @@ NOTES = (
 
 FIXED = {
     "radius_m": RADIUS,
+    "vertices": 4 * SEGMENTS**2 + 2,
     "gravity_m_s2": GRAVITY,
     "young_pa": MATERIAL.young,
     "poisson": MATERIAL.poisson,

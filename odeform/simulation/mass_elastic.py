@@ -36,7 +36,7 @@ def simulate(
     A stress-free ball falls as a point does; the simulator takes over shortly before it lands.
     """
     # here, so that looking at a scene and training on its data need no simulator
-    from odeform.simulation.shell import Rest, run
+    from odeform.simulation.shell import Rest, SimulationError, run
 
     rate = rate or SCHEMA.window.rate
     body, rest, mesh = stress_free(parameters, step, segments)
@@ -49,6 +49,8 @@ def simulate(
     height = HEIGHT - 0.5 * GRAVITY * falling**2
     fall = rest + height[:, None, None] * np.array([0.0, 0.0, 1.0])
     times, vertices = run(body, LIMIT, rate, begin=begin, rest=Rest(REST_SPEED, REST_TIME))
+    if times[-1] > LIMIT - 1.0 / rate:
+        raise SimulationError(f"the ball has not come to rest within {LIMIT:g} s")
     return Sequence(
         np.concatenate([falling, times]),
         np.concatenate([fall, vertices]).astype(np.float32),

@@ -28,13 +28,15 @@ def _one(scene_name: str, entry: Entry, root: Path, rate: float, step: float) ->
     return replace(entry, sha256=save_sequence(root, entry.name, sequence))
 
 
-def _finished(root: Path, plan: list[Entry], provenance: dict[str, object]) -> dict[str, Entry]:
+def _finished(root: Path, plan: list[Entry], new: Dataset) -> dict[str, Entry]:
     """Entries that an earlier, interrupted run of the same plan has completed."""
     if not (root / INDEX).exists():
         return {}
     old = open_folder(root)
-    if old.provenance != provenance:
-        raise InputError(f"{root}: holds another data set ({old.provenance}); expected {provenance} or an empty folder")
+    for part in ("provenance", "fixed", "schema"):
+        was, wanted = getattr(old, part), getattr(new, part)
+        if was != wanted:
+            raise InputError(f"{root}: holds another data set, of {part} {was}; expected {wanted} or an empty folder")
     wanted = {entry.name: entry for entry in plan}
     return {e.name: e for e in old.entries if e.name in wanted and e.parameters == wanted[e.name].parameters}
 
@@ -64,13 +66,13 @@ def simulate_dataset(
             zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
         )
     ]
-    done = _finished(root, plan, provenance)
+    empty = Dataset(root, schema, (), folder_reader(root), scene.fixed, provenance)
+    done = _finished(root, plan, empty)
     todo = [entry for entry in plan if entry.name not in done]
     progress = Progress(f"simulate {scene_name}", len(plan), done=len(done))
 
     def index() -> Dataset:
-        entries = tuple(done[e.name] for e in plan if e.name in done)
-        dataset = Dataset(root, schema, entries, folder_reader(root), scene.fixed, provenance)
+        dataset = replace(empty, entries=tuple(done[e.name] for e in plan if e.name in done))
         write_index(dataset)
         return dataset
 

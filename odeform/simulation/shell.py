@@ -161,8 +161,7 @@ def run(
 ) -> tuple[Floats, Floats]:
     """Step the body from `begin` to `until` seconds, or till it rests.
 
-    Returns times (T,) on the grid k / rate and vertices (T, N, 3), those at both ends included.
-
+    Returns times (T,) on the grid k / rate within that span, and vertices (T, N, 3).
     Frames fall between steps where the rate does not divide them: positions are then interpolated with the
     velocities of both sides (cubic Hermite), so that the step never depends on the frames asked for.
     """

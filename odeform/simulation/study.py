@@ -118,8 +118,11 @@ def main() -> None:
     parser.add_argument("--json", metavar="FILE")
     args = parser.parse_args()
     if args.count < 1:
-        raise InputError("study: expected at least one sequence")
-    text = json.dumps(study(args.scene, args.count, args.seed, args.workers), indent=1)
+        parser.error("expected at least one sequence")
+    try:
+        text = json.dumps(study(args.scene, args.count, args.seed, args.workers), indent=1)
+    except InputError as error:
+        parser.error(str(error))
     if args.json:
         write_aside(Path(args.json), text.encode())
     else:

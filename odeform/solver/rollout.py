@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import torch
+from torch.autograd.function import once_differentiable
 
 __all__ = ["Branch", "roll_out"]
 
@@ -59,7 +60,8 @@ class _RollOut(torch.autograd.Function):
         return states
 
     @staticmethod
-    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[Any, ...]:
+    @once_differentiable
+    def backward(ctx: Any, *grads: torch.Tensor) -> tuple[Any, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]
         of_states, places, nets, hidden = grads[0], ctx.places, ctx.nets, ctx.hidden
         errors = [[torch.empty_like(h1), torch.empty_like(h2)] for h1, h2 in hidden]
         # tanh' = 1 - tanh^2

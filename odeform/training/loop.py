@@ -6,6 +6,7 @@ the states, and the last millimetres, which it would take hours for, come from t
 """
 
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -47,6 +48,8 @@ class TrainConfig:
     """Share of the motion that is rolled out at first, and share of the time in which it grows to the whole."""
     ridge: float = 1e-6
     """Of the readout's least squares, relative to the mean square of a feature."""
+    longest: float = 0.01
+    """Seconds; longer frames are integrated in several steps."""
     report: float = 20.0
     """Seconds between lines of progress, and between saved states."""
 
@@ -115,19 +118,25 @@ class _Trainer:
             for k, v in data.reduced.items()
         }
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
-        self.step = float(data.times[1] - data.times[0])
+        frame = float(data.times[1] - data.times[0])
+        self.substeps = max(1, math.ceil(frame / config.longest - 1e-9))
+        self.step = frame / self.substeps
+        self.identity = data.identity
         points, shares = _shape(data)
         self.shape = points.to(device), shares.to(device)
         self.frames = len(self.truth["train"]) - 1
         self.generator = torch.Generator().manual_seed(config.seed)
-        self.weights = [w for name, w in net.named_parameters() if not name.endswith("readout.weight")]
+        for decoder in net.decoders:
+            decoder.readout.requires_grad_(False)  # solved for
+        self.weights = [w for w in net.parameters() if w.requires_grad]
         self.optimiser = torch.optim.AdamW(self.weights, lr=config.rate, weight_decay=1e-4)
         self.outputs = [slice(0, POSE), slice(POSE, None)] if net.config.rigid else [slice(POSE, None)]
         self.done = 0
         self.elapsed = 0.0
 
     def states(self, theta: torch.Tensor, frames: int) -> torch.Tensor:
-        return self.net.roll_out(self.net.encode(self.shape, theta), theta, [self.step] * frames)
+        start = self.net.encode(self.shape, theta)
+        return self.net.roll_out(start, theta, [self.step] * (frames * self.substeps))[:: self.substeps]
 
     def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
         """Of a batch, after its readout has been solved for."""
@@ -183,12 +192,17 @@ class _Trainer:
         rigid, local = (total / len(self.theta[split]) / 3.0).sqrt().tolist()
         return rigid, local
 
+    def _fingerprint(self) -> dict[str, Any]:
+        """What has to be the same for a training to go on; how long it may take need not."""
+        config = {k: v for k, v in asdict(self.config).items() if k not in ("minutes", "report")}
+        return {"data": self.identity, "network": asdict(self.net.config), "config": config}
+
     def save(self, path: Path) -> None:
         tensors = {f"net.{name}": value for name, value in self.net.state_dict().items()}
         for index, state in self.optimiser.state_dict()["state"].items():
             tensors |= {f"adam.{index}.{name}": value for name, value in state.items()}
         tensors["generator"] = self.generator.get_state()
-        meta = {"config": asdict(self.config), "done": self.done, "elapsed": self.elapsed}
+        meta = {**self._fingerprint(), "done": self.done, "elapsed": self.elapsed}
         tensors = {name: value.contiguous() for name, value in tensors.items()}
         write_aside(path, save(tensors, {"training": json.dumps(meta)}))
 
@@ -201,6 +215,9 @@ class _Trainer:
             tensors = load(data)
             header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
             meta: dict[str, Any] = json.loads(header["__metadata__"]["training"])
+            for part, wanted in json.loads(json.dumps(self._fingerprint())).items():
+                if meta[part] != wanted:
+                    raise InputError(f"--resume: {path}: another training, of {part} {meta[part]}; expected {wanted}")
             weights = {k.removeprefix("net."): v for k, v in tensors.items() if k.startswith("net.")}
             states: dict[int, dict[str, torch.Tensor]] = {}
             for key, value in tensors.items():
@@ -212,7 +229,9 @@ class _Trainer:
             self.optimiser.load_state_dict({"state": states, "param_groups": groups})
             self.generator.set_state(tensors["generator"])
             self.done, self.elapsed = int(meta["done"]), float(meta["elapsed"])
-        except (SafetensorError, KeyError, ValueError, RuntimeError) as error:
+        except InputError:
+            raise
+        except (SafetensorError, KeyError, ValueError, TypeError, RuntimeError) as error:
             raise InputError(f"--resume: {path}: not the state of this training: {error}") from None
 
 
@@ -237,6 +256,8 @@ def train_network(
     if resume and part is not None:
         trainer.restore(part)
         report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
+    elif part is not None and part.exists():
+        report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
     seconds = 60.0 * config.minutes
     begin, printed = time.monotonic() - trainer.elapsed, trainer.elapsed
     try:
@@ -261,10 +282,17 @@ def train_network(
         raise
     finally:
         torch.set_num_threads(threads)
+    if part is not None:
+        trainer.save(part)
     trainer.solve_readout(config.ridge)
     rigid, local = trainer.errors_mm("val")
     net.cpu()
-    return {"val_rigid_rmse_mm": rigid, "val_deformation_rmse_mm": local, "steps": trainer.done}
+    return {
+        "val_rigid_rmse_mm": rigid,
+        "val_deformation_rmse_mm": local,
+        "steps": trainer.done,
+        "seconds": trainer.elapsed,
+    }
 
 
 def network_weights(net: ODeformNet) -> Arrays:

@@ -30,9 +30,9 @@ class Metric(nn.Module):
 
 
 def balanced(*losses: torch.Tensor) -> torch.Tensor:
-    """sum_i ln L_i, up to a constant: the paper's automatic weights (eq. 10) at their optimum for large losses.
+    """Its gradient is that of sum_i ln L_i (its value is the number of losses).
 
-    There s_i^2 = L_i / 2, whatever the loss: rigid and local errors differ by orders of magnitude in mm^2, and each
-    pulls by its relative error.
+    That is the paper's automatic weighting (eq. 10) with each s_i^2 at its optimum for large losses, L_i / 2. Rigid and
+    local errors differ by orders of magnitude in mm^2; here each pulls by its relative error.
     """
     return torch.stack([loss / loss.detach().clamp_min(1e-30) for loss in losses]).sum()

@@ -1,5 +1,8 @@
 """Which integration is good enough: the qualities of a checkpoint, from its own errors on the validation split."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from odeform.model.data import TrainingData
@@ -14,7 +17,6 @@ SHARES = {"draft": 1.0, "balanced": 0.1}
 """Solver error that a quality may add, as a share of the model's own. A tenth adds half a per cent to the total."""
 REFERENCE = {"method": "dopri5", "tolerance": 1e-7}
 TRUTH = Quality("dopri5", tolerance=1e-10)
-SEQUENCES = 16
 
 
 def _candidates(step: float) -> list[dict[str, object]]:
@@ -23,29 +25,35 @@ def _candidates(step: float) -> list[dict[str, object]]:
     return [*adaptive, *({"method": "rk4", "step": step * factor} for factor in (2.0, 1.0, 0.5, 0.25))]
 
 
-def choose_qualities(model: ODeform, data: TrainingData, error_mm: float) -> dict[str, dict[str, object]]:
-    """Settings of each quality: those of the fewest evaluations that keep to its share of the model's RMSE `error_mm`.
+def choose_qualities(model: ODeform, data: TrainingData, shares: Mapping[str, float] = SHARES) -> dict[str, Any]:
+    """Settings of each quality: those of the fewest evaluations whose error keeps to its share of the model's.
 
-    The solver's error is that against a reference of tolerance 1e-10 in double precision, over validation parameters.
+    Over the validation sequences; the solver's error is that against tolerance 1e-10 in double precision, the model's
+    that of this reference against the data.
     """
-    thetas = data.theta["val"][:SEQUENCES]
     placed = model.place(model.rest, 0.0)
+    scale = np.full(data.reduced["val"].shape[-1], 1e3)
+    scale[3:POSE] *= data.space.arm * np.sqrt(2.0 / 3.0)
 
     def motions(quality: Quality, dtype: type) -> tuple[Floats, float]:
-        solved = [model.integrate(theta, placed, quality, float(data.times[-1]), dtype) for theta in thetas]
-        return np.stack([s.reduced(data.times) for s in solved]), float(np.mean([s.stats.evaluations for s in solved]))
+        """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
+        stop = float(data.times[-1])
+        solved = [model.integrate(theta, placed, quality, stop, dtype) for theta in data.theta["val"]]
+        reduced = [s.reduced(data.times) + (0.0 if np.isinf(s.last_good) else np.nan) for s in solved]
+        return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
+
+    def rmse(a: Floats, b: Floats) -> float:
+        return float(np.sqrt((((a - b) * scale)[:, 1:] ** 2).sum(axis=-1).mean() / 3.0))
 
     truth, _ = motions(TRUTH, np.float64)
-    scale = np.full(truth.shape[-1], 1e3)
-    scale[3:POSE] *= data.space.arm * np.sqrt(2.0 / 3.0)
+    allowed = rmse(truth, data.reduced["val"])
     costs = []
     for setting in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(Quality(**setting), np.float32)  # pyright: ignore[reportArgumentType]
-        error = float(np.sqrt((((reduced - truth) * scale)[:, 1:] ** 2).sum(axis=-1).mean() / 3.0))
-        costs.append((evaluations, error if np.isfinite(error) else np.inf, setting))
+        costs.append((evaluations, rmse(reduced, truth), setting))
     costs.sort(key=lambda cost: cost[0])
     chosen = {
-        name: next((setting for _, error, setting in costs if error <= share * error_mm), REFERENCE)
-        for name, share in SHARES.items()
+        name: next((setting for _, error, setting in costs if error <= share * allowed), REFERENCE)
+        for name, share in shares.items()
     }
     return {**chosen, "reference": REFERENCE}

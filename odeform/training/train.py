@@ -1,6 +1,5 @@
 """From a data set to a checkpoint, for every model that learns from parameters."""
 
-import math
 import platform
 import time
 from collections.abc import Callable
@@ -80,7 +79,8 @@ def train(
         "dataset": dataset.provenance,
         "fixed": dataset.fixed,
         "seed": request.seed,
-        "training_seconds": round(time.monotonic() - begin, 1),
+        # over all sittings of a resumed training
+        "training_seconds": round(settings["val"]["seconds"] if "val" in settings else time.monotonic() - begin, 1),
         "machine": platform.processor() or platform.machine(),
         "versions": {name: version(name) for name in ("odeform", "numpy", "torch")},
         "truncation_mm": data.truncation_mm,
@@ -99,8 +99,7 @@ def train(
     )
     if request.model == "odeform":
         # the solver may add to the model's error, not more
-        error = math.hypot(*(settings["val"][f"val_{part}_rmse_mm"] for part in ("rigid", "deformation")))
-        qualities = choose_qualities(ODeform(checkpoint), data, error)
+        qualities = choose_qualities(ODeform(checkpoint), data)
         checkpoint = replace(checkpoint, config={**checkpoint.config, "qualities": qualities})
     write_checkpoint(out, checkpoint)
     scores = evaluate(load(out), dataset, "test")
@@ -114,6 +113,7 @@ def train(
 def _command(dataset: Dataset, request: TrainRequest) -> list[str]:
     made = dataset.provenance
     simulate = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
+    simulate += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
     options = f" --model {request.model} --seed {request.seed}"
     options += f" --minutes {request.minutes:g}" if request.model == "odeform" else ""
     options += f" --window {request.window[0]}:{request.window[1]}" if request.window else ""

@@ -1,4 +1,5 @@
 import hashlib
+import lzma
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import save
 
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.packed import _expand, _squeeze, open_packed, pack
@@ -156,7 +158,7 @@ def test_what_failed_stays_listed(tmp_path: Path) -> None:
     assert packed.entries[1] == failed
     assert [s.name for s in packed.sequences("all")] == ["s0", "s2"]
     with zipfile.ZipFile(tmp_path / "a.odp") as file:
-        assert file.namelist() == ["dataset.json", "common.npz", "s0", "s2"]
+        assert file.namelist() == ["dataset.json", "common.safetensors", "s0", "s2"]
 
 
 def test_one_is_read_without_the_others(small: Path) -> None:
@@ -218,28 +220,49 @@ def test_truncated(small: Path, keep: float) -> None:
     assert "not a packed data set, or damaged" in refused(small)
 
 
+def edited(members: dict[str, bytes], old: bytes, new: bytes) -> dict[str, bytes]:
+    """With another text in the index."""
+    index = lzma.decompress(members["dataset.json"])
+    assert old in index
+    return {**members, "dataset.json": lzma.compress(index.replace(old, new))}
+
+
 def blob(content: bytes) -> Callable[[dict[str, bytes]], dict[str, bytes]]:
     """What replaces the first sequence by such bytes, with a checksum to match."""
 
     def change(members: dict[str, bytes]) -> dict[str, bytes]:
         old, new = (hashlib.sha256(data).hexdigest().encode() for data in (members["s0"], content))
-        return {**members, "dataset.json": members["dataset.json"].replace(old, new), "s0": content}
+        return {**edited(members, old, new), "s0": content}
 
     return change
 
 
 DAMAGE: dict[str, Callable[[dict[str, bytes]], dict[str, bytes]]] = {
     "no index": lambda members: {k: v for k, v in members.items() if k != "dataset.json"},
-    "no common part": lambda members: {k: v for k, v in members.items() if k != "common.npz"},
+    "no common part": lambda members: {k: v for k, v in members.items() if k != "common.safetensors"},
     "no sequence": lambda members: {k: v for k, v in members.items() if k != "s0"},
     "nothing": lambda members: {},
-    "index is no JSON": lambda members: {**members, "dataset.json": b"{"},
-    "index of a folder": lambda members: {**members, "dataset.json": members["dataset.json"].replace(b"codec", b"x")},
-    "common part is no archive": lambda members: {**members, "common.npz": b"hello"},
+    "index is not compressed": lambda members: {**members, "dataset.json": lzma.decompress(members["dataset.json"])},
+    "index is no JSON": lambda members: {**members, "dataset.json": lzma.compress(b"{")},
+    "index of a folder": lambda members: edited(members, b"codec", b"x"),
+    "quantum of nothing": lambda members: edited(members, b'"quantum_m": ', b'"quantum_m": -'),
+    "common part is no safetensors": lambda members: {**members, "common.safetensors": b"hello"},
+    "common part of another": lambda members: {**members, "common.safetensors": save({"points": np.zeros((3, 3))})},
     "sequence of nothing": blob(b""),
     "sequence of text": blob(b"hello"),
+    "sequence without a rate": blob(_squeeze(np.zeros((5, 18), dtype=np.int64), 0.0)),
     "sequence of another shape": blob(_squeeze(np.zeros((5, 3), dtype=np.int64), 120.0)),
 }
+
+
+def test_refuses_compressed_members(small: Path) -> None:
+    """Nothing inflates before its size is known."""
+    with zipfile.ZipFile(small) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(small, "w", zipfile.ZIP_LZMA) as file:
+        for name, data in members.items():
+            file.writestr(name, data)
+    refused(small)
 
 
 @pytest.mark.parametrize("damage", DAMAGE)

@@ -225,7 +225,7 @@ def test_solver_error_is_of_the_size_it_says(predictors: dict[str, Predictor], q
     theta = predictor.schema.vector(motion.parameters)
 
     def solve(setting: Quality) -> Motion:
-        trajectory = predictor._trajectory(theta, motion.placed, setting, 1.0, np.float64)  # pyright: ignore
+        trajectory = predictor.integrate(theta, motion.placed, setting, 1.0, np.float64)  # pyright: ignore
         return replace(motion, trajectory=trajectory)
 
     def frames(setting: Quality) -> tuple[np.ndarray, np.ndarray]:

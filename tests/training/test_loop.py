@@ -41,9 +41,14 @@ def test_outputs_are_whitened(data: TrainingData) -> None:
 
 
 def test_seconds_of_training_lower_the_error(data: TrainingData) -> None:
-    before = train_network(build_network(data, 0), data, TrainConfig(minutes=0.0), silent)
-    after = train_network(build_network(data, 0), data, TrainConfig(minutes=0.1), silent)
-    assert after["val_rigid_rmse_mm"] < 0.75 * before["val_rigid_rmse_mm"]
+    """Of the training sequences: these few say little about any other."""
+    errors = []
+    for minutes in (0.0, 0.1):
+        net = build_network(data, 0)
+        train_network(net, data, TrainConfig(minutes=minutes), silent)
+        errors.append(_Trainer(net, data, TrainConfig(), torch.device("cpu")).errors_mm("train"))
+    assert errors[1][0] < 0.5 * errors[0][0]
+    assert errors[1][1] < 0.8 * errors[0][1]
 
 
 def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:

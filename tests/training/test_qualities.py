@@ -10,15 +10,15 @@ from odeform.solver.integrate import Quality
 from odeform.training.qualities import REFERENCE, choose_qualities
 
 
-@pytest.mark.parametrize("error_mm", [20.0, 0.2])
+@pytest.mark.parametrize("share", [1.0, 0.1])
 def test_a_smaller_error_asks_for_more_evaluations(
-    dataset: Dataset, predictors: dict[str, Predictor], error_mm: float
+    dataset: Dataset, predictors: dict[str, Predictor], share: float
 ) -> None:
     model = cast(ODeform, predictors["odeform"])
     data = prepare(dataset, modes=model.space.basis.modes)
     evaluations = []
-    for error in (error_mm, 0.01 * error_mm):
-        chosen = choose_qualities(model, data, error)
+    for factor in (1.0, 0.01):
+        chosen = choose_qualities(model, data, {"draft": factor * share, "balanced": 0.1 * factor * share})
         assert chosen["reference"] == REFERENCE
         motions = [model.solve(quality=Quality(**chosen[name])) for name in ("draft", "balanced")]  # pyright: ignore
         evaluations += [motion.stats.evaluations for motion in motions]
@@ -30,7 +30,7 @@ def test_a_smaller_error_asks_for_more_evaluations(
 def test_nothing_is_exact_enough(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
     model = cast(ODeform, predictors["odeform"])
     data = prepare(dataset, modes=model.space.basis.modes)
-    assert choose_qualities(model, data, 1e-12)["balanced"] == REFERENCE
+    assert choose_qualities(model, data, {"balanced": 1e-12})["balanced"] == REFERENCE
 
 
 def test_a_checkpoint_brings_its_qualities(predictors: dict[str, Predictor]) -> None:
