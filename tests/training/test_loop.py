@@ -40,14 +40,16 @@ def test_outputs_are_whitened(data: TrainingData) -> None:
     assert (whitened[..., 6:] ** 2).mean(axis=(0, 1)) == pytest.approx(np.ones(8), rel=1e-4)
 
 
-def test_seconds_of_training_lower_the_error(data: TrainingData) -> None:
+def test_descent_lowers_what_the_readout_leaves(data: TrainingData) -> None:
     """Of the training sequences: these few say little about any other."""
+    trainer = _Trainer(build_network(data, 0), data, TrainConfig(), torch.device("cpu"))
     errors = []
-    for minutes in (0.0, 0.1):
-        net = build_network(data, 0)
-        train_network(net, data, TrainConfig(minutes=minutes), silent)
-        errors.append(_Trainer(net, data, TrainConfig(), torch.device("cpu")).errors_mm("train"))
-    assert errors[1][0] < 0.5 * errors[0][0]
+    for steps in (0, 40):
+        for step in range(steps):
+            trainer.advance(step / steps)
+        trainer.solve_readout(1e-6)
+        errors.append(trainer.errors_mm("train"))
+    assert errors[1][0] < 0.8 * errors[0][0]
     assert errors[1][1] < errors[0][1]
 
 
