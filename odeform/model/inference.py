@@ -139,19 +139,18 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
 
     In double precision: a readout solved for by least squares has large weights that cancel.
     """
-    dtype = np.float64
-    gains = weights["gains"].astype(np.float64)
+    gains = weights["gains"].astype(float)
     parts = []
     for branch in config.branches:
         place = slice(0, config.rigid_latent) if branch == "rigid" else slice(config.state - config.local_latent, None)
-        (first, bias), *others = _layers(weights, f"{branch}_decoder.hidden", dtype)
+        (first, bias), *others = _layers(weights, f"{branch}_decoder.hidden", np.float64)
         seen = config.latent(branch)
-        readout = np.asfortranarray(weights[f"{branch}_decoder.readout.weight"].astype(dtype))
-        parts.append((place, np.asfortranarray(first[:, :seen]), first[:, seen:].astype(float), bias, others, readout))
+        readout = np.asfortranarray(weights[f"{branch}_decoder.readout.weight"].astype(float))
+        parts.append((place, np.asfortranarray(first[:, :seen]), first[:, seen:], bias, others, readout))
 
     def fold(theta: Floats) -> Decoder:
         folded = [
-            (place, [(first, bias + (seeing @ theta).astype(dtype)), *others], readout)
+            (place, [(first, bias + seeing @ theta), *others], readout)
             for place, first, seeing, bias, others, readout in parts
         ]
 
@@ -163,7 +162,7 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
                     x = _silu(x @ matrix.T + bias)
                 out.append(np.concatenate([features, x], axis=1) @ readout.T)
             if not config.rigid:
-                out.insert(0, np.zeros((len(states), POSE), dtype=dtype))
+                out.insert(0, np.zeros((len(states), POSE)))
             return np.concatenate(out, axis=1) * gains
 
         return decode

@@ -14,7 +14,7 @@ from odeform.model.config import ModelConfig
 from odeform.model.reduced import POSE
 from odeform.solver.rollout import Branch, roll_out
 
-__all__ = ["ODeformNet", "ShapeEncoder", "mlp"]
+__all__ = ["ODeformNet", "ShapeEncoder"]
 
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:

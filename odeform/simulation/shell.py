@@ -36,7 +36,7 @@ class SimulationError(RuntimeError):
 def _xml(
     mesh: Mesh, mass: float, thickness: float, material: Material, step: float, gravity: float, floor: bool
 ) -> str:
-    # the implicit step damps like `step` seconds of its own; taken off, a rebound depends on the step a third as much
+    # the implicit step damps like `step` seconds of its own; taken off, a rebound hardly depends on the step
     damping = max(damping_time(thickness, material) - step, 0.0)
     contact = f'friction="{material.friction} 0.005 0.0001" solref="{material.contact_time} 1"'
     plane = f'<geom type="plane" size="0 0 1" pos="0 0 {-CONTACT_RADIUS}" {contact}/>' if floor else ""

@@ -51,8 +51,7 @@ def _run(scene: Scene, parameters: dict[str, float], step: float) -> Sequence:
 
 
 def _condition(frames: slice, nudged: list[Sequence]) -> float:
-    """Condition number of the sensitivities to the normalised quantities (mass, bending, force; not the direction) over
-    some frames, by central differences."""
+    """Condition number of the sensitivities to the normalised parameters over some frames, by central differences."""
     moved = [s.until(frames.stop / RATE).vertices[frames].astype(float).ravel() for s in nudged]
     return float(np.linalg.cond(np.stack([b - a for a, b in zip(moved[::2], moved[1::2], strict=True)], axis=1)))
 
@@ -74,12 +73,11 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
         return {**parameters, parameter.name: parameter.denormalise(unit + 2.0 * by)}
 
     jobs = [(p, scene.step) for p in settings] + [(p, 0.5 * scene.step) for p in settings]
-    quantities = [parameter for parameter in learned if parameter.unit != "rad"]
-    jobs += [(nudge(p, q, by), scene.step) for p in settings for q in quantities for by in (-NUDGE, NUDGE)]
+    jobs += [(nudge(p, q, by), scene.step) for p in settings for q in learned for by in (-NUDGE, NUDGE)]
     parallel: Any = Parallel(n_jobs=workers, verbose=5)
     motions: list[Sequence] = parallel(delayed(_run)(scene, *job) for job in jobs)
     coarse, fine = motions[:count], motions[count : 2 * count]
-    width = 2 * len(quantities)
+    width = 2 * len(learned)
     nudged = [motions[at : at + width] for at in range(2 * count, len(motions), width)]
     rows = []
     for parameters, a, b, others in zip(settings, coarse, fine, nudged, strict=True):
