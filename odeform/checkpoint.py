@@ -11,7 +11,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from odeform.errors import InputError
-from odeform.files import bundled, write_aside
+from odeform.files import bundled, safetensors_metadata, write_aside
 from odeform.schema import Schema
 from odeform.types import Arrays
 
@@ -63,10 +63,9 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
         raise InputError(f"checkpoint {path}: {error.strerror}") from None
     try:
         arrays = load(data)
-        header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        metadata = safetensors_metadata(data)
     except (SafetensorError, KeyError, ValueError):
         raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
-    metadata = header.get("__metadata__", {})
     if "odeform" not in metadata:
         raise InputError(f"checkpoint {path}: a safetensors file, but not of ODeform")
     try:

@@ -1,10 +1,11 @@
 """Files: written whole or not at all, and those that travel with the package."""
 
+import json
 import os
 import tempfile
 from pathlib import Path
 
-__all__ = ["bundled", "write_aside"]
+__all__ = ["bundled", "safetensors_metadata", "write_aside"]
 
 
 def write_aside(path: Path, data: bytes) -> None:
@@ -19,6 +20,11 @@ def write_aside(path: Path, data: bytes) -> None:
     except BaseException:
         Path(aside).unlink(missing_ok=True)
         raise
+
+
+def safetensors_metadata(data: bytes) -> dict[str, str]:
+    """The metadata of a safetensors file that has been loaded and is sound; its library reads them from paths only."""
+    return json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")]).get("__metadata__", {})
 
 
 def bundled(kind: str) -> Path:

@@ -20,7 +20,7 @@ from safetensors.torch import load, save
 from torch import nn
 
 from odeform.errors import InputError
-from odeform.files import write_aside
+from odeform.files import safetensors_metadata, write_aside
 from odeform.model.config import ModelConfig
 from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
@@ -213,8 +213,7 @@ class _Trainer:
             raise InputError(f"--resume: {path}: {error.strerror}; expected what an interrupted run left") from None
         try:
             tensors = load(data)
-            header = json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")])
-            meta: dict[str, Any] = json.loads(header["__metadata__"]["training"])
+            meta: dict[str, Any] = json.loads(safetensors_metadata(data)["training"])
             for part, wanted in json.loads(json.dumps(self._fingerprint())).items():
                 if meta[part] != wanted:
                     raise InputError(f"--resume: {path}: another training, of {part} {meta[part]}; expected {wanted}")
