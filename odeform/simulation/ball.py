@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from odeform.simulation.shell import ShellBody
 
 __all__ = [
-    "BENDING",
     "FIXED",
     "GRAVITY",
     "MATERIAL",
@@ -24,6 +23,7 @@ __all__ = [
     "RADIUS",
     "SEGMENTS",
     "STEP",
+    "bending",
     "mass",
     "rest_mesh",
     "sphere",
@@ -36,10 +36,8 @@ STEP = 5e-4  # s
 SEGMENTS = 10  # 402 vertices
 MATERIAL = Material(young=0.13e6, poisson=0.3, viscosity=19.0, friction=0.5, contact_time=0.002)
 
-BENDING = Parameter("bending", "N m", 0.3, 3.0, 0.6, scale="log", description="bending stiffness EI of its wall")
-
 NOTES = (
-    "The wall is 0.29 to 0.63 of the radius: too thick for thin-shell theory, bending and stretching follow "
+    "The wall is 0.29 of the radius or more: too thick for thin-shell theory, bending and stretching follow "
     "E h^3 / (12 (1 - nu^2)) and E h by definition of the scene.",
     "Losses are those of a lining of fixed viscosity, so that mass and bending act apart and not by their ratio alone.",
 )
@@ -58,6 +56,10 @@ FIXED = {
 
 def mass(low: float, high: float, default: float) -> Parameter:
     return Parameter("mass", "kg", low, high, default, scale="log", description="mass of the ball")
+
+
+def bending(high: float) -> Parameter:
+    return Parameter("bending", "N m", 0.3, high, 0.6, scale="log", description="bending stiffness EI of its wall")
 
 
 def sphere(segments: int = SEGMENTS) -> Mesh:

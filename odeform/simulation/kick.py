@@ -6,7 +6,7 @@ import numpy as np
 
 from odeform.geometry.rigid import rotation_z
 from odeform.schema import Parameter, Parameters, Schema, Window
-from odeform.simulation.ball import BENDING, FIXED, NOTES, SEGMENTS, STEP, mass, rest_mesh, stress_free
+from odeform.simulation.ball import FIXED, NOTES, SEGMENTS, STEP, bending, mass, rest_mesh, stress_free
 from odeform.simulation.scene import Scene
 from odeform.types import Floats, Sequence
 
@@ -18,11 +18,13 @@ SPREAD = math.radians(25.0)  # angular width of the pulse around the struck poin
 SCHEMA = Schema(
     scene="kick",
     parameters=(
-        mass(0.3, 1.0, 0.5),
-        BENDING,
-        Parameter("force", "N", 70.0, 150.0, 120.0, description="peak of the pulse F sin^2(pi t / 20 ms)"),
+        # beyond these ranges the first contact no longer tells mass, bending and force apart: balls that are light and
+        # stiff or kicked flat leave too soon, heavy ones kicked weakly not at all
+        mass(0.5, 1.0, 0.7),
+        bending(2.0),
+        Parameter("force", "N", 100.0, 150.0, 120.0, description="peak of the pulse F sin^2(pi t / 20 ms)"),
         Parameter("azimuth", "rad", -math.pi, math.pi, 0.0, role="azimuth", description="heading of the pulse"),
-        Parameter("elevation", "rad", 0.0, math.pi / 4, 0.6, description="rise of the pulse above the floor"),
+        Parameter("elevation", "rad", 0.5, math.pi / 4, 0.6, description="rise of the pulse above the floor"),
     ),
     window=Window(0.0, 1.0, 120.0),
     notes=NOTES,

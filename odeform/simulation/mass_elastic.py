@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from odeform.schema import Parameters, Schema, Window
-from odeform.simulation.ball import BENDING, FIXED, GRAVITY, NOTES, RADIUS, SEGMENTS, STEP, mass, rest_mesh, stress_free
+from odeform.simulation.ball import FIXED, GRAVITY, NOTES, RADIUS, SEGMENTS, STEP, bending, mass, rest_mesh, stress_free
 from odeform.simulation.scene import Scene
 from odeform.types import Mesh, Sequence
 
@@ -18,7 +18,7 @@ REST_TIME = 0.1  # s for which the ball has to be that slow
 
 SCHEMA = Schema(
     scene="mass-elastic",
-    parameters=(mass(0.2, 1.0, 0.5), BENDING),
+    parameters=(mass(0.2, 1.0, 0.5), bending(3.0)),
     window=Window(0.0, 1.25, 120.0),
     impact=(0.25, 0.75),
     notes=(
