@@ -6,16 +6,26 @@ import socket
 import sys
 from collections.abc import Sequence
 
+import numpy as np
 import viser
 
+from odeform.checkpoint import bundled_checkpoints
+from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
+from odeform.types import Floats
+from odeform.types import Sequence as Motions
 from odeform_viz.clock import Clock
+from odeform_viz.columns import Column, Columns
+from odeform_viz.heat import scale_for
+from odeform_viz.panels.compare import ComparePanel
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.playback import PlaybackPanel
+from odeform_viz.panels.plots import PlotPanel
 from odeform_viz.panels.status import StatusPanel
+from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
-from odeform_viz.scene import SceneView
-from odeform_viz.session import Column, Frame, Session, Wish, same_motions
+from odeform_viz.scene import Looks, SceneView, color_of
+from odeform_viz.session import Frame, Session, Wish, same_motions
 from odeform_viz.worker import Worker
 
 __all__ = ["App"]
@@ -29,13 +39,20 @@ class App:
     """Serves a page in which the user's wishes are met, the newest first and only."""
 
     def __init__(
-        self, columns: Sequence[Column], host: str = "127.0.0.1", port: int = 8080, record: str | None = None
+        self,
+        columns: Sequence[Column],
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        record: str | None = None,
+        sequence: Motions | None = None,
     ) -> None:
-        self.session = Session(columns)
+        """The first of the columns gives the scene and its sliders; `sequence` is shown as truth at first."""
+        self.columns = Columns.of(columns)
+        self.session = Session(columns[0].source.schema)
         _require_free(host, port)
         # the worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
         sys.setswitchinterval(SWITCH)
-        self._recorder = Recorder(record, self.session.columns) if record else None
+        self._recorder = Recorder(record) if record else None
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
         self.server.gui.configure_theme(
@@ -46,25 +63,44 @@ class App:
             brand_color=(214, 96, 48),
         )
         self.server.gui.set_panel_label(f"ODeform · {self.session.schema.scene}")
-        window = self.session.schema.window
-        self.clock = Clock(window.start, window.stop)
         self._worker = Worker(self._serve)
-        wake = self._worker.wake
-        self._status = StatusPanel(self.server, self.session.columns)
-        self._playback = PlaybackPanel(self.server, window, self.clock, wake, self._largest)
-        self._parameters = ParameterPanel(self.server, self.session, wake)
-        self._scene = SceneView(self.server, self.session.columns)
-        with self.server.gui.add_folder("View"):
-            follow = self.server.gui.add_checkbox("follow the body", initial_value=True)
-        with self.server.gui.add_folder("About", expand_by_default=False):
-            self.server.gui.add_markdown(_about(self.session))
-        follow.on_update(lambda event: self._set_follow(bool(event.target.value)))
+        self._build(columns)
         self.server.gui.add_command("Play or pause", hotkey="K").on_trigger(lambda _: self._playback.toggle())
         self._shown: Frame | None = None
+        self._looks = Looks()
+        self._heat: float | None = None
         self._settled = False
-        self._dirty = False
+        if sequence is not None:
+            self._truth.open(sequence)
         self.clock.play()
         self._worker.start()
+
+    def _build(self, columns: Sequence[Column]) -> None:
+        schema, gui, wake = self.session.schema, self.server.gui, self._worker.wake
+        self.clock = Clock(schema.window.start, schema.window.stop)
+        self._playback = PlaybackPanel(self.server, schema.window, self.clock, wake, self._largest)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Explore"):
+            qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
+            samples = _training_samples(columns[0])
+            self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
+            with gui.add_folder("View"):
+                self._follow = gui.add_checkbox("follow the body", initial_value=True)
+                self._follow.on_update(lambda _: wake())
+            with gui.add_folder("About", expand_by_default=False):
+                gui.add_markdown(_about(columns[0]))
+        with tabs.add_tab("Compare"):
+            models = {n: str(p) for n, p in bundled_checkpoints().items() if n.startswith(f"{schema.scene}/")}
+            dataset = open_dataset(schema.scene) if schema.scene in bundled_datasets() else None
+            read, say = self._parameters.parameters, self._say
+            self._truth = TruthPanel(
+                self.server, schema, self.columns, dataset, read, self._parameters.set, self._changed, say
+            )
+            self._compare = ComparePanel(self.server, schema, self.columns, models, read, wake, say)
+        self._status = StatusPanel(self.server)
+        self._plots = PlotPanel(self.server, schema.window)
+        extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
+        self._scene = SceneView(self.server, extent, len(columns))
 
     @property
     def url(self) -> str:
@@ -73,6 +109,7 @@ class App:
 
     def close(self) -> None:
         """Stop serving; a recording is completed."""
+        self._truth.cancel()
         self._worker.stop()
         if self._recorder:
             self._recorder.close()
@@ -80,48 +117,81 @@ class App:
 
     def _wish(self) -> Wish:
         parameters = self.session.schema.complete(self._parameters.parameters())
-        return Wish(parameters, self.clock.time(), self._parameters.quality(), self._parameters.visible())
+        return Wish(parameters, self.clock.time(), self._parameters.quality(), self.columns.all)
 
     def _largest(self) -> float:
-        wish = self._wish()
-        return self.session.largest_deformation(wish) if any(wish.visible) else 0.0
+        return self.session.largest_deformation(self._wish())
 
-    def _set_follow(self, follow: bool) -> None:
-        self._scene.follow = follow
-        self._dirty = True
+    def _changed(self) -> None:
+        self._compare.refresh()
         self._worker.wake()
+
+    def _say(self, message: str) -> None:
+        self._status.show_error(message)
 
     def _serve(self) -> float | None:
         """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
         try:
             wish = self._wish()
-            if self._shown is None or wish != self._shown.wish or self._dirty:
-                self._dirty = False
-                frame = self.session.frame(wish)
-                self._settled = self._shown is not None and same_motions(frame, self._shown)
-                self._scene.publish(frame)
-                self._playback.show(wish.time)
-                self._status.show(frame, self._settled)
-                self._shown = frame
-                if self._recorder:
-                    self._recorder.log(frame)
+            looks = Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
+            if self._shown is None or wish != self._shown.wish or looks != self._looks:
+                self._show(self.session.frame(wish), looks)
             elif not self._settled:
                 self._settled = True
-                self._status.show(self._shown, True)
+                self._describe(self._shown)
         except InputError as error:
             self._status.show_error(str(error))
-            self._dirty, self._settled = True, True  # what is shown next replaces the message, whatever it is
+            self._shown, self._settled = None, True  # what comes next is shown, even if it was before
         if self.clock.playing:
             return TICK
         return None if self._settled else SETTLE
 
+    def _show(self, frame: Frame, looks: Looks) -> None:
+        # colours keep their scale over the whole motion, so it has to be known first
+        self._heat = self._scale(frame) if looks.heat else None
+        self._settled = self._shown is not None and same_motions(frame, self._shown)
+        self._scene.publish(frame, looks, self._heat)
+        self._playback.show(frame.wish.time)
+        self._shown, self._looks = frame, looks
+        self._describe(frame)
+        if self._recorder:
+            self._recorder.log(frame)
 
-def _about(session: Session) -> str:
-    """What the scene leaves fixed, what to keep in mind, and where the models come from."""
-    checkpoint = session.columns[0].predictor.checkpoint
-    fixed = ", ".join(f"{name} {value:.4g}" for name, value in checkpoint.provenance.get("fixed", {}).items())
-    lines = [*session.schema.notes, f"Fixed: {fixed}."]
-    lines += [f"Made by `{command}`." for command in checkpoint.provenance.get("command", [])]
+    def _scale(self, frame: Frame) -> float | None:
+        """The end of the colour scale in mm, one for all columns; None where nothing can be compared."""
+        errors = [self.session.curves(shown, frame.wish).error for shown in frame.columns if shown.error]
+        return scale_for(np.concatenate([e for e in errors if e is not None])) if errors else None
+
+    def _describe(self, frame: Frame) -> None:
+        """What accompanies a frame: numbers, curves, marks at the sliders."""
+        self._parameters.show()
+        truth = frame.truth.column.truth if frame.truth else None
+        away = truth is not None and not truth.of(frame.wish.parameters)
+        self._truth.show(away)
+        self._status.show(frame, self._settled, self._heat, away)
+        lines = [
+            (shown.column.label, color_of(frame.wish.columns, shown.column), self.session.curves(shown, frame.wish))
+            for shown in frame.columns
+        ]
+        self._plots.show(lines, frame.wish.time)
+
+
+def _training_samples(column: Column) -> dict[str, Floats]:
+    """The values of each learned parameter in the training split, as far as the checkpoint tells."""
+    if column.predictor is None or "training.theta" not in column.predictor.checkpoint.arrays:
+        return {}
+    theta = column.predictor.checkpoint.arrays["training.theta"]
+    learned = column.predictor.schema.learned
+    return {p.name: np.array([p.denormalise(float(x)) for x in theta[:, i]]) for i, p in enumerate(learned)}
+
+
+def _about(column: Column) -> str:
+    """What the scene leaves fixed, what to keep in mind, and where the model comes from."""
+    assert column.predictor is not None
+    provenance = column.predictor.checkpoint.provenance
+    fixed = ", ".join(f"{name} {value:.4g}" for name, value in provenance.get("fixed", {}).items())
+    lines = [*column.source.schema.notes, f"Fixed: {fixed}."]
+    lines += [f"Made by `{command}`." for command in provenance.get("command", [])]
     return "\n\n".join([*lines, "Press K to play or pause."])
 
 

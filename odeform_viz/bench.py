@@ -9,9 +9,9 @@ import numpy as np
 import odeform
 from odeform.evaluation.bench import ball
 from odeform_viz.app import App
+from odeform_viz.columns import Column
 from odeform_viz.loopback import LoopbackClient
-from odeform_viz.scene import checker_parts
-from odeform_viz.session import Column
+from odeform_viz.shapes import checker_parts
 
 __all__ = ["drag"]
 

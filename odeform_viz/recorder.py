@@ -9,8 +9,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from odeform.errors import InputError
+from odeform.model.recorded import RecordedMotion
 from odeform.types import Floats, Ints, Mesh
-from odeform_viz.session import Column, ColumnFrame, Frame
+from odeform_viz.columns import Column
+from odeform_viz.session import ColumnFrame, Frame
 
 __all__ = ["Recorder"]
 
@@ -21,7 +23,7 @@ MOTION = "motion_time"  # timeline: seconds of the motion
 class Recorder:
     """Logs every published frame to a file. Use from one thread: Rerun's clock is thread-local."""
 
-    def __init__(self, path: str | Path, columns: Sequence[Column]) -> None:
+    def __init__(self, path: str | Path) -> None:
         path = Path(path)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -29,23 +31,34 @@ class Recorder:
                 pass
         except OSError as error:
             raise InputError(f"recording {path}: cannot be written: {error.strerror}") from None
-        self._columns = columns
         self._stream = rr.RecordingStream("odeform")
-        self._stream.save(str(path), default_blueprint=_blueprint(columns))
+        self._stream.save(str(path))
+        self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._index = 0
-        for index, column in enumerate(columns):
-            self._log_static(index, column)
+        self._known: dict[int, Column] = {}
+        self._present: set[int] = set()
 
-    def _log_static(self, index: int, column: Column) -> None:
-        checkpoint = column.predictor.checkpoint
-        provenance = {
-            "label": column.label,
-            "model": checkpoint.model,
-            "sha256": checkpoint.sha256,
-            "schema": checkpoint.schema.to_json(),
-            "provenance": checkpoint.provenance,
-            "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
-        }
+    def log(self, frame: Frame) -> None:
+        self._stream.set_time(SHOWN, sequence=self._index)
+        self._stream.set_time(MOTION, duration=frame.wish.time)
+        self._index += 1
+        for name, value in frame.wish.parameters.items():
+            self._stream.log(f"parameters/{name}", rr.Scalars(value))
+        fresh = [shown.column for shown in frame.columns if shown.column.key not in self._known]
+        for column in fresh:
+            self._known[column.key] = column
+            self._log_static(column)
+        if fresh:
+            self._stream.send_blueprint(_blueprint(list(self._known.values())), make_default=True)
+        present = {shown.column.key for shown in frame.columns}
+        for key in self._present - present:
+            self._stream.log(f"world/{self._known[key].label}", rr.Clear(recursive=True))
+        self._present = present
+        for shown in frame.columns:
+            self._log_column(shown.column, shown, frame.wish.time)
+
+    def _log_static(self, column: Column) -> None:
+        provenance = _provenance(column)
         text = rr.TextDocument(f"```json\n{json.dumps(provenance, indent=1)}\n```", media_type=rr.MediaType.MARKDOWN)
         self._stream.log(f"provenance/{column.label}", text, static=True)
         geometry = column.geometry
@@ -55,18 +68,6 @@ class Recorder:
                 rr.Mesh3D.from_fields(triangle_indices=geometry.faces, albedo_factor=[236, 112, 60, 255]),
                 static=True,
             )
-        if index == 0:
-            self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-
-    def log(self, frame: Frame) -> None:
-        self._stream.set_time(SHOWN, sequence=self._index)
-        self._stream.set_time(MOTION, duration=frame.wish.time)
-        self._index += 1
-        for name, value in frame.wish.parameters.items():
-            self._stream.log(f"parameters/{name}", rr.Scalars(value))
-        for column, shown in zip(self._columns, frame.columns, strict=True):
-            if shown is not None:
-                self._log_column(column, shown, frame.wish.time)
 
     def _log_column(self, column: Column, shown: ColumnFrame, time: float) -> None:
         path = f"world/{column.label}/body"
@@ -92,6 +93,21 @@ class Recorder:
     def close(self) -> None:
         self._stream.flush()
         self._stream.disconnect()
+
+
+def _provenance(column: Column) -> dict[str, object]:
+    if isinstance(column.source, RecordedMotion):
+        return {"label": column.label, "model": "recorded", "parameters": dict(column.source.parameters)}
+    checkpoint = column.source.checkpoint
+    return {
+        "label": column.label,
+        "model": checkpoint.model,
+        "sha256": checkpoint.sha256,
+        "pinned": None if column.pinned is None else dict(column.pinned),
+        "schema": checkpoint.schema.to_json(),
+        "provenance": checkpoint.provenance,
+        "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
+    }
 
 
 def _normals(points: Floats, faces: Ints) -> Floats:

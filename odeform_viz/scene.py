@@ -1,6 +1,7 @@
 """Frames -> viser handles: columns side by side under one camera, the floor, the pulse."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -8,75 +9,34 @@ import viser.transforms as vtf
 
 from odeform.geometry.rigid import rotation_z
 from odeform.model.motion import Motion
-from odeform.types import Floats, GaussianSplats, Geometry, Ints, Mesh
-from odeform_viz.session import Column, ColumnFrame, Frame
+from odeform.model.recorded import RecordedMotion
+from odeform.types import Floats
+from odeform_viz.columns import Column
+from odeform_viz.heat import Spread
+from odeform_viz.session import ColumnFrame, Frame
+from odeform_viz.shapes import Color, show_shape
 
-__all__ = ["SceneView", "checker_parts"]
+__all__ = ["Looks", "SceneView", "color_of"]
 
-COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (90, 90, 90))
+COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (176, 42, 98), (0, 128, 140))
+TRUTH = (70, 74, 82)
 ARROW = (190, 20, 20)
+GHOST = 0.45  # opacity of all but the first where columns overlap
 
 
-def checker_parts(mesh: Mesh) -> list[tuple[Ints, Ints]]:
-    """A mesh in two parts, octants about its centre in turn: for each the vertices (M,) it uses and its faces (F, 3).
+@dataclass(frozen=True)
+class Looks:
+    """How columns are shown: one over the other or in a row, errors in colours, the camera at the body's side."""
 
-    A body of one colour hides how it turns.
-    """
-    points = np.asarray(mesh.points, dtype=float)
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    odd = np.prod(points[mesh.faces].mean(axis=1) - centre, axis=1) > 0.0
-    parts = []
-    for faces in (mesh.faces[odd], mesh.faces[~odd]):
-        used, local = np.unique(faces, return_inverse=True)
-        parts.append((used, local.reshape(-1, 3)))
-    return [part for part in parts if len(part[0])]
+    overlay: bool = False
+    heat: bool = True
+    follow: bool = True
 
 
-Update = Callable[[Floats], None]
-
-
-def _show_shape(server: viser.ViserServer, root: str, geometry: Geometry, color: tuple[int, int, int]) -> Update:
-    """Add a shape to the scene; returns what moves its points."""
-    points = np.asarray(geometry.points, dtype=np.float32)
-    if isinstance(geometry, Mesh):
-        return _show_mesh(server, root, geometry, color)
-    if isinstance(geometry, GaussianSplats):
-        return _show_splats(server, root, geometry)
-    cloud = server.scene.add_point_cloud(f"{root}/points", points, color, point_size=0.003)
-
-    def move(points: Floats) -> None:
-        cloud.points = points
-
-    return move
-
-
-def _show_mesh(server: viser.ViserServer, root: str, mesh: Mesh, color: tuple[int, int, int]) -> Update:
-    points = np.asarray(mesh.points, dtype=np.float32)
-    red, green, blue = (round(0.45 * c + 0.55 * 235) for c in color)
-    handles = []
-    for index, ((used, faces), shade) in enumerate(zip(checker_parts(mesh), (color, (red, green, blue)), strict=False)):
-        handle = server.scene.add_mesh_simple(f"{root}/part_{index}", points[used], faces, color=shade)
-        handles.append((handle, used))
-
-    def move(points: Floats) -> None:
-        for handle, used in handles:
-            handle.vertices = points[used]
-
-    return move
-
-
-def _show_splats(server: viser.ViserServer, root: str, splats: GaussianSplats) -> Update:
-    # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
-    scale = 0.01
-    covariances = (splats.covariances / scale**2).astype(np.float32)
-    colors, opacities = splats.colors.astype(np.float32), splats.opacities[:, None].astype(np.float32)
-    centers = (splats.points / scale).astype(np.float32)
-    handle = server.scene.add_gaussian_splats(f"{root}/splats", centers, covariances, colors, opacities, scale=scale)
-
-    def move(points: Floats) -> None:
-        handle.set_gaussians((points / scale).astype(np.float32), covariances, colors, opacities)
-
-    return move
+def color_of(columns: Sequence[Column], column: Column) -> Color:
+    """Models in the order of the palette, the truth in grey."""
+    models = [c.key for c in columns if c.truth is None]
+    return TRUTH if column.truth else COLORS[models.index(column.key) % len(COLORS)]
 
 
 class _ColumnView:
@@ -86,71 +46,133 @@ class _ColumnView:
     body that the camera follows would tremble.
     """
 
-    def __init__(self, server: viser.ViserServer, root: str, column: Column, color: tuple[int, int, int]) -> None:
-        self._server, self._geometry = server, column.geometry
-        self._body = server.scene.add_frame(f"{root}/body", show_axes=False)
-        self._shape = _show_shape(server, f"{root}/body", column.geometry, color)
-        self._resting = True
-        self._root, self._color = root, color
+    def __init__(self, server: viser.ViserServer, column: Column, color: Color) -> None:
+        self._server, self._column, self._color = server, column, color
+        self.root = f"/world/column_{column.key}"
+        points = np.asarray(column.geometry.points, dtype=float)
+        self._rest, self._centre = points.astype(np.float32), points.mean(axis=0)
+        self._size = float(np.ptp(points, axis=0).max())
+        self._place = server.scene.add_frame(self.root, show_axes=False)
+        self._body = server.scene.add_frame(f"{self.root}/body", show_axes=False)
+        self._shape = show_shape(server, f"{self.root}/body", column.geometry, color)
+        # a label lags where its own position changes, not where its parent's does
+        self._above = server.scene.add_frame(f"{self.root}/above", show_axes=False)
+        self._label: viser.LabelHandle | None = None
+        self._motion: Motion | RecordedMotion | None = None
+        self._spread: tuple[RecordedMotion, Spread] | None = None
+        self._as_built = True
 
-    def show(self, frame: ColumnFrame) -> None:
+    def centre(self, frame: ColumnFrame) -> Floats:
+        """(3,) where the rigid part takes the centre of the body."""
+        return frame.pose[:3, :3] @ self._centre + frame.pose[:3, 3]
+
+    def moved(self, frame: ColumnFrame) -> Floats:
+        """(3,) how far the centre of the body has come."""
+        return self.centre(frame) - self._centre
+
+    def hide(self) -> None:
+        self._place.visible = False
+
+    def remove(self) -> None:
+        self._place.remove()
+
+    def show(
+        self, frame: ColumnFrame, place: float, opacity: float | None, truth: ColumnFrame | None, heat: float | None
+    ) -> None:
+        self._place.visible = True
+        self._place.position = (0.0, place, 0.0)
         self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
         self._body.position = frame.pose[:3, 3]
-        if frame.points is not None:
-            self._shape(frame.points)
-        elif not self._resting:
-            self._shape(np.asarray(self._geometry.points, dtype=np.float32))
-        self._resting = frame.points is None
+        self._above.position = self.centre(frame)
+        self._shape.fade(opacity)
+        points = self._rest if frame.points is None else frame.points
+        if heat is not None and frame.error is not None and truth is not None:
+            self._shape.paint(points, self._spread_from(truth)(1e3 * frame.error.distances), heat)
+            self._as_built = False
+        elif frame.points is not None or not self._as_built:
+            self._shape.move(points)
+            self._as_built = frame.points is None
 
-    def show_path(self, motion: Motion) -> None:
+    def _spread_from(self, truth: ColumnFrame) -> Spread:
+        record = truth.motion
+        assert isinstance(record, RecordedMotion)
+        if self._spread is None or self._spread[0] is not record:
+            self._spread = (record, Spread(record.geometry.points, self._rest))
+        return self._spread[1]
+
+    def title(self, text: str | None) -> None:
+        if text is None:
+            if self._label is not None:
+                self._label.remove()
+                self._label = None
+        elif self._label is None:
+            self._label = self._server.scene.add_label(
+                f"{self.root}/above/label", text, position=(0.0, 0.0, 0.75 * self._size), anchor="bottom-center"
+            )
+        elif self._label.text != text:
+            self._label.text = text
+
+    def accompany(self, motion: Motion | RecordedMotion) -> None:
+        """What only accompanies a motion: its way and its push; sent when the motion is another."""
+        if motion is self._motion:
+            return
+        self._motion = motion
+        with self._server.atomic():
+            self._show_path(motion)
+            if isinstance(motion, Motion):
+                self._show_pulse(motion)
+
+    def _show_path(self, motion: Motion | RecordedMotion) -> None:
         """The way of the body's centre over the trained window."""
         window = motion.schema.window
         poses = motion.pose(np.linspace(window.start, window.stop, 61))
-        centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
-        way = poses[:, :3, :3] @ centre + poses[:, :3, 3]
+        way = poses[:, :3, :3] @ self._centre + poses[:, :3, 3]
         segments = np.stack([way[:-1], way[1:]], axis=1).astype(np.float32)
         self._server.scene.add_line_segments(
-            f"{self._root}/path",
+            f"{self.root}/path",
             segments,
             colors=np.array(self._color, dtype=np.uint8),
             thickness=2.0,
             thickness_units="screen",
         )
 
+    def _show_pulse(self, motion: Motion) -> None:
+        """The push, on the side where it drives the body, as long as it is strong; only scenes with a force have one.
 
-def _centre(frame: ColumnFrame) -> Floats:
-    """(3,) where the rigid part takes the centre of the body."""
-    centre = np.asarray(frame.motion.geometry.points, dtype=float).mean(axis=0)
-    return frame.pose[:3, :3] @ centre + frame.pose[:3, 3]
+        It acts on the far side, low at the back, where the floor would hide most of an arrow.
+        """
+        parameters = motion.parameters
+        if not {"force", "elevation"} <= set(parameters):
+            return
+        elevation = parameters["elevation"]
+        heading = rotation_z(motion.schema.azimuth(parameters))
+        direction = heading @ np.array([np.cos(elevation), 0.0, np.sin(elevation)])
+        start = 0.5 * (self._rest.min(axis=0) + self._rest.max(axis=0)) + 0.55 * self._size * direction
+        force = next(p for p in motion.schema.parameters if p.name == "force")
+        length = self._size * max(parameters["force"], 0.0) / force.high
+        shaft = np.array([[start, start + length * direction]], dtype=np.float32)
+        self._server.scene.add_arrows(
+            f"{self.root}/pulse",
+            shaft,
+            ARROW,
+            shaft_radius=0.02 * self._size,
+            head_radius=0.055 * self._size,
+            head_length=0.12 * self._size,
+        )
 
 
 class SceneView:
     """Everything in the viewport."""
 
-    def __init__(self, server: viser.ViserServer, columns: Sequence[Column]) -> None:
-        self._server, self._columns = server, columns
-        self.follow = True
-        extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
-        self._gap, self._size = 1.6 * extent, extent
-        self._set_stage()
-        self._frames, self._views, self._labels = [], [], []
-        for index, column in enumerate(columns):
-            root = f"/world/column_{index}"
-            self._frames.append(server.scene.add_frame(root, show_axes=False, position=self._place(index)))
-            self._views.append(_ColumnView(server, root, column, COLORS[index % len(COLORS)]))
-            if len(columns) > 1:
-                # a label lags where its own position changes, not where its parent's does
-                self._labels.append(server.scene.add_frame(f"{root}/above", show_axes=False))
-                server.scene.add_label(f"{root}/above/label", column.label, position=(0.0, 0.0, 0.75 * extent))
-        self._motions: list[Motion | None] = [None] * len(columns)
+    def __init__(self, server: viser.ViserServer, extent: float, columns: int) -> None:
+        """`extent` is the size of a body in metres, `columns` how many are to be in view at first."""
+        self._server, self._size = server, extent
+        self._views: dict[int, tuple[Column, _ColumnView]] = {}
+        self._set_stage(columns)
 
-    def _place(self, index: int) -> tuple[float, float, float]:
-        """Columns stand in a row across the default heading, from left to right."""
-        return (0.0, self._gap * (0.5 * (len(self._columns) - 1) - index), 0.0)
-
-    def _set_stage(self) -> None:
+    def _set_stage(self, columns: int) -> None:
         server, size = self._server, self._size
-        wide = 1.0 + 0.45 * (len(self._columns) - 1)
+        wide = 1.0 + 0.45 * (columns - 1)
         server.scene.set_up_direction("+z")
         server.initial_camera.position = (-3.9 * size * wide, -2.6 * size * wide, 1.9 * size * wide)
         # the panel covers the right third of the view: look past the body's right side
@@ -170,55 +192,50 @@ class SceneView:
             plane_opacity=1.0,
         )
 
-    def publish(self, frame: Frame) -> None:
-        """Send one frame, whole: clients never see half of it. What only accompanies a motion follows it."""
-        with self._server.atomic():
-            for index, column in enumerate(frame.columns):
-                self._frames[index].visible = column is not None
-                if column is None:
-                    continue
-                self._views[index].show(column)
-                if self._labels:
-                    self._labels[index].position = _centre(column)
-            self._world.position = self._offset(frame)
-        self._server.flush()
-        for index, column in enumerate(frame.columns):
-            if column is not None and self._motions[index] is not column.motion:
-                self._motions[index] = column.motion
-                with self._server.atomic():
-                    self._views[index].show_path(column.motion)
-                    self._show_pulse(index, column.motion)
+    def publish(self, frame: Frame, looks: Looks, heat: float | None) -> None:
+        """Send one frame, whole: clients never see half of it. What only accompanies a motion follows it.
 
-    def _offset(self, frame: Frame) -> tuple[float, float, float]:
+        Errors against the truth are painted on a scale that ends at `heat` mm.
+        """
+        with self._server.atomic():
+            self._match(frame)
+            several = len(frame.columns) > 1
+            for index, shown in enumerate(frame.columns):
+                view = self._views[shown.column.key][1]
+                # columns stand in a row across the default heading, from left to right
+                place = 0.0 if looks.overlay else 1.6 * self._size * (0.5 * (len(frame.columns) - 1) - index)
+                view.show(shown, place, GHOST if looks.overlay and index else None, frame.truth, heat)
+                view.title(title_of(shown) if several and not looks.overlay else None)
+            self._world.position = self._offset(frame, looks)
+        self._server.flush()
+        for shown in frame.columns:
+            self._views[shown.column.key][1].accompany(shown.motion)
+
+    def _match(self, frame: Frame) -> None:
+        """A view for each column that is shown, none for those that are gone."""
+        wished = {column.key: column for column in frame.wish.columns}
+        for key, (column, view) in list(self._views.items()):
+            if key not in wished or wished[key].geometry is not column.geometry:
+                view.remove()
+                del self._views[key]
+            elif not wished[key].shown:
+                view.hide()
+        for shown in frame.columns:
+            if shown.column.key not in self._views:
+                color = color_of(frame.wish.columns, shown.column)
+                self._views[shown.column.key] = (shown.column, _ColumnView(self._server, shown.column, color))
+
+    def _offset(self, frame: Frame, looks: Looks) -> tuple[float, float, float]:
         """Following moves the world past the camera, which stays in the user's hand."""
-        first = next((column for column in frame.columns if column is not None), None)
-        if not self.follow or first is None:
+        if not looks.follow or not frame.columns:
             return (0.0, 0.0, 0.0)
-        moved = _centre(first) - np.asarray(first.motion.geometry.points, dtype=float).mean(axis=0)
+        first = frame.columns[0]
+        moved = self._views[first.column.key][1].moved(first)
         return (-float(moved[0]), -float(moved[1]), 0.0)
 
-    def _show_pulse(self, index: int, motion: Motion) -> None:
-        """The push, on the side where it drives the body, as long as it is strong; only scenes with a force have one.
 
-        It acts on the far side, low at the back, where the floor would hide most of an arrow.
-        """
-        parameters = motion.parameters
-        if not {"force", "elevation"} <= set(parameters):
-            return
-        elevation = parameters["elevation"]
-        heading = rotation_z(motion.schema.azimuth(parameters))
-        direction = heading @ np.array([np.cos(elevation), 0.0, np.sin(elevation)])
-        points = np.asarray(motion.geometry.points, dtype=float)
-        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        start = centre + 0.55 * self._size * direction
-        force = next(p for p in motion.schema.parameters if p.name == "force")
-        length = self._size * max(parameters["force"], 0.0) / force.high
-        shaft = np.array([[start, start + length * direction]], dtype=np.float32)
-        self._server.scene.add_arrows(
-            f"/world/column_{index}/pulse",
-            shaft,
-            ARROW,
-            shaft_radius=0.02 * self._size,
-            head_radius=0.055 * self._size,
-            head_length=0.12 * self._size,
-        )
+def title_of(shown: ColumnFrame) -> str:
+    """What stands above a column: its name, its error, and what is wrong."""
+    error = f" · {shown.error.rmse_mm:.2f} mm" if shown.error else ""
+    sunk = " · below the floor" if shown.sunk else ""
+    return f"{shown.column.label}{error}{sunk}"

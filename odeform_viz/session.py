@@ -1,19 +1,24 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from odeform.errors import InputError
 from odeform.model.motion import Motion, SolveStats
+from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
-from odeform.types import Floats, Geometry
+from odeform.types import Floats, Geometry, Perpoint, Times, Vector
+from odeform_viz.columns import Column
 
-__all__ = ["Column", "ColumnFrame", "Frame", "Session", "Wish", "same_motions"]
+__all__ = ["REACH", "ColumnFrame", "Curves", "Error", "Frame", "Session", "Wish", "same_motions"]
 
 INVISIBLE = 5e-5  # m; a deformation below this cannot be seen on a ball of 0.1 m at any sensible zoom
+SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
+REACH = 1.5  # trained windows that one can look at
 
 
 @dataclass(frozen=True)
@@ -23,16 +28,25 @@ class Wish:
     parameters: Mapping[str, float]
     time: float
     quality: str
-    visible: tuple[bool, ...]
+    columns: tuple[Column, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
-    """One model beside the others."""
+class Error:
+    """How far a prediction is from the truth at one moment: `distances` (N,) metres at the truth's vertices."""
 
-    label: str
-    predictor: Predictor
-    geometry: Geometry
+    distances: Perpoint
+    rmse_mm: float
+    """Over all coordinates, as is `mae_mm`."""
+    mae_mm: float
+    worst: int
+    """The vertex that is farthest off."""
+    where: Vector
+    """(3,) metres: where the truth has it."""
+
+    @property
+    def worst_mm(self) -> float:
+        return 1e3 * float(self.distances[self.worst])
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,85 +54,157 @@ class ColumnFrame:
     """One column at one moment: the `pose` (4, 4), and what it moves.
 
     `points` (N, 3) is the body deformed where it rests; None where the deformation is too small to be seen, and the
-    pose says it all.
+    pose says it all. `depth` is how far the body is below the floor, in metres. `error` is that against the truth,
+    where there is one of these parameters.
     """
 
-    motion: Motion
+    column: Column
+    motion: Motion | RecordedMotion
     points: Floats | None
     pose: Floats
+    depth: float
+    error: Error | None
 
     @property
     def stats(self) -> SolveStats:
         return self.motion.stats
 
+    @property
+    def sunk(self) -> bool:
+        return self.depth > SUNK
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """All visible columns at one moment, in the order of the session's columns; None for hidden ones."""
+    """All visible columns at one moment, in the order of the wish."""
 
     wish: Wish
-    columns: tuple[ColumnFrame | None, ...]
+    columns: tuple[ColumnFrame, ...]
+
+    @cached_property
+    def truth(self) -> ColumnFrame | None:
+        return next((shown for shown in self.columns if shown.column.truth), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation` and pooled
+    `error` in mm, the latter None without truth."""
+
+    times: Times
+    height: Times
+    turn: Times
+    deformation: Times
+    error: Times | None
 
 
 def same_motions(one: Frame, other: Frame) -> bool:
     """Whether two frames differ in time alone."""
-    pairs = zip(one.columns, other.columns, strict=True)
-    return all(a is None or (b is not None and a.motion is b.motion) for a, b in pairs)
+    return [shown.motion for shown in one.columns] == [shown.motion for shown in other.columns]
 
 
 class Session:
     """Columns under one set of parameters and one time. Integrates only when parameters or quality change."""
 
-    def __init__(self, columns: Sequence[Column]) -> None:
-        first = columns[0].predictor.schema
-        for column in columns[1:]:
-            if column.predictor.schema.scene != first.scene:
-                raise InputError(
-                    f"cannot compare {column.label}: it is of scene {column.predictor.schema.scene}, not {first.scene}"
-                )
-        self.columns = tuple(columns)
-        self.schema: Schema = first
-        self._motions: dict[int, tuple[tuple[object, ...], Motion]] = {}
+    def __init__(self, schema: Schema) -> None:
+        self.schema = schema
+        self._solved: dict[tuple[int, int], tuple[tuple[object, ...], Motion]] = {}
+        self._curves: dict[int, tuple[object, object, Curves]] = {}
 
-    @property
-    def qualities(self) -> tuple[str, ...]:
-        """Names that any of the columns can be solved with."""
-        names = [name for column in self.columns for name in column.predictor.qualities]
-        return tuple(dict.fromkeys(names))
+    def parameters(self, column: Column, wish: Wish) -> Mapping[str, float]:
+        """Those that a column stands for."""
+        return column.pinned if column.pinned is not None else wish.parameters
 
-    def motion(self, index: int, wish: Wish) -> Motion:
-        """The motion of one column; the same object until parameters or quality change."""
-        column = self.columns[index]
-        names = {p.name for p in column.predictor.schema.parameters}
-        parameters = {name: value for name, value in wish.parameters.items() if name in names}
-        key = (wish.quality, *sorted(parameters.items()))
-        if index not in self._motions or self._motions[index][0] != key:
-            motion = column.predictor.solve(column.geometry, parameters, wish.quality)
-            self._motions[index] = (key, motion)
-        return self._motions[index][1]
+    def motion(self, column: Column, wish: Wish) -> Motion | RecordedMotion:
+        """The motion of one column; the same object until its parameters, shape or quality change."""
+        source = column.source
+        if isinstance(source, RecordedMotion):
+            return source
+        return self._solve(column, source, 0, column.geometry, wish)
+
+    def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> Motion:
+        names = {p.name for p in source.schema.parameters}
+        parameters = {n: value for n, value in self.parameters(column, wish).items() if n in names}
+        quality = wish.quality if wish.quality in source.qualities else "balanced"
+        wanted = (quality, *sorted(parameters.items()))
+        known = self._solved.get((column.key, use))
+        if known is None or known[0] != wanted or known[1].geometry is not geometry:
+            known = self._solved[column.key, use] = (wanted, source.solve(geometry, parameters, quality))
+        return known[1]
+
+    def truth_of(self, column: Column, wish: Wish) -> RecordedMotion | None:
+        """The record among the columns, where it is of this column's parameters and body."""
+        truth = next((c.source for c in wish.columns if c.shown and isinstance(c.source, RecordedMotion)), None)
+        if truth is None or column.truth is not None or not truth.of(self.parameters(column, wish)):
+            return None
+        return None if column.foreign else truth
 
     def frame(self, wish: Wish) -> Frame:
         """What is to be seen; only visible columns are computed. `InputError` for wishes that no motion can meet."""
         if not np.isfinite(wish.time) or wish.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {wish.time}")
-        columns = [
-            self._column(self.motion(index, wish), wish.time) if visible else None
-            for index, visible in enumerate(wish.visible)
-        ]
-        return Frame(wish, tuple(columns))
+        kept = {column.key for column in wish.columns}
+        self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
+        self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
+        return Frame(wish, tuple(self._column(column, wish) for column in wish.columns if column.shown))
 
-    def _column(self, motion: Motion, time: float) -> ColumnFrame:
+    def _column(self, column: Column, wish: Wish) -> ColumnFrame:
+        motion, time = self.motion(column, wish), wish.time
         pose = motion.pose(time)
-        if motion.deformation_bound(time) < INVISIBLE:
-            return ColumnFrame(motion, None, pose)
-        points = motion.deformed(time)
-        if not (np.isfinite(points).all() and np.isfinite(pose).all()):
-            raise InputError(f"the prediction at t = {time:.3f} s is not finite; the last good frame stays")
-        return ColumnFrame(motion, points, pose)
+        points = None if motion.deformation_bound(time) < INVISIBLE else motion.deformed(time)
+        body = motion.geometry.points if points is None else points
+        heights = body @ pose[2, :3].astype(np.float32) + np.float32(pose[2, 3])
+        lowest = float(heights.min())
+        if not (np.isfinite(heights).all() and np.isfinite(pose).all()):
+            raise InputError(f"{column.label} at t = {time:.3f} s is not finite; the last good frame stays")
+        return ColumnFrame(column, motion, points, pose, max(-lowest, 0.0), self._error(column, wish))
+
+    def _error(self, column: Column, wish: Wish) -> Error | None:
+        truth = self.truth_of(column, wish)
+        if truth is None or truth.extrapolates(wish.time) or column.predictor is None:
+            return None
+        predicted = self._solve(column, column.predictor, 1, truth.geometry, wish).vertices(wish.time)
+        true = truth.vertices(wish.time)
+        off = np.subtract(predicted, true, dtype=float)
+        distances = np.linalg.norm(off, axis=1)
+        worst = int(distances.argmax())
+        rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
+        return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
+
+    @property
+    def times(self) -> Times:
+        """The moments of curves: the frames of the window, and on to where one can look."""
+        window = self.schema.window
+        return window.start + np.arange(round(REACH * (window.stop - window.start) * window.rate) + 1) / window.rate
+
+    def curves(self, shown: ColumnFrame, wish: Wish) -> Curves:
+        """Of the whole motion that a column shows; made once for each."""
+        truth = self.truth_of(shown.column, wish)
+        known = self._curves.get(shown.column.key)
+        if known is None or known[0] is not shown.motion or known[1] is not truth:
+            made = self._make_curves(shown, truth, wish)
+            known = self._curves[shown.column.key] = (shown.motion, truth, made)
+        return known[2]
+
+    def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, wish: Wish) -> Curves:
+        motion, times = shown.motion, self.times
+        poses = motion.pose(times)
+        centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
+        height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
+        turn = np.degrees(np.arccos(np.clip((np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
+        error = None
+        if truth is not None and shown.column.predictor is not None:
+            predicted = self._solve(shown.column, shown.column.predictor, 1, truth.geometry, wish)
+            off = predicted.vertices(times) - truth.vertices(times)
+            error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
+            error[[truth.extrapolates(float(t)) for t in times]] = np.nan
+        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error)
 
     def largest_deformation(self, wish: Wish) -> float:
         """The time within the trained window at which the first visible column is deformed most."""
-        index = wish.visible.index(True)
+        column = next((column for column in wish.columns if column.shown), None)
+        if column is None:
+            return wish.time
         window = self.schema.window
         times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
-        return float(times[np.argmax(self.motion(index, wish).deformation_rms(times))])
+        return float(times[np.argmax(self.motion(column, wish).deformation_rms(times))])

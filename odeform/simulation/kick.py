@@ -1,6 +1,7 @@
 """Scene `kick`: a soft hollow ball on the floor gets a force pulse and is thrown, rolls and lands."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -45,12 +46,16 @@ def pulse_weights(rest: Floats, elevation: float) -> Floats:
 
 
 def simulate(
-    parameters: Parameters, rate: float | None = None, step: float = STEP, segments: int = SEGMENTS
+    parameters: Parameters,
+    rate: float | None = None,
+    step: float = STEP,
+    segments: int = SEGMENTS,
+    report: Callable[[float], None] = lambda _: None,
 ) -> Sequence:
     """One motion over the scene's window, frames at `rate` Hz (default: the window's).
 
-    The mesh is oriented with the pulse: the heading is a symmetry of the scene, and a mesh that turns with it keeps
-    this symmetry exact.
+    `report` is given the share that is done. The mesh is oriented with the pulse: the heading is a
+    symmetry of the scene, and a mesh that turns with it keeps this symmetry exact.
     """
     # here, so that looking at a scene and training on its data need no simulator
     from odeform.simulation.shell import run
@@ -63,7 +68,7 @@ def simulate(
     def force(time: float) -> Floats | None:
         return load * math.sin(math.pi * time / PULSE) ** 2 if time < PULSE else None
 
-    times, vertices = run(body, window.stop, rate or window.rate, force)
+    times, vertices = run(body, window.stop, rate or window.rate, force, report=lambda now: report(now / window.stop))
     turned = vertices @ rotation_z(parameters["azimuth"]).T
     return Sequence(times, turned.astype(np.float32), mesh.faces, body.weights, dict(parameters))
 

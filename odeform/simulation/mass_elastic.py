@@ -1,6 +1,7 @@
 """Scene `mass-elastic`: a soft hollow ball falls, lands, bounces and comes to rest (the paper's drop)."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -29,11 +30,16 @@ SCHEMA = Schema(
 
 
 def simulate(
-    parameters: Parameters, rate: float | None = None, step: float = STEP, segments: int = SEGMENTS
+    parameters: Parameters,
+    rate: float | None = None,
+    step: float = STEP,
+    segments: int = SEGMENTS,
+    report: Callable[[float], None] = lambda _: None,
 ) -> Sequence:
     """One drop until the ball rests, frames at `rate` Hz (default: the window's).
 
-    A stress-free ball falls as a point does; the simulator takes over shortly before it lands.
+    `report` is given the share that is done. A stress-free ball falls as a point does; the simulator takes
+    over shortly before it lands.
     """
     # here, so that looking at a scene and training on its data need no simulator
     from odeform.simulation.shell import Rest, SimulationError, run
@@ -48,7 +54,14 @@ def simulate(
     falling = np.arange(math.ceil(begin * rate - 1e-9)) / rate
     height = HEIGHT - 0.5 * GRAVITY * falling**2
     fall = rest + height[:, None, None] * np.array([0.0, 0.0, 1.0])
-    times, vertices = run(body, LIMIT, rate, begin=begin, rest=Rest(REST_SPEED, REST_TIME))
+    times, vertices = run(
+        body,
+        LIMIT,
+        rate,
+        begin=begin,
+        rest=Rest(REST_SPEED, REST_TIME),
+        report=lambda now: report(now / SCHEMA.window.stop),
+    )
     if times[-1] > LIMIT - 1.0 / rate:
         raise SimulationError(f"the ball has not come to rest within {LIMIT:g} s")
     return Sequence(

@@ -158,10 +158,12 @@ def run(
     force: Callable[[float], Floats | None] = lambda _: None,
     begin: float = 0.0,
     rest: Rest | None = None,
+    report: Callable[[float], None] = lambda _: None,
 ) -> tuple[Floats, Floats]:
     """Step the body from `begin` to `until` seconds, or till it rests.
 
-    Returns times (T,) on the grid k / rate within that span, and vertices (T, N, 3).
+    Returns times (T,) on the grid k / rate within that span, and vertices (T, N, 3). `report` is called every 50 steps
+    with the seconds that are done.
     Frames fall between steps where the rate does not divide them: positions are then interpolated with the
     velocities of both sides (cubic Hermite), so that the step never depends on the frames asked for.
     """
@@ -173,6 +175,8 @@ def run(
     still = 0.0
     for index in range(1, round((until - begin) / step) + 1):
         body.step(force(now + 0.5 * step))
+        if index % 50 == 0:
+            report(now)
         after, there, speed_there = begin + index * step, body.positions, body.velocities.copy()
         while len(frames) < len(times) and times[len(frames)] <= after + 1e-9:
             s = (times[len(frames)] - now) / step

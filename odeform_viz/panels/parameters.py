@@ -1,16 +1,18 @@
-"""Sliders of the scene's parameters, and which models are shown."""
+"""Sliders of the scene's parameters, where they were trained, presets; and how finely to integrate."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
+import numpy as np
 import viser
 
 from odeform.errors import InputError
-from odeform.schema import Parameter
-from odeform_viz.session import Session
+from odeform.schema import Parameter, Schema
+from odeform.types import Floats
 
-__all__ = ["ParameterPanel"]
+__all__ = ["ParameterPanel", "presets", "slider_range"]
 
 BEYOND = 0.2  # of the trained span that a slider reaches beyond it
+TICKS = 160  # places along a slider that a training sample can be seen at
 
 
 def slider_range(parameter: Parameter) -> tuple[float, float]:
@@ -24,55 +26,127 @@ def slider_range(parameter: Parameter) -> tuple[float, float]:
     return low, parameter.high + margin
 
 
-class ParameterPanel:
-    """One slider a parameter, with its unit and its trained range as marks."""
+def presets(schema: Schema) -> dict[str, dict[str, float]]:
+    """The defaults, and the corners of the trained range of the first two learned parameters."""
+    defaults = {p.name: p.default for p in schema.parameters}
+    out = {"defaults": defaults}
+    first, second = schema.learned[0], schema.learned[min(1, len(schema.learned) - 1)]
+    for one in ("low", "high"):
+        for two in ("low", "high"):
+            if first is not second:
+                name = f"{one} {first.name}, {two} {second.name}"
+                out[name] = {**defaults, first.name: getattr(first, one), second.name: getattr(second, two)}
+    return out
 
-    def __init__(self, server: viser.ViserServer, session: Session, wake: Callable[[], None]) -> None:
+
+def samples_svg(parameter: Parameter, samples: Floats | None, value: float) -> str:
+    """Where on a slider the training samples lie, and a warning where the value is beyond them."""
+    low, high = slider_range(parameter)
+    inside = parameter.inside(value)
+
+    def at(x: float) -> float:
+        return 100.0 * (x - low) / (high - low)
+
+    band = (
+        f'<rect x="{at(parameter.low):.1f}%" width="{at(parameter.high) - at(parameter.low):.1f}%" y="0" height="5" '
+        f'fill="#dfe6ee"/>'
+    )
+    marks = ""
+    if samples is not None:
+        places = np.unique(np.round((samples - low) / (high - low) * TICKS).astype(int))
+        marks = "".join(
+            f'<rect x="{100.0 * p / TICKS:.2f}%" width="1" y="0" height="5" fill="#4a6a8c"/>' for p in places
+        )
+    warning = (
+        ""
+        if inside
+        else f'<div style="color:#b3450c;font-size:0.75em">⚠ beyond the trained '
+        f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}</div>"
+    )
+    return (
+        f'<div style="margin:-0.9em 4.9em 0.1em 6.9em"><svg width="100%" height="5" style="display:block">{band}{marks}'
+        f"</svg>{warning}</div>"
+    )
+
+
+class ParameterPanel:
+    """One slider a parameter, with its unit, its trained range and the samples in it."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        schema: Schema,
+        samples: Mapping[str, Floats],
+        qualities: tuple[str, ...],
+        wake: Callable[[], None],
+    ) -> None:
+        """`samples` are the values of the training sequences by parameter; `qualities` the ways to integrate."""
+        self._schema, self._samples, self._qualities = schema, samples, qualities
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        self._defaults = {p.name: p.default for p in session.schema.parameters}
-        with server.gui.add_folder("Parameters"):
-            for parameter in session.schema.parameters:
+        self._strips: dict[str, viser.GuiHtmlHandle] = {}
+        self._presets = presets(schema)
+        gui = server.gui
+        with gui.add_folder("Parameters"):
+            for parameter in schema.parameters:
                 low, high = slider_range(parameter)
-                slider = server.gui.add_slider(
+                slider = gui.add_slider(
                     f"{parameter.name} ({parameter.unit})",
                     min=round(low, 4),
                     max=round(high, 4),
                     step=round((high - low) / 1000, 5),
                     initial_value=parameter.default,
-                    marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}")),
                     hint=f"{parameter.description}; trained from {parameter.low:.3g} to {parameter.high:.3g}",
                 )
                 slider.on_update(lambda _: wake())
                 self._sliders[parameter.name] = slider
-            reset = server.gui.add_button("Reset parameters", color="gray")
-            reset.on_click(lambda _: self._reset())
+                if parameter.role != "azimuth":
+                    self._strips[parameter.name] = gui.add_html("")
+            preset = gui.add_dropdown("preset", tuple(self._presets), hint="corners of the trained range")
+            preset.on_update(lambda event: self._choose(str(event.target.value), event.client_id is not None))
+            reset = gui.add_button_group("reset", ("all", *(p.name for p in schema.parameters)))
+            reset.on_click(lambda event: self._reset(str(event.target.value)))
             self._quality = None
-            if session.qualities:
-                initial = "balanced" if "balanced" in session.qualities else session.qualities[0]
-                self._quality = server.gui.add_dropdown(
-                    "quality", session.qualities, initial_value=initial, hint="how finely the ODE is integrated"
+            if qualities:
+                initial = "balanced" if "balanced" in qualities else qualities[0]
+                self._quality = gui.add_dropdown(
+                    "quality", qualities, initial_value=initial, hint="how finely the ODE is integrated"
                 )
                 self._quality.on_update(lambda _: wake())
-            self._visible = []
-            if len(session.columns) > 1:
-                for column in session.columns:
-                    box = server.gui.add_checkbox(column.label, initial_value=True, hint="show this model")
-                    box.on_update(lambda _: wake())
-                    self._visible.append(box)
-        self._known = session.qualities
+        self.show()
 
-    def _reset(self) -> None:
+    def _choose(self, name: str, by_hand: bool) -> None:
+        if by_hand and name in self._presets:
+            self.set(self._presets[name])
+
+    def _reset(self, name: str) -> None:
+        defaults = self._presets["defaults"]
+        self.set(defaults if name == "all" else {name: defaults[name]})
+
+    def set(self, parameters: Mapping[str, float]) -> None:
+        """Move the sliders. `InputError` for what the scene has not or no motion can have."""
+        complete = self._schema.complete({**self.parameters(), **parameters})
         for name, slider in self._sliders.items():
-            slider.value = self._defaults[name]
+            slider.value = min(max(complete[name], slider.min), slider.max)
+
+    def set_quality(self, name: str) -> None:
+        if self._quality is not None and name in self._qualities:
+            self._quality.value = name
 
     def parameters(self) -> dict[str, float]:
         return {name: slider.value for name, slider in self._sliders.items()}
 
     def quality(self) -> str:
         value = self._quality.value if self._quality else "balanced"
-        if self._known and value not in self._known:
-            raise InputError(f"quality: expected one of {', '.join(self._known)}, got {value!r}")
+        if self._quality and value not in self._qualities:
+            raise InputError(f"quality: expected one of {', '.join(self._qualities)}, got {value!r}")
         return value
 
-    def visible(self) -> tuple[bool, ...]:
-        return tuple(bool(box.value) for box in self._visible) or (True,)
+    def show(self) -> None:
+        """Refresh what stands at the sliders; called by the worker."""
+        for parameter in self._schema.parameters:
+            strip = self._strips.get(parameter.name)
+            if strip is not None:
+                value = self._sliders[parameter.name].value
+                content = samples_svg(parameter, self._samples.get(parameter.name), value)
+                if strip.content != content:
+                    strip.content = content

@@ -6,11 +6,11 @@ import viser
 
 from odeform.schema import Window
 from odeform_viz.clock import Clock
+from odeform_viz.session import REACH
 
 __all__ = ["PlaybackPanel"]
 
 SPEEDS = {"true speed": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/50": 0.02}
-REACH = 1.5  # windows that the time slider spans
 
 
 class PlaybackPanel:

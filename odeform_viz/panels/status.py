@@ -2,29 +2,45 @@
 
 import viser
 
-from odeform_viz.session import Column, ColumnFrame, Frame
+from odeform_viz.heat import BANDS
+from odeform_viz.session import ColumnFrame, Frame
 
 __all__ = ["StatusPanel", "describe", "moment_in_words"]
 
 
 def moment_in_words(frame: Frame) -> str:
-    """Trained, or what is extrapolated: time and parameters."""
-    shown = next((column for column in frame.columns if column is not None), None)
-    if shown is None:
+    """Where the moment lies: on a trained frame, between two, or beyond; and parameters outside of what was trained."""
+    models = [shown for shown in frame.columns if shown.column.predictor]
+    if not frame.columns:
         return "nothing shown"
-    beyond = list(shown.motion.outside)
-    if shown.motion.extrapolates(frame.wish.time):
+    if not models:
+        return "the truth alone"
+    motion, time = models[0].motion, frame.wish.time
+    beyond = list(dict.fromkeys(name for shown in models for name in shown.motion.outside))
+    if motion.extrapolates(time):
         beyond.insert(0, "time")
-    return f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained" if beyond else "inside what was trained"
+    sunk = [shown.column.label for shown in frame.columns if shown.sunk]
+    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained" if beyond else ""
+    if not words:
+        window = motion.schema.window
+        phase = (time - window.start) * window.rate
+        on = abs(phase - round(phase)) < 0.02
+        words = f"inside what was trained, {'on a' if on else 'between two'} trained frame{'s' * (not on)}"
+    if sunk:
+        deepest = max(shown.depth for shown in frame.columns)
+        words += f"  \n⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor"
+    return words
 
 
-def describe(column: Column, frame: ColumnFrame, settled: bool = True) -> str:
+def describe(shown: ColumnFrame, settled: bool = True) -> str:
     """Solver, work, solver error and the checkpoint's test error of one column, as Markdown.
 
     The solver error costs as much as the solution: it is left open until the user's hand has `settled`.
     """
-    stats = frame.stats
+    column, stats = shown.column, shown.stats
     lines = [f"**{column.label}** · {len(column.geometry.points):,} points"]
+    if column.predictor is None:
+        return "  \n".join([*lines, stats.solver, "between its frames cubic"])
     if stats.evaluations:
         error = "…" if not settled else "unknown"
         if settled and stats.solver_error_mm is not None:
@@ -33,35 +49,56 @@ def describe(column: Column, frame: ColumnFrame, settled: bool = True) -> str:
         lines.append(f"solver error ≈ {error} (estimated)")
     else:
         lines.append(f"{stats.solver} · no ODE · {stats.wall_ms:.1f} ms")
+    if shown.error is not None:
+        e = shown.error
+        lines.append(f"now off the truth by {e.rmse_mm:.2f} mm RMSE, {e.mae_mm:.2f} MAE, {e.worst_mm:.2f} at worst")
     score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
     if score is not None:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
     if stats.status != "ok":
-        lines.append(
-            f"⚠ **{stats.status}**: showing the last good state, t = {frame.motion.trajectory.last_good:.3f} s"
-        )
+        last = shown.motion.trajectory.last_good  # pyright: ignore[reportAttributeAccessIssue]
+        lines.append(f"⚠ **{stats.status}**: showing the last good state, t = {last:.3f} s")
     return "  \n".join(lines)
 
 
-class StatusPanel:
-    """Two texts, sent only when they change."""
+def scale_html(top: float) -> str:
+    """The colour bar of errors, in mm."""
+    cells = "".join(f'<div style="flex:1;height:10px;background:rgb{color}"></div>' for color in BANDS)
+    return (
+        f'<div style="padding:0 1em;font-size:0.8em"><div style="display:flex">{cells}</div>'
+        f'<div style="display:flex;justify-content:space-between"><span>0</span><span>distance to the truth</span>'
+        f"<span>≥ {top:g} mm</span></div></div>"
+    )
 
-    def __init__(self, server: viser.ViserServer, columns: tuple[Column, ...]) -> None:
-        self._columns = columns
+
+class StatusPanel:
+    """Texts, sent only when they change."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
         with server.gui.add_folder("Status"):
             self._moment = server.gui.add_markdown("")
+            self._message = server.gui.add_markdown("", visible=False)
+            self._scale = server.gui.add_html("", visible=False)
             self._details = server.gui.add_markdown("")
 
-    def show(self, frame: Frame, settled: bool) -> None:
-        shown = zip(self._columns, frame.columns, strict=True)
+    def show(self, frame: Frame, settled: bool, heat: float | None, away: bool) -> None:
+        """`heat` is the top of the colour scale, where errors are painted; `away`, that the sliders left the truth."""
         _say(self._moment, moment_in_words(frame))
-        _say(self._details, "\n\n".join(describe(column, one, settled) for column, one in shown if one is not None))
+        note = "The truth is of other parameters than the sliders: no errors shown." if away else ""
+        _say(self._message, note)
+        painted = heat is not None and any(shown.error for shown in frame.columns)
+        self._scale.visible = painted
+        if painted and heat is not None:
+            _say(self._scale, scale_html(heat))
+        _say(self._details, "\n\n".join(describe(shown, settled) for shown in frame.columns))
 
     def show_error(self, message: str) -> None:
         """The last good frame stays on screen."""
         _say(self._moment, f"⚠ **{message}**")
 
 
-def _say(text: viser.GuiMarkdownHandle, content: str) -> None:
+def _say(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:
     if text.content != content:
         text.content = content
+    if isinstance(text, viser.GuiMarkdownHandle):
+        text.visible = bool(content)

@@ -11,9 +11,9 @@ from odeform import InputError
 from odeform.predictor import Predictor
 from odeform_viz.app import App
 from odeform_viz.bench import BODY
+from odeform_viz.columns import Column
 from odeform_viz.loopback import LoopbackClient
-from odeform_viz.scene import checker_parts
-from odeform_viz.session import Column
+from odeform_viz.shapes import checker_parts
 
 
 @pytest.fixture
@@ -31,12 +31,11 @@ def app(kick: Predictor, port: int, capfd: pytest.CaptureFixture[str]) -> Iterat
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_has_the_sliders_of_the_scene_and_nothing_else_to_set(app: App, port: int) -> None:
+def test_has_the_sliders_of_the_scene(app: App, port: int) -> None:
     with LoopbackClient(port) as client:
         for parameter in app.session.schema.parameters:
             assert f"{parameter.name} ({parameter.unit})" in client.controls
         assert "time (s)" in client.controls
-        assert "odeform" not in client.controls  # nothing to switch with one column
 
 
 def test_opens_playing_and_a_hand_on_time_stops_it(app: App, port: int) -> None:

@@ -8,19 +8,19 @@ import rerun as rr
 
 from odeform import InputError
 from odeform.predictor import Predictor
+from odeform_viz.columns import Column, Columns
 from odeform_viz.recorder import Recorder
-from odeform_viz.session import Column, Session, Wish
+from odeform_viz.session import Session, Wish
 
 
 def _record(kick: Predictor, path: Path, times: list[float]) -> list[np.ndarray]:
-    session = Session([Column("odeform", kick, kick.rest)])
-    recorder = Recorder(path, session.columns)
+    session, columns = Session(kick.schema), Columns.of([Column("odeform", kick, kick.rest)]).all
+    recorder = Recorder(path)
     shown = []
     for time in times:
-        frame = session.frame(Wish(session.schema.complete({"mass": 0.4}), time, "balanced", (True,)))
+        frame = session.frame(Wish(session.schema.complete({"mass": 0.4}), time, "balanced", columns))
         recorder.log(frame)
         column = frame.columns[0]
-        assert column is not None
         shown.append(column.motion.deformed(time))
     recorder.close()
     return shown
@@ -53,4 +53,4 @@ def test_positions_parameters_and_provenance_read_back(kick: Predictor, tmp_path
 def test_an_unwritable_place_is_refused_at_once(kick: Predictor, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="recording"):
-        Recorder(tmp_path / "file" / "session.rrd", [Column("odeform", kick, kick.rest)])
+        Recorder(tmp_path / "file" / "session.rrd")

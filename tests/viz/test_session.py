@@ -6,48 +6,59 @@ import numpy as np
 import pytest
 
 from odeform import InputError
+from odeform.dataset.index import Dataset
+from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
+from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
-from odeform_viz.session import Column, Session, Wish
+from odeform_viz.session import Session, Wish
 
 
 @pytest.fixture
-def session(predictors: dict[str, Predictor]) -> Session:
-    return Session([Column(name, p, p.rest) for name, p in predictors.items()])
+def columns(predictors: dict[str, Predictor]) -> tuple[Column, ...]:
+    return Columns.of([Column(name, p, p.rest) for name, p in predictors.items()]).all
 
 
 @pytest.fixture
-def wish(session: Session) -> Wish:
-    return Wish(session.schema.complete({}), 0.02, "balanced", (True, True, True))
+def session(columns: tuple[Column, ...]) -> Session:
+    return Session(columns[0].source.schema)
+
+
+@pytest.fixture
+def wish(session: Session, columns: tuple[Column, ...]) -> Wish:
+    return Wish(session.schema.complete({}), 0.02, "balanced", columns)
+
+
+def _alone(predictor: Predictor, time: float = 0.02) -> tuple[Session, Wish]:
+    session = Session(predictor.schema)
+    columns = Columns.of([Column(predictor.model, predictor, predictor.rest)]).all
+    return session, Wish(session.schema.complete({}), time, "balanced", columns)
 
 
 def test_time_alone_never_integrates_again(session: Session, wish: Wish) -> None:
     first = session.frame(wish).columns[0]
     later = session.frame(replace(wish, time=0.4)).columns[0]
-    assert first is not None
-    assert later is not None
     assert later.motion is first.motion
-    changed = session.frame(replace(wish, parameters={**wish.parameters, "mass": 0.7})).columns[0]
-    assert changed is not None
+    changed = session.frame(replace(wish, parameters={**wish.parameters, "mass": 0.71})).columns[0]
     assert changed.motion is not first.motion
 
 
 def test_hidden_columns_are_not_computed(session: Session, wish: Wish, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
-    for column in session.columns:
-        solve = column.predictor.solve
+    for column in wish.columns:
+        solve = column.source.solve
         monkeypatch.setattr(
-            column.predictor, "solve", lambda *a, _s=solve, _c=column.label, **k: (asked.append(_c), _s(*a, **k))[1]
+            column.source, "solve", lambda *a, _s=solve, _c=column.label, **k: (asked.append(_c), _s(*a, **k))[1]
         )
-    frame = session.frame(replace(wish, visible=(False, True, False)))
-    assert asked == [session.columns[1].label]
-    assert [column is None for column in frame.columns] == [True, False, True]
+    shown = tuple(replace(column, shown=index == 1) for index, column in enumerate(wish.columns))
+    frame = session.frame(replace(wish, columns=shown))
+    assert asked == [wish.columns[1].label]
+    assert [column.column.label for column in frame.columns] == asked
 
 
 def test_a_frame_is_what_the_predictor_says(kick: Predictor) -> None:
-    session = Session([Column("odeform", kick, kick.rest)])
-    shown = session.frame(Wish(session.schema.complete({}), 0.02, "balanced", (True,))).columns[0]
-    assert shown is not None
+    session, wish = _alone(kick)
+    shown = session.frame(wish).columns[0]
     assert shown.points is not None
     motion = kick.solve(kick.rest)
     np.testing.assert_array_equal(shown.points, motion.deformed(0.02))
@@ -55,9 +66,52 @@ def test_a_frame_is_what_the_predictor_says(kick: Predictor) -> None:
     np.testing.assert_allclose(moved, motion.vertices(0.02), atol=1e-6)
 
 
+def test_a_pinned_column_does_not_heed_the_sliders(session: Session, wish: Wish) -> None:
+    first = wish.columns[0]
+    pinned = replace(first, key=99, pinned={**wish.parameters, "mass": 0.9})
+    heavy = replace(wish, parameters={**wish.parameters, "mass": 0.6}, columns=(first, pinned))
+    under, apart = session.frame(heavy).columns
+    assert under.motion.parameters["mass"] == 0.6
+    assert apart.motion.parameters["mass"] == 0.9
+    later = session.frame(replace(heavy, parameters=wish.parameters)).columns[1]
+    assert later.motion is apart.motion
+
+
+@pytest.fixture
+def truth(dataset: Dataset, session: Session) -> Column:
+    motion = RecordedMotion(session.schema, next(dataset.sequences("test")))
+    return Column("truth", motion, motion.geometry, key=50)
+
+
+def test_the_error_is_that_against_the_truth_at_its_vertices(session: Session, wish: Wish, truth: Column) -> None:
+    record = truth.truth
+    assert record is not None
+    time = float(record.sequence.times[12])
+    at = replace(wish, parameters=record.parameters, time=time, columns=(*wish.columns, truth))
+    shown = session.frame(at).columns[0]
+    assert shown.error is not None
+    predicted = wish.columns[0].source.solve(record.geometry, record.parameters).vertices(time)
+    off = predicted.astype(float) - record.sequence.vertices[12]
+    assert shown.error.rmse_mm == pytest.approx(1e3 * np.sqrt((off**2).mean()), rel=1e-5)
+    assert shown.error.worst_mm == pytest.approx(1e3 * np.linalg.norm(off, axis=1).max(), rel=1e-5)
+    curve = session.curves(shown, at).error
+    assert curve is not None
+    assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rmse_mm, rel=1e-4)
+
+
+def test_without_its_parameters_the_truth_tells_no_error(session: Session, wish: Wish, truth: Column) -> None:
+    record = truth.truth
+    assert record is not None
+    moved = {**record.parameters, "mass": record.parameters["mass"] * 1.05}
+    columns = (*wish.columns, truth)
+    assert all(s.error is None for s in session.frame(replace(wish, parameters=moved, columns=columns)).columns)
+    foreign = tuple(replace(column, foreign=True) for column in wish.columns)
+    at = replace(wish, parameters=record.parameters, columns=(*foreign, truth))
+    assert all(shown.error is None for shown in session.frame(at).columns)
+
+
 def test_at_rest_a_pose_says_it_all(session: Session, wish: Wish) -> None:
     shown = session.frame(replace(wish, time=0.0)).columns[0]
-    assert shown is not None
     assert shown.points is None
     np.testing.assert_allclose(shown.pose, np.eye(4), atol=1e-12)
 
@@ -68,18 +122,9 @@ def test_impossible_times_are_refused(session: Session, wish: Wish, time: float)
         session.frame(replace(wish, time=time))
 
 
-def test_another_scene_is_refused(session: Session) -> None:
-    first, other = session.columns[:2]
-
-    class Foreign:
-        schema = replace(other.predictor.schema, scene="mass-elastic")
-
-    with pytest.raises(InputError, match="mass-elastic"):
-        Session([first, Column("foreign", Foreign(), other.geometry)])  # pyright: ignore[reportArgumentType]
-
-
 def test_the_moment_in_words(session: Session, wish: Wish) -> None:
-    assert "inside" in moment_in_words(session.frame(wish))
+    assert "between two" in moment_in_words(session.frame(replace(wish, time=0.02)))
+    assert "on a trained frame" in moment_in_words(session.frame(replace(wish, time=0.025)))
     late = moment_in_words(session.frame(replace(wish, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
@@ -87,16 +132,21 @@ def test_the_moment_in_words(session: Session, wish: Wish) -> None:
     assert "mass" in heavy
 
 
+def test_a_body_below_the_floor_is_remarked(session: Session, wish: Wish) -> None:
+    frame = session.frame(wish)
+    sunk = replace(frame.columns[0], depth=0.012)
+    assert sunk.sunk
+    assert "12 mm below the floor" in moment_in_words(replace(frame, columns=(sunk,)))
+
+
 def test_status_names_solver_error_as_such(session: Session, wish: Wish) -> None:
     shown = session.frame(wish).columns[0]
-    assert shown is not None
-    text = describe(session.columns[0], shown)
+    text = describe(shown)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
     assert f"{shown.stats.evaluations} evaluations" in text
 
 
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:
-    session = Session([Column("odeform", kick, kick.rest)])
-    moment = session.largest_deformation(Wish(session.schema.complete({}), 0.0, "balanced", (True,)))
-    assert 0.005 < moment < 0.03
+    session, wish = _alone(kick, 0.0)
+    assert 0.005 < session.largest_deformation(wish) < 0.03

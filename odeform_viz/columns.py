@@ -1,0 +1,102 @@
+"""What stands side by side: models under the sliders, models pinned at parameters of their own, the truth."""
+
+import itertools
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from odeform.errors import InputError
+from odeform.model.recorded import RecordedMotion
+from odeform.predictor import Predictor
+from odeform.schema import Schema
+from odeform.types import Geometry
+
+__all__ = ["Column", "Columns"]
+
+MOST = 12  # columns; more than that nobody tells apart
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One motion beside the others: of a model or a record, of a shape, at the sliders or `pinned`."""
+
+    label: str
+    source: Predictor | RecordedMotion
+    geometry: Geometry
+    pinned: Mapping[str, float] | None = None
+    foreign: bool = False
+    """Whether the shape is another than the body that was trained."""
+    shown: bool = True
+    key: int = -1
+    """Given by `Columns`; the same while a column is shown and hidden."""
+
+    @property
+    def truth(self) -> RecordedMotion | None:
+        return self.source if isinstance(self.source, RecordedMotion) else None
+
+    @property
+    def predictor(self) -> Predictor | None:
+        return None if isinstance(self.source, RecordedMotion) else self.source
+
+
+class Columns:
+    """The columns at hand, changed by callbacks of any thread and read as snapshots."""
+
+    def __init__(self, schema: Schema) -> None:
+        self._schema = schema
+        self._columns: tuple[Column, ...] = ()
+        self._lock = threading.Lock()
+        self._keys = itertools.count()
+
+    @property
+    def all(self) -> tuple[Column, ...]:
+        return self._columns
+
+    def add(self, *columns: Column) -> None:
+        """At the end; labels already taken are numbered. A record replaces the one before: there is one truth."""
+        with self._lock:
+            kept = list(self._columns)
+            for column in columns:
+                lacks = self._lacks(column)
+                if column.truth is not None:
+                    kept = [c for c in kept if c.truth is None]
+                label = f"{column.label} (no {', '.join(lacks)})" if lacks else column.label
+                kept.append(replace(column, label=_unused(label, {c.label for c in kept}), key=next(self._keys)))
+            if len(kept) > MOST:
+                raise InputError(f"{len(kept)} columns: expected at most {MOST}; remove some first")
+            self._columns = tuple(kept)
+
+    def _lacks(self, column: Column) -> list[str]:
+        """The sliders that a model does not heed. `InputError` for another scene."""
+        schema = column.source.schema
+        if schema.scene != self._schema.scene:
+            raise InputError(f"cannot compare {column.label}: it is of scene {schema.scene}, not {self._schema.scene}")
+        heeded = {p.name for p in schema.parameters}
+        return [p.name for p in self._schema.parameters if p.name not in heeded]
+
+    def remove(self, key: int) -> None:
+        with self._lock:
+            self._columns = tuple(c for c in self._columns if c.key != key)
+
+    def show(self, key: int, shown: bool) -> None:
+        with self._lock:
+            self._columns = tuple(replace(c, shown=shown) if c.key == key else c for c in self._columns)
+
+    def reshape(self, geometry: Geometry, foreign: bool) -> None:
+        """Another shape for all models."""
+        with self._lock:
+            self._columns = tuple(
+                c if c.truth else replace(c, geometry=geometry, foreign=foreign) for c in self._columns
+            )
+
+    @classmethod
+    def of(cls, columns: Sequence[Column]) -> "Columns":
+        """`InputError` for models of different scenes."""
+        out = cls(columns[0].source.schema)
+        out.add(*columns)
+        return out
+
+
+def _unused(label: str, taken: set[str]) -> str:
+    names = itertools.chain([label], (f"{label} #{n}" for n in itertools.count(2)))
+    return next(name for name in names if name not in taken)

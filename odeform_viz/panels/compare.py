@@ -1,0 +1,135 @@
+"""What stands beside what: columns to add, pin, sweep and hide, and how they are arranged."""
+
+from collections.abc import Callable, Mapping
+
+import viser
+
+import odeform
+from odeform.errors import InputError
+from odeform.schema import Parameter, Schema
+from odeform_viz.columns import Column, Columns
+
+__all__ = ["ComparePanel", "pinned_label", "sweep"]
+
+SWEEP = 5  # columns of a sweep, as in the paper's figure
+
+
+def pinned_label(name: str, parameters: Mapping[str, float], schema: Schema, only: Parameter | None = None) -> str:
+    """A model's name with the parameters it is pinned at."""
+    named = [only] if only else list(schema.learned)
+    return f"{name} at " + ", ".join(f"{p.name} {parameters[p.name]:.3g}" for p in named)
+
+
+def sweep(column: Column, parameters: Mapping[str, float], schema: Schema, swept: Parameter) -> list[Column]:
+    """The model of a column pinned at even steps of one parameter over its trained range, the others as they are."""
+    out = []
+    for index in range(SWEEP):
+        at = {**parameters, swept.name: swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0)}
+        label = f"{swept.name} {at[swept.name]:.3g} {swept.unit}"
+        out.append(Column(label, column.source, column.geometry, pinned=at, foreign=column.foreign))
+    return out
+
+
+class ComparePanel:
+    """Changes the columns; what it shows of them it reads back from them."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        schema: Schema,
+        columns: Columns,
+        models: Mapping[str, str],
+        parameters: Callable[[], dict[str, float]],
+        wake: Callable[[], None],
+        say: Callable[[str], None],
+    ) -> None:
+        """`models` are the checkpoints at hand, by name; `parameters` reads the sliders; `say` shows a message."""
+        self._server, self._schema, self._columns = server, schema, columns
+        self._models, self._parameters, self._wake, self._say = models, parameters, wake, say
+        self._boxes: dict[int, viser.GuiCheckboxHandle] = {}
+        gui = server.gui
+        self._folder = gui.add_folder("Columns")
+        with self._folder:
+            self._clear = gui.add_button("Remove hidden columns", color="gray", visible=False)
+            self._clear.on_click(lambda _: self._guarded(self._remove_hidden))
+        with gui.add_folder("Add"):
+            if models:
+                self._model = gui.add_dropdown("model", tuple(models), hint="checkpoints of this scene")
+                gui.add_button("Add model").on_click(lambda _: self._guarded(self._add))
+            pin = gui.add_button("Pin these parameters", hint="keeps a copy at the sliders' values: compare A with B")
+            pin.on_click(lambda _: self._guarded(self._pin))
+            self._swept = gui.add_dropdown("parameter", tuple(p.name for p in schema.learned))
+            over = gui.add_button(f"Sweep it in {SWEEP} columns", hint="over its trained range, the others as they are")
+            over.on_click(lambda _: self._guarded(self._sweep))
+        with gui.add_folder("Arrangement"):
+            self._overlay = gui.add_checkbox("overlay", False, hint="one over the other instead of side by side")
+            self._heat = gui.add_checkbox("error colours", True, hint="distance to the truth on the surface")
+            for box in (self._overlay, self._heat):
+                box.on_update(lambda _: wake())
+        self.refresh()
+
+    @property
+    def overlay(self) -> bool:
+        return bool(self._overlay.value)
+
+    @property
+    def heat(self) -> bool:
+        return bool(self._heat.value)
+
+    def _guarded(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except InputError as error:
+            self._say(str(error))
+        self.refresh()
+        self._wake()
+
+    def _first(self) -> Column:
+        """The model that is pinned and swept: the first under the sliders."""
+        return next(c for c in self._columns.all if c.predictor is not None)
+
+    def _add(self) -> None:
+        if self._model.value not in self._models:
+            raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
+        like = self._first()
+        predictor = odeform.load(self._models[self._model.value])
+        shape = like.geometry if like.foreign else predictor.rest
+        self._columns.add(Column(predictor.model, predictor, shape, foreign=like.foreign))
+
+    def _pin(self) -> None:
+        like, parameters = self._first(), self._parameters()
+        label = pinned_label(like.source.schema.scene and like.label.split(" at ")[0], parameters, self._schema)
+        self._columns.add(Column(label, like.source, like.geometry, pinned=parameters, foreign=like.foreign))
+
+    def _sweep(self) -> None:
+        swept = next((p for p in self._schema.learned if p.name == self._swept.value), None)
+        if swept is None:
+            raise InputError(f"parameter: expected one that is learned, got {self._swept.value!r}")
+        for column in self._columns.all:
+            self._columns.show(column.key, False)
+        self._columns.add(*sweep(self._first(), self._parameters(), self._schema, swept))
+
+    def _remove_hidden(self) -> None:
+        first = self._first()
+        for column in self._columns.all:
+            if not column.shown and column is not first:
+                self._columns.remove(column.key)
+
+    def refresh(self) -> None:
+        """One box a column."""
+        at_hand = {column.key: column for column in self._columns.all}
+        for key in [key for key in self._boxes if key not in at_hand]:
+            self._boxes.pop(key).remove()
+        with self._folder:
+            for key, column in at_hand.items():
+                if key not in self._boxes:
+                    box = self._server.gui.add_checkbox(column.label, column.shown, hint="show this column")
+                    box.on_update(lambda event, key=key: self._tick(key, bool(event.target.value)))
+                    self._boxes[key] = box
+                self._boxes[key].value = column.shown
+        self._clear.visible = len(at_hand) > 1 and any(not c.shown for c in at_hand.values())
+
+    def _tick(self, key: int, shown: bool) -> None:
+        self._columns.show(key, shown)
+        self._clear.visible = any(not c.shown for c in self._columns.all)
+        self._wake()
