@@ -92,6 +92,8 @@ def train(
         arrays={
             **arrays,
             **data.space.arrays(),
+            # viewers show where the model was taught
+            "training.theta": data.theta["train"].astype(np.float32),
             "rest.points": np.asarray(rest.points, dtype=np.float32),
             "rest.faces": np.asarray(rest.faces, dtype=np.int32),
         },

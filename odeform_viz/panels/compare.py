@@ -14,10 +14,9 @@ __all__ = ["ComparePanel", "pinned_label", "sweep"]
 SWEEP = 5  # columns of a sweep, as in the paper's figure
 
 
-def pinned_label(name: str, parameters: Mapping[str, float], schema: Schema, only: Parameter | None = None) -> str:
+def pinned_label(name: str, parameters: Mapping[str, float], schema: Schema) -> str:
     """A model's name with the parameters it is pinned at."""
-    named = [only] if only else list(schema.learned)
-    return f"{name} at " + ", ".join(f"{p.name} {parameters[p.name]:.3g}" for p in named)
+    return f"{name} at " + ", ".join(f"{p.name} {parameters[p.name]:.3g}" for p in schema.learned)
 
 
 def sweep(column: Column, parameters: Mapping[str, float], schema: Schema, swept: Parameter) -> list[Column]:
@@ -55,11 +54,15 @@ class ComparePanel:
         with gui.add_folder("Add"):
             if models:
                 self._model = gui.add_dropdown("model", tuple(models), hint="checkpoints of this scene")
-                gui.add_button("Add model").on_click(lambda _: self._guarded(self._add))
-            pin = gui.add_button("Pin these parameters", hint="keeps a copy at the sliders' values: compare A with B")
+                gui.add_button("Add model", color="gray").on_click(lambda _: self._guarded(self._add))
+            pin = gui.add_button(
+                "Pin these parameters", color="gray", hint="keeps a copy at the sliders' values: compare A with B"
+            )
             pin.on_click(lambda _: self._guarded(self._pin))
             self._swept = gui.add_dropdown("parameter", tuple(p.name for p in schema.learned))
-            over = gui.add_button(f"Sweep it in {SWEEP} columns", hint="over its trained range, the others as they are")
+            over = gui.add_button(
+                f"Sweep it in {SWEEP} columns", color="gray", hint="over its trained range, the others as they are"
+            )
             over.on_click(lambda _: self._guarded(self._sweep))
         with gui.add_folder("Arrangement"):
             self._overlay = gui.add_checkbox("overlay", False, hint="one over the other instead of side by side")
@@ -86,7 +89,7 @@ class ComparePanel:
 
     def _first(self) -> Column:
         """The model that is pinned and swept: the first under the sliders."""
-        return next(c for c in self._columns.all if c.predictor is not None)
+        return next(c for c in self._columns.all if c.predictor is not None and c.pinned is None)
 
     def _add(self) -> None:
         if self._model.value not in self._models:
@@ -98,7 +101,7 @@ class ComparePanel:
 
     def _pin(self) -> None:
         like, parameters = self._first(), self._parameters()
-        label = pinned_label(like.source.schema.scene and like.label.split(" at ")[0], parameters, self._schema)
+        label = pinned_label(like.label, parameters, self._schema)
         self._columns.add(Column(label, like.source, like.geometry, pinned=parameters, foreign=like.foreign))
 
     def _sweep(self) -> None:

@@ -64,7 +64,7 @@ def samples_svg(parameter: Parameter, samples: Floats | None, value: float) -> s
         f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}</div>"
     )
     return (
-        f'<div style="margin:-0.9em 4.9em 0.1em 6.9em"><svg width="100%" height="5" style="display:block">{band}{marks}'
+        f'<div style="margin:-0.2em 4.5em 0.1em 7.6em"><svg width="100%" height="5" style="display:block">{band}{marks}'
         f"</svg>{warning}</div>"
     )
 
@@ -95,6 +95,7 @@ class ParameterPanel:
                     max=round(high, 4),
                     step=round((high - low) / 1000, 5),
                     initial_value=parameter.default,
+                    marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}")),
                     hint=f"{parameter.description}; trained from {parameter.low:.3g} to {parameter.high:.3g}",
                 )
                 slider.on_update(lambda _: wake())

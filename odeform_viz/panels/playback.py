@@ -24,7 +24,7 @@ class PlaybackPanel:
         wake: Callable[[], None],
         largest: Callable[[], float],
     ) -> None:
-        self._clock, self._wake, self._window = clock, wake, window
+        self._clock, self._wake, self._window, self._largest = clock, wake, window, largest
         span = window.stop - window.start
         with server.gui.add_folder("Time"):
             self._time = server.gui.add_slider(
@@ -39,14 +39,13 @@ class PlaybackPanel:
             self._time.on_update(self._dragged)
             self._play = server.gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._play.on_click(lambda _: self.toggle())
-            step = server.gui.add_button_group("step", ("start", "◀ frame", "frame ▶"))
-            step.on_click(lambda event: self._step(event.target.value))
+            go = server.gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
+            go.on_click(lambda event: self._step(event.target.value))
+            go.hint = "start, frame before, frame after, largest deformation"
             self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
             self._speed.on_update(lambda _: self._changed())
             self._loop = server.gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())
-            peak = server.gui.add_button("Largest deformation", hint="jump to the moment of the largest deformation")
-            peak.on_click(lambda _: self._jump(largest()))
         self._changed()
 
     async def _dragged(self, event: viser.GuiEvent) -> None:
@@ -69,9 +68,12 @@ class PlaybackPanel:
         self._wake()
 
     def _step(self, which: str) -> None:
+        if which == "peak":
+            self._jump(self._largest())
+            return
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
-        target = {"start": 0, "◀ frame": index - 1, "frame ▶": index + 1}.get(which, index)
+        target = {"start": 0, "◀": index - 1, "▶": index + 1}.get(which, index)
         self._jump(self._window.start + max(target, 0) * frame)
 
     def _jump(self, moment: float) -> None:

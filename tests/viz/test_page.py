@@ -118,7 +118,7 @@ def _until(holds: Callable[[], bool], seconds: float = 10.0) -> bool:
 def test_play_and_largest_deformation_work_by_click(page: tuple[Page, list[str]], app: App) -> None:
     browser, errors = page
     browser.get_by_role("button", name="all", exact=True).click()
-    browser.get_by_role("button", name="Largest deformation").click()
+    browser.get_by_role("button", name="peak", exact=True).click()
     assert _until(lambda: 0.005 < app.clock.time() < 0.03)
     browser.get_by_role("button", name="Play", exact=True).click()
     assert _until(lambda: app.clock.playing)
