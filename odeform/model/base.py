@@ -31,8 +31,8 @@ class ReducedModel(ABC):
         try:
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
-            self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays)
             self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
+            self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
             self._read(checkpoint)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
