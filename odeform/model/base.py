@@ -9,7 +9,8 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
-from odeform.model.motion import Motion, PlacedBasis, Trajectory, place
+from odeform.model.motion import Motion, Trajectory
+from odeform.model.placed import PlacedBasis, place
 from odeform.model.reduced import ReducedSpace
 from odeform.schema import Parameters
 from odeform.solver.integrate import Quality
