@@ -32,11 +32,12 @@ def checker_parts(mesh: Mesh) -> list[tuple[Ints, Ints]]:
     return [part for part in parts if len(part[0])]
 
 
-Update = Callable[[Floats], None]
+Update = Callable[[Floats, Floats | None], None]
+"""Shows points (N, 3) and, of splats, covariances (N, 3, 3): None for those at rest."""
 
 
 def _show_shape(server: viser.ViserServer, root: str, geometry: Geometry, color: tuple[int, int, int]) -> Update:
-    """Add a shape to the scene; returns what moves its points."""
+    """Add a shape to the scene; returns what moves it."""
     points = np.asarray(geometry.points, dtype=np.float32)
     if isinstance(geometry, Mesh):
         return _show_mesh(server, root, geometry, color)
@@ -44,7 +45,7 @@ def _show_shape(server: viser.ViserServer, root: str, geometry: Geometry, color:
         return _show_splats(server, root, geometry)
     cloud = server.scene.add_point_cloud(f"{root}/points", points, color, point_size=0.003)
 
-    def move(points: Floats) -> None:
+    def move(points: Floats, _: Floats | None) -> None:
         cloud.points = points
 
     return move
@@ -58,7 +59,7 @@ def _show_mesh(server: viser.ViserServer, root: str, mesh: Mesh, color: tuple[in
         handle = server.scene.add_mesh_simple(f"{root}/part_{index}", points[used], faces, color=shade)
         handles.append((handle, used))
 
-    def move(points: Floats) -> None:
+    def move(points: Floats, _: Floats | None) -> None:
         for handle, used in handles:
             handle.vertices = points[used]
 
@@ -68,13 +69,14 @@ def _show_mesh(server: viser.ViserServer, root: str, mesh: Mesh, color: tuple[in
 def _show_splats(server: viser.ViserServer, root: str, splats: GaussianSplats) -> Update:
     # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
     scale = 0.01
-    covariances = (splats.covariances / scale**2).astype(np.float32)
+    resting = (splats.covariances / scale**2).astype(np.float32)
     colors, opacities = splats.colors.astype(np.float32), splats.opacities[:, None].astype(np.float32)
     centers = (splats.points / scale).astype(np.float32)
-    handle = server.scene.add_gaussian_splats(f"{root}/splats", centers, covariances, colors, opacities, scale=scale)
+    handle = server.scene.add_gaussian_splats(f"{root}/splats", centers, resting, colors, opacities, scale=scale)
 
-    def move(points: Floats) -> None:
-        handle.set_gaussians((points / scale).astype(np.float32), covariances, colors, opacities)
+    def move(points: Floats, covariances: Floats | None) -> None:
+        shown = resting if covariances is None else covariances / np.float32(scale**2)
+        handle.set_gaussians((points / scale).astype(np.float32), shown, colors, opacities)
 
     return move
 
@@ -97,9 +99,9 @@ class _ColumnView:
         self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
         self._body.position = frame.pose[:3, 3]
         if frame.points is not None:
-            self._shape(frame.points)
+            self._shape(frame.points, frame.covariances)
         elif not self._resting:
-            self._shape(np.asarray(self._geometry.points, dtype=np.float32))
+            self._shape(np.asarray(self._geometry.points, dtype=np.float32), None)
         self._resting = frame.points is None
 
     def show_path(self, motion: Motion) -> None:

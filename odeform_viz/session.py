@@ -9,7 +9,7 @@ from odeform.errors import InputError
 from odeform.model.motion import Motion, SolveStats
 from odeform.predictor import Predictor
 from odeform.schema import Schema
-from odeform.types import Floats, Geometry
+from odeform.types import Floats, GaussianSplats, Geometry
 
 __all__ = ["Column", "ColumnFrame", "Frame", "Session", "Wish", "same_motions"]
 
@@ -39,12 +39,13 @@ class Column:
 class ColumnFrame:
     """One column at one moment: the `pose` (4, 4), and what it moves.
 
-    `points` (N, 3) is the body deformed where it rests; None where the deformation is too small to be seen, and the
-    pose says it all.
+    `points` (N, 3) is the body deformed where it rests, `covariances` (N, 3, 3) in m^2 those of its splats, if it is
+    made of any; None where the deformation is too small to be seen, and the pose says it all.
     """
 
     motion: Motion
     points: Floats | None
+    covariances: Floats | None
     pose: Floats
 
     @property
@@ -110,11 +111,12 @@ class Session:
     def _column(self, motion: Motion, time: float) -> ColumnFrame:
         pose = motion.pose(time)
         if motion.deformation_bound(time) < INVISIBLE:
-            return ColumnFrame(motion, None, pose)
+            return ColumnFrame(motion, None, None, pose)
         points = motion.deformed(time)
         if not (np.isfinite(points).all() and np.isfinite(pose).all()):
             raise InputError(f"the prediction at t = {time:.3f} s is not finite; the last good frame stays")
-        return ColumnFrame(motion, points, pose)
+        splats = isinstance(motion.geometry, GaussianSplats)
+        return ColumnFrame(motion, points, motion.deformed_covariances(time) if splats else None, pose)
 
     def largest_deformation(self, wish: Wish) -> float:
         """The time within the trained window at which the first visible column is deformed most."""
