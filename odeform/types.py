@@ -16,6 +16,7 @@ __all__ = [
     "GaussianSplats",
     "Geometry",
     "Ints",
+    "Matrices",
     "Mesh",
     "Perpoint",
     "PointCloud",
@@ -41,6 +42,7 @@ Times = Float[np.ndarray, "times"]
 Vector = Float[np.ndarray, "3"]
 Vectors = Float[np.ndarray, "*batch 3"]
 Rotations = Float[np.ndarray, "*batch 3 3"]
+Matrices = Float[np.ndarray, "points 3 3"]
 Pose = Float[np.ndarray, "*batch 4 4"]
 Basis = Float[np.ndarray, "points 3 modes"]
 

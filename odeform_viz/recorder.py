@@ -4,13 +4,13 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from odeform.errors import InputError
+from odeform.geometry.normals import vertex_normals
 from odeform.model.recorded import RecordedMotion
-from odeform.types import Floats, Ints, Mesh
+from odeform.types import Mesh
 from odeform_viz.columns import Column
 from odeform_viz.session import ColumnFrame, Frame
 
@@ -73,7 +73,7 @@ class Recorder:
         path = f"world/{column.label}/body"
         points = shown.motion.deformed(time) if shown.points is None else shown.points
         if isinstance(column.geometry, Mesh):
-            normals = _normals(points, column.geometry.faces)
+            normals = vertex_normals(points, column.geometry.faces)
             self._stream.log(path, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
         else:
             self._stream.log(path, rr.Points3D(points))
@@ -108,16 +108,6 @@ def _provenance(column: Column) -> dict[str, object]:
         "provenance": checkpoint.provenance,
         "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
     }
-
-
-def _normals(points: Floats, faces: Ints) -> Floats:
-    """(N, 3) area-weighted vertex normals; a mesh without them is drawn unlit."""
-    corners = points[faces]
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = np.zeros_like(points)
-    for corner in range(3):
-        np.add.at(total, faces[:, corner], face)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-20)
 
 
 def _blueprint(columns: Sequence[Column]) -> rrb.Blueprint:

@@ -90,7 +90,7 @@ class _ColumnView:
             self._shape.paint(points, self._spread_from(truth)(1e3 * frame.error.distances), heat)
             self._as_built = False
         elif frame.points is not None or not self._as_built:
-            self._shape.move(points)
+            self._shape.move(points, frame.covariances)
             self._as_built = frame.points is None
 
     def _spread_from(self, truth: ColumnFrame) -> Spread:

@@ -11,7 +11,7 @@ from odeform.model.motion import Motion, SolveStats
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
-from odeform.types import Floats, Geometry, Perpoint, Times, Vector
+from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
 __all__ = ["REACH", "ColumnFrame", "Curves", "Error", "Frame", "Session", "Wish", "same_motions"]
@@ -53,14 +53,15 @@ class Error:
 class ColumnFrame:
     """One column at one moment: the `pose` (4, 4), and what it moves.
 
-    `points` (N, 3) is the body deformed where it rests; None where the deformation is too small to be seen, and the
-    pose says it all. `depth` is how far the body is below the floor, in metres. `error` is that against the truth,
-    where there is one of these parameters.
+    `points` (N, 3) is the body deformed where it rests, `covariances` (N, 3, 3) in m^2 those of its splats, if it is
+    made of any; None where the deformation is too small to be seen, and the pose says it all. `depth` is how far the
+    body is below the floor, in metres. `error` is that against the truth, where there is one of these parameters.
     """
 
     column: Column
     motion: Motion | RecordedMotion
     points: Floats | None
+    covariances: Floats | None
     pose: Floats
     depth: float
     error: Error | None
@@ -157,7 +158,10 @@ class Session:
         lowest = float(heights.min())
         if not (np.isfinite(heights).all() and np.isfinite(pose).all()):
             raise InputError(f"{column.label} at t = {time:.3f} s is not finite; the last good frame stays")
-        return ColumnFrame(column, motion, points, pose, max(-lowest, 0.0), self._error(column, wish))
+        covariances = None
+        if points is not None and isinstance(motion, Motion) and isinstance(column.geometry, GaussianSplats):
+            covariances = motion.deformed_covariances(time)
+        return ColumnFrame(column, motion, points, covariances, pose, max(-lowest, 0.0), self._error(column, wish))
 
     def _error(self, column: Column, wish: Wish) -> Error | None:
         truth = self.truth_of(column, wish)

@@ -14,9 +14,10 @@ Color = tuple[int, int, int]
 
 
 class ShapeView(Protocol):
-    """A shape in the scene. `move` takes its points (N, 3); `paint` values (N,) on a scale that ends at `top`."""
+    """A shape in the scene. `move` takes its points (N, 3) and, of splats, covariances (N, 3, 3), None for those at
+    rest; `paint` values (N,) on a scale that ends at `top`."""
 
-    def move(self, points: Points) -> None: ...
+    def move(self, points: Points, covariances: Floats | None = None) -> None: ...
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None: ...
 
@@ -59,7 +60,7 @@ class _MeshView:
             self._parts.append((handle, used))
         self._bands: list[viser.MeshHandle | None] = [None] * len(BANDS)
 
-    def move(self, points: Points) -> None:
+    def move(self, points: Points, covariances: Floats | None = None) -> None:
         for handle, used in self._parts:
             handle.vertices = points[used]
             handle.visible = True
@@ -94,7 +95,7 @@ class _CloudView:
             f"{root}/points", points, color, point_size=0.003, precision="float32"
         )
 
-    def move(self, points: Points) -> None:
+    def move(self, points: Points, covariances: Floats | None = None) -> None:
         self._cloud.points = points
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
@@ -118,8 +119,9 @@ class _SplatView:
     def _scaled(self, points: Floats) -> Points:
         return (points / self.SCALE).astype(np.float32)
 
-    def move(self, points: Points) -> None:
-        self._handle.set_gaussians(self._scaled(points), self._covariances, *self._look)
+    def move(self, points: Points, covariances: Floats | None = None) -> None:
+        shown = self._covariances if covariances is None else covariances / np.float32(self.SCALE**2)
+        self._handle.set_gaussians(self._scaled(points), shown, *self._look)
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
         self.move(points)

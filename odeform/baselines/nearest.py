@@ -6,7 +6,7 @@ from odeform.baselines.frames import FrameTrajectory
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.data import TrainingData
-from odeform.model.motion import PlacedBasis
+from odeform.model.placed import PlacedBasis
 from odeform.solver.integrate import Quality
 from odeform.types import Arrays, Floats
 

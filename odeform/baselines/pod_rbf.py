@@ -15,7 +15,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.model.base import ReducedModel
 from odeform.model.data import TrainingData
-from odeform.model.motion import PlacedBasis
+from odeform.model.placed import PlacedBasis
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality
 from odeform.types import Arrays, Floats

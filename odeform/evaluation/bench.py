@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from odeform.model.motion import place
+from odeform.model.placed import place
 from odeform.predictor import Predictor, load
 from odeform.schema import Parameters
 from odeform.types import Floats, Geometry, Mesh

@@ -9,7 +9,8 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
-from odeform.model.motion import Motion, PlacedBasis, Trajectory, place
+from odeform.model.motion import Motion, Trajectory
+from odeform.model.placed import PlacedBasis, place
 from odeform.model.reduced import ReducedSpace
 from odeform.schema import Parameters
 from odeform.solver.integrate import Quality
@@ -31,8 +32,8 @@ class ReducedModel(ABC):
         try:
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
-            self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays)
             self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
+            self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
             self._read(checkpoint)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None

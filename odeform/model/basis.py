@@ -39,18 +39,25 @@ class DisplacementBasis:
             out[at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
         return out
 
-    def gradients(self, points: Points) -> Float[np.ndarray, "points 3 3 modes"]:
-        """d phi / dx at `points` (N, 3) -> (N, 3, 3, K) float32, [n, i, j, k] = d(phi_k)_i / dx_j, per metre/metre."""
-        out = np.empty((len(points), 3, 3, self.modes), dtype=np.float32)
+    def slopes(
+        self, points: Points, directions: Float[np.ndarray, "points directions 3"]
+    ) -> Float[np.ndarray, "modes directions 3 points"]:
+        """(grad phi) d at `points` (N, 3) along `directions` (N, M, 3) -> (K, M, 3, N) float32, metre per metre.
+
+        The modes come first, so that a frame is c @ slopes at memory speed.
+        """
+        out = np.empty((self.modes, directions.shape[1], 3, len(points)), dtype=np.float32)
         count = len(self.centers)
         for at in range(0, len(points), CHUNK):
             chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
             distance = np.sqrt(_squares(chunk, self.centers))
-            for axis in range(3):
-                slope = 3.0 * distance * (chunk[:, None, axis] - self.centers[None, :, axis])
-                value = slope @ self.weights[:count] + self.weights[count + 1 + axis]
-                out[at : at + CHUNK, :, axis] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
-        return out / np.float32(self.scale)
+            for column in range(directions.shape[1]):
+                along = directions[at : at + CHUNK, column]
+                ahead = (chunk * along).sum(axis=1)[:, None] - along @ self.centers.T
+                value = (3.0 * distance * ahead) @ self.weights[:count] + along @ self.weights[count + 1 :]
+                out[:, column, :, at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).transpose(1, 2, 0)
+        out /= np.float32(self.scale)
+        return out
 
 
 Pairs = Float[np.ndarray, "points centers"]

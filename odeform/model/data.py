@@ -10,7 +10,7 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.model.reduced import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
-from odeform.types import Floats
+from odeform.types import Floats, Mesh
 
 __all__ = ["TrainingData", "prepare"]
 
@@ -51,14 +51,14 @@ def prepare(
     if every < 1 or len(range(0, count, every)) < 4:
         raise InputError(f"every {every}: expected at least 4 frames to learn from among {count}")
     poses, locals_, theta = {}, {}, {}
-    rest = weights = anchor = times = None
+    rest = weights = anchor = times = faces = None
     for split in ("train", "val"):
         poses[split], locals_[split], vectors = [], [], []
         for recorded in dataset.sequences(split):
             sequence = recorded.until(stop, every)
             if anchor is None:
                 anchor = sequence.weights @ sequence.vertices[0].astype(float)
-                weights, times = sequence.weights, sequence.times
+                weights, times, faces = sequence.weights, sequence.times, sequence.faces
                 rest = to_canonical(sequence.vertices[0], anchor, schema.azimuth(sequence.parameters))
             assert rest is not None
             if sequence.vertices.shape[1] != len(rest):
@@ -74,6 +74,7 @@ def prepare(
     assert weights is not None
     assert anchor is not None
     assert times is not None
+    assert faces is not None
     shapes = fit_modes(locals_["train"], weights, modes or MOST_MODES)
     shares = weights[:, None]
     coefficients = {
@@ -84,7 +85,7 @@ def prepare(
     if modes is None:
         enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
         modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
-    space = make_space(rest, shapes[..., :modes], weights, anchor)
+    space = make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor)
     reduced, truncation = {}, {}
     for split in ("train", "val"):
         pairs = zip(poses[split], coefficients[split], strict=True)

@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
-from odeform.geometry.shape import surface_shares
-from odeform.model.reduced import ReducedSpace, rotation_of, to_canonical
+from odeform.model.placed import PlacedBasis
+from odeform.model.reduced import ReducedSpace, rotation_of
+from odeform.model.triads import Axes, gradients, moved_covariances
 from odeform.schema import Parameters, Schema
-from odeform.types import Floats, Frames, GaussianSplats, Geometry, Perpoint, Points, Pose, Rotations, Times, Vectors
+from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
-__all__ = ["Motion", "PlacedBasis", "SolveStats", "Trajectory", "place"]
+__all__ = ["Motion", "SolveStats", "Trajectory"]
 
 
 @dataclass(frozen=True)
@@ -49,30 +49,6 @@ class Trajectory(Protocol):
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) seconds -> (T, 6 + K)."""
         ...
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedBasis:
-    """A geometry seen through a basis: points in the scene and canonical (N, 3), values (3 N, K); float32."""
-
-    points: Points
-    rest: Points
-    values: Float[np.ndarray, "rows modes"]
-    reach: Float[np.ndarray, " modes"]
-    """Largest displacement of any point by each mode."""
-    shares: Perpoint
-    """Share of the surface at each point."""
-
-
-def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasis:
-    """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
-    rest = to_canonical(geometry.points, space.anchor, azimuth)
-    values = space.basis.values(rest)
-    points = np.asarray(geometry.points, dtype=np.float32)
-    reach = np.sqrt((values**2).sum(axis=1).max(axis=0))
-    return PlacedBasis(
-        points, rest.astype(np.float32), values.reshape(-1, space.basis.modes), reach, surface_shares(geometry)
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,25 +111,30 @@ class Motion:
         """D(t)(P0), the deformation alone where the body rests: (N, 3) float32 metres. `pose(t)` takes it on."""
         return self.placed.points + self.local(t)
 
-    def gradients(self, t: float) -> Rotations:
-        """F(t) = dP/dP0 at each point: (N, 3, 3), from the gradients of the cached basis (one product a frame).
+    def gradients(self, t: float) -> Matrices:
+        """F(t) = dP/dP0 at each point: (N, 3, 3), float32, with singular values within `triads.BOUND`.
 
-        Off the trained surface the normal derivative is the basis's smooth continuation, not data.
+        From data on a surface the tangential part alone: the unit normal there goes to that of the deformed surface,
+        a point off the surface takes the normal of the nearest one on it.
         """
         y = self._reduced(t)
-        rotation = self._rotation_shift(y)[0][0]
-        canonical = np.eye(3) + self._basis_gradients @ y[0, 6:].astype(np.float32)
-        return rotation @ canonical @ self._to_canonical_axes
+        carried = self._carried_axes(y, self._rotation_shift(y)[0][0])
+        return gradients(_turned(self.placed.triads.rest, self._to_scene_axes), carried)
 
-    @cached_property
-    def _basis_gradients(self) -> Floats:
-        return self.space.basis.gradients(self.placed.rest)
+    def rotations(self, t: float) -> Matrices:
+        """(N, 3, 3) the rotation nearest to F(t) at each point, its polar factor."""
+        u, _, vt = np.linalg.svd(self.gradients(t))
+        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+        return u @ vt
 
-    def covariances(self, t: float) -> Float[np.ndarray, "points 3 3"]:
-        """(N, 3, 3) covariances of splats at time `t`, turned with the rigid part."""
-        assert isinstance(self.geometry, GaussianSplats)
-        rotation = self.pose(t)[:3, :3]
-        return rotation @ self.geometry.covariances @ rotation.T
+    def covariances(self, t: float) -> Matrices:
+        """F S F^T, the covariances of splats at time `t`: (N, 3, 3) float32 m^2."""
+        y = self._reduced(t)
+        return self._moved_covariances(y, self._rotation_shift(y)[0][0])
+
+    def deformed_covariances(self, t: float) -> Matrices:
+        """Covariances of splats under the deformation alone, where the body rests: to `deformed` as (N, 3, 3) m^2."""
+        return self._moved_covariances(self._reduced(t), self._to_scene_axes)
 
     def deformation_bound(self, time: float) -> float:
         """No point is displaced locally by more than this at `time`, in metres."""
@@ -161,14 +142,17 @@ class Motion:
         return float(np.abs(y[0, 6:]) @ self.placed.reach)
 
     def deformation_rms(self, times: Times) -> Times:
-        """(T,) root-mean-square local displacement of the points in metres."""
+        """(T,) root-mean-square local displacement over the surface in metres."""
         y = self._reduced(times)
-        gram = self.placed.values.T @ self.placed.values / len(self.placed.rest)
-        return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", y[:, 6:], gram, y[:, 6:]), 0.0))
+        return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", y[:, 6:], self.placed.gram, y[:, 6:]), 0.0))
+
+    @property
+    def _to_scene_axes(self) -> Rotations:
+        return rotation_of(np.zeros(6), self.schema.azimuth(self.parameters))[0]
 
     @property
     def _to_canonical_axes(self) -> Rotations:
-        return rotation_of(np.zeros(6), self.schema.azimuth(self.parameters))[0].T
+        return self._to_scene_axes.T
 
     def _rotation_shift(self, y: Floats) -> tuple[Rotations, Vectors]:
         return rotation_of(y[:, :6], self.schema.azimuth(self.parameters))
@@ -178,3 +162,20 @@ class Motion:
         # one product for all times; for one time a matrix-vector product at memory speed
         moved = coefficients @ self.placed.values.T if len(y) > 1 else (self.placed.values @ coefficients[0])[None]
         return moved.reshape(len(y), -1, 3)
+
+    def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
+        """The triads under the deformation of `y` (1, 6 + K), turned from canonical axes by `turn` (3, 3)."""
+        return _turned(self.placed.triads.carried(y[0, 6:]), turn)
+
+    def _moved_covariances(self, y: Floats, turn: Rotations) -> Matrices:
+        assert isinstance(self.geometry, GaussianSplats)
+        if y[0, 6:].any():
+            return moved_covariances(self.placed.covariances, self._carried_axes(y, turn))
+        # a rigid motion turns the numbers as they were given: those of P(0) are what they were
+        rotation = turn @ self._to_canonical_axes
+        flat = self.geometry.covariances.reshape(-1, 9) @ np.kron(rotation, rotation).T
+        return flat.reshape(-1, 3, 3).astype(np.float32)
+
+
+def _turned(axes: Axes, rotation: Rotations) -> Axes:
+    return rotation.astype(np.float32) @ axes

@@ -6,7 +6,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
 from odeform.model.inference import LatentTrajectory, check_weights, encode, make_decoder, make_field, pool_shape
-from odeform.model.motion import PlacedBasis
+from odeform.model.placed import PlacedBasis
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
+from odeform.geometry.shape import surface_shares
 from odeform.model.motion import SolveStats
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, Mesh, Points, Pose, Sequence, Times
@@ -75,10 +76,10 @@ class RecordedMotion:
         return float(np.linalg.norm(self.deformed(time) - self.sequence.vertices[0], axis=1).max())
 
     def deformation_rms(self, times: Times) -> Times:
-        """(T,) root-mean-square local displacement of the points in metres."""
+        """(T,) root-mean-square local displacement over the surface in metres."""
         frames, poses = self.vertices(times), self.pose(times)
         back = np.einsum("tni,tij->tnj", frames - poses[:, None, :3, 3], poses[:, :3, :3])
-        return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2).mean(axis=1))
+        return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_shares(self.geometry))
 
     def of(self, parameters: Mapping[str, float]) -> bool:
         """Whether this is the motion under those parameters, to the resolution of a slider."""

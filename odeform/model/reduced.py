@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Arrays, Basis, Frames, Perpoint, Points, Rotations, Sequence, Vector, Vectors
+from odeform.types import Arrays, Basis, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
 __all__ = ["POSE", "ReducedSpace", "decompose", "fit_modes", "make_space", "rotation_of", "to_canonical"]
 
@@ -28,23 +28,34 @@ class ReducedSpace:
 
     The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
     displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
-    does the same for small rotation errors.
+    does the same for small rotation errors. `surface`, canonical, is where the training data lie; None where they
+    fill a volume, so that their derivatives are known in every direction.
     """
 
     anchor: Vector
     arm: float
     basis: DisplacementBasis
+    surface: Mesh | None
 
     def to_json(self) -> dict[str, object]:
-        return {"anchor": [float(x) for x in self.anchor], "arm": self.arm, "basis_scale": self.basis.scale}
+        return {
+            "anchor": [float(x) for x in self.anchor],
+            "arm": self.arm,
+            "basis_scale": self.basis.scale,
+            "surface": self.surface is not None,
+        }
 
     def arrays(self) -> Arrays:
         return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
 
     @classmethod
-    def from_parts(cls, data: dict[str, object], arrays: Arrays) -> "ReducedSpace":
+    def from_parts(cls, data: dict[str, object], arrays: Arrays, rest: Mesh) -> "ReducedSpace":
+        """`rest` is the trained body as it rests in the scene."""
         basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
-        return cls(np.array(data["anchor"], dtype=float), float(data["arm"]), basis)  # pyright: ignore
+        anchor = np.array(data["anchor"], dtype=float)
+        # older checkpoints do not say: all of them are of surfaces
+        surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
+        return cls(anchor, float(data["arm"]), basis, surface)  # pyright: ignore
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:
@@ -79,10 +90,11 @@ def fit_modes(locals_: list[Frames], weights: Perpoint, modes: int) -> Basis:
     return vectors[:, ::-1][:, :modes].reshape(len(weights), 3, -1) / root[..., None]
 
 
-def make_space(rest: Points, shapes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
-    """The space of the modes `shapes` (N, 3, K) at the canonical points `rest` (N, 3)."""
-    arm = float(np.sqrt((weights[:, None] * rest**2).sum()))
-    return ReducedSpace(np.asarray(anchor, dtype=float), arm, fit_basis(rest, shapes, arm))
+def make_space(rest: Mesh, shapes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
+    """The space of the modes `shapes` (N, 3, K) at the vertices of `rest`, canonical. One without a face is inside."""
+    arm = float(np.sqrt((weights[:, None] * rest.points**2).sum()))
+    surface = rest if len(np.unique(rest.faces)) == len(rest.points) else None
+    return ReducedSpace(np.asarray(anchor, dtype=float), arm, fit_basis(rest.points, shapes, arm), surface)
 
 
 def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Rotations, Vectors]:

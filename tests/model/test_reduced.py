@@ -5,7 +5,7 @@ import trimesh
 from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.model.data import prepare
-from odeform.model.reduced import POSE, ReducedSpace, decompose, rotation_of, to_canonical
+from odeform.model.reduced import POSE, ReducedSpace, decompose, make_space, rotation_of, to_canonical
 from odeform.predictor import Predictor
 from odeform.types import Mesh, Sequence
 
@@ -79,9 +79,27 @@ def test_training_motions_come_back(dataset: Dataset, predictors: dict[str, Pred
 
 
 def test_space_survives_its_parts(predictors: dict[str, Predictor]) -> None:
+    rest = predictors["nearest"].rest
     space = predictors["nearest"].space  # pyright: ignore[reportAttributeAccessIssue]
-    again = ReducedSpace.from_parts(space.to_json(), space.arrays())
+    again = ReducedSpace.from_parts(space.to_json(), space.arrays(), rest)
     points = np.asarray(Mesh(space.basis.centers * space.arm, np.zeros((0, 3), int)).points)
     assert np.array_equal(again.basis.values(points), space.basis.values(points))
     assert np.array_equal(again.anchor, space.anchor)
     assert again.arm == space.arm
+    assert again.surface is not None
+    assert np.allclose(again.surface.points + space.anchor, rest.points, rtol=0.0, atol=1e-12)
+
+
+def test_a_vertex_without_a_face_is_inside() -> None:
+    """Data with interior points fill a volume, and their checkpoint says so; one that does not say is of a surface."""
+    sphere = trimesh.creation.icosphere(1, 0.1)
+    points = np.concatenate([sphere.vertices, [[0.01, 0.0, 0.02]]])
+    weights, shapes = np.full(len(points), 1.0 / len(points)), np.ones((len(points), 3, 1))
+    faces, anchor = np.asarray(sphere.faces), np.zeros(3)
+    shell = make_space(Mesh(points[:-1], faces), shapes[:-1], weights[:-1], anchor)
+    solid = make_space(Mesh(points, faces), shapes, weights, anchor)
+    assert shell.surface is not None
+    assert solid.surface is None
+    assert ReducedSpace.from_parts(solid.to_json(), solid.arrays(), Mesh(points, faces)).surface is None
+    old = {name: value for name, value in shell.to_json().items() if name != "surface"}
+    assert ReducedSpace.from_parts(old, shell.arrays(), Mesh(points[:-1], faces)).surface is not None

@@ -9,6 +9,7 @@ from odeform import InputError
 from odeform.dataset.index import Dataset
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
+from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
 from odeform_viz.session import Session, Wish
@@ -114,6 +115,23 @@ def test_at_rest_a_pose_says_it_all(session: Session, wish: Wish) -> None:
     shown = session.frame(replace(wish, time=0.0)).columns[0]
     assert shown.points is None
     np.testing.assert_allclose(shown.pose, np.eye(4), atol=1e-12)
+
+
+def test_splats_deform_with_the_body(kick: Predictor) -> None:
+    halves = 2e-3 * np.random.default_rng(0).normal(size=(len(kick.rest.points), 3, 3))
+    ones = np.ones((len(halves), 3))
+    splats = GaussianSplats(kick.rest.points, halves @ halves.swapaxes(1, 2), ones, ones[:, 0])
+    columns = Columns.of([Column("splats", kick, splats), Column("mesh", kick, kick.rest)]).all
+    session = Session(kick.schema)
+    wish = Wish(session.schema.complete({}), 0.02, "balanced", columns)
+    shown, mesh = session.frame(wish).columns
+    assert shown.covariances is not None
+    assert mesh.covariances is None
+    turn = shown.pose[:3, :3]
+    moved = kick.solve(splats).covariances(0.02)
+    np.testing.assert_allclose(turn @ shown.covariances @ turn.T, moved, atol=1e-5 * moved.max())
+    assert np.abs(shown.covariances - splats.covariances).max() > 1e-3 * splats.covariances.max()
+    assert session.frame(replace(wish, time=0.0)).columns[0].covariances is None
 
 
 @pytest.mark.parametrize("time", [float("nan"), float("inf"), -1.0])
