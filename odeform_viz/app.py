@@ -5,6 +5,7 @@ import io
 import socket
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import viser
@@ -12,8 +13,9 @@ import viser
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
+from odeform.export import write_motion
+from odeform.model.motion import Motion
 from odeform.types import Floats
-from odeform.types import Sequence as Motions
 from odeform_viz.clock import Clock
 from odeform_viz.columns import Column, Columns
 from odeform_viz.heat import scale_for
@@ -21,11 +23,14 @@ from odeform_viz.panels.compare import ComparePanel
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.plots import PlotPanel
+from odeform_viz.panels.record import RecordPanel
+from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.status import StatusPanel
 from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
-from odeform_viz.scene import Looks, SceneView, color_of
-from odeform_viz.session import Frame, Session, Wish, same_motions
+from odeform_viz.scene import SceneView, color_of
+from odeform_viz.session import Frame, Looks, Session, Wish, same_motions
+from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 from odeform_viz.worker import Worker
 
 __all__ = ["App"]
@@ -44,15 +49,15 @@ class App:
         host: str = "127.0.0.1",
         port: int = 8080,
         record: str | None = None,
-        sequence: Motions | None = None,
     ) -> None:
-        """The first of the columns gives the scene and its sliders; `sequence` is shown as truth at first."""
+        """The first of the columns, a model, gives the scene and its sliders; a record moves them to its parameters."""
         self.columns = Columns.of(columns)
         self.session = Session(columns[0].source.schema)
         _require_free(host, port)
         # the worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
         sys.setswitchinterval(SWITCH)
         self._recorder = Recorder(record) if record else None
+        self._record_to = record
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
             self.server = viser.ViserServer(host=host, port=port, verbose=False)
         self.server.gui.configure_theme(
@@ -70,8 +75,9 @@ class App:
         self._looks = Looks()
         self._heat: float | None = None
         self._settled = False
-        if sequence is not None:
-            self._truth.open(sequence)
+        for column in columns:
+            if column.truth:
+                self._parameters.set(column.truth.parameters)
         self.clock.play()
         self._worker.start()
 
@@ -84,6 +90,8 @@ class App:
             qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
             samples = _training_samples(columns[0])
             self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
+            body = columns[0].source.rest  # pyright: ignore[reportAttributeAccessIssue]
+            self._shape = ShapePanel(self.server, self.columns, body, self._changed, self._say)
             with gui.add_folder("View"):
                 self._follow = gui.add_checkbox("follow the body", initial_value=True)
                 self._follow.on_update(lambda _: wake())
@@ -97,6 +105,10 @@ class App:
                 self.server, schema, self.columns, dataset, read, self._parameters.set, self._changed, say
             )
             self._compare = ComparePanel(self.server, schema, self.columns, models, read, wake, say)
+        with tabs.add_tab("Record"):
+            self._take = RecordPanel(
+                self.server, schema.scene, self._record, self._save, self._restore, self._export, self._say
+            )
         self._status = StatusPanel(self.server)
         self._plots = PlotPanel(self.server, schema.window)
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
@@ -119,6 +131,9 @@ class App:
         parameters = self.session.schema.complete(self._parameters.parameters())
         return Wish(parameters, self.clock.time(), self._parameters.quality(), self.columns.all)
 
+    def _read_looks(self) -> Looks:
+        return Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
+
     def _largest(self) -> float:
         return self.session.largest_deformation(self._wish())
 
@@ -126,14 +141,67 @@ class App:
         self._compare.refresh()
         self._worker.wake()
 
+    def _record(self, path: str | None) -> None:
+        """Wish for a recording, or for its end; the worker sees to it, on whose thread everything is logged."""
+        self._record_to = path
+        self._worker.wake()
+
+    def _keep_recording(self) -> None:
+        """Start or end the recording as wished."""
+        wished = self._record_to
+        if self._recorder is not None and wished is None:
+            self._recorder.close()
+            self._take.finished(str(self._recorder.path), self._recorder.frames)
+            self._recorder = None
+        if self._recorder is None and wished is not None:
+            try:
+                self._recorder = Recorder(wished)
+            except InputError as error:
+                self._record_to = None
+                self._take.show(None, 0, str(error))
+                return
+            self._shown = None  # the frame at hand belongs in it
+        if self._recorder is not None:
+            self._take.show(wished, self._recorder.frames)
+
+    def _save(self) -> bytes:
+        return state_to_json(capture(self.session.schema.scene, self._wish(), self._read_looks()))
+
+    def _restore(self, data: bytes) -> None:
+        """`InputError` if the state is none, or a checkpoint of it is not at hand; the page then stays as it was."""
+        schema = self.session.schema
+        state = state_from_json(data, schema.scene)
+        self.columns.restart(columns_of(state, schema, next(c for c in self.columns.all if c.predictor)))
+        self._parameters.set(state.parameters)
+        self._parameters.set_quality(state.quality)
+        self._compare.set(state.overlay, state.heat)
+        self._follow.value = state.follow
+        self._playback.jump(state.time)
+        self._changed()
+
+    def _export(self, path: Path) -> Path:
+        """The motion of the first model that is shown: a `.ply` of this moment, or all frames as `.npz`."""
+        wish = self._wish()
+        column = next((c for c in wish.columns if c.shown and c.predictor), None)
+        if column is None:
+            raise InputError("export: no model is shown")
+        motion = self.session.motion(column, wish)
+        assert isinstance(motion, Motion)
+        if path.suffix == ".ply":
+            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"))
+            return path.with_name(f"{path.stem}_{0:05d}.ply")
+        write_motion(motion, self.session.schema.window.times, path)
+        return path
+
     def _say(self, message: str) -> None:
         self._status.show_error(message)
 
     def _serve(self) -> float | None:
         """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
         try:
+            self._keep_recording()
             wish = self._wish()
-            looks = Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
+            looks = self._read_looks()
             if self._shown is None or wish != self._shown.wish or looks != self._looks:
                 self._show(self.session.frame(wish), looks)
             elif not self._settled:
@@ -159,8 +227,10 @@ class App:
 
     def _scale(self, frame: Frame) -> float | None:
         """The end of the colour scale in mm, one for all columns; None where nothing can be compared."""
-        errors = [self.session.curves(shown, frame.wish).error for shown in frame.columns if shown.error]
-        return scale_for(np.concatenate([e for e in errors if e is not None])) if errors else None
+        curves = [self.session.curves(shown, frame.wish) for shown in frame.columns if shown.error]
+        stop = self.session.schema.window.stop
+        errors = [c.error[c.times <= stop] for c in curves if c.error is not None]
+        return scale_for(np.concatenate(errors)) if errors else None
 
     def _describe(self, frame: Frame) -> None:
         """What accompanies a frame: numbers, curves, marks at the sliders."""

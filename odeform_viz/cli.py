@@ -3,48 +3,39 @@
 import argparse
 import sys
 import time
-from collections.abc import Sequence as Several
+from collections.abc import Sequence
 
 import odeform
 from odeform.cli import run_guarded
-from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.geometry.shape import fit_to
-from odeform.types import Geometry, Sequence
-from odeform_viz.columns import Column
+from odeform_viz.columns import Column, truth_column
+from odeform_viz.shaping import describe_fit, shape_from
 
-__all__ = ["main", "make_columns", "open_sequence"]
+__all__ = ["main", "make_columns"]
 
 
-def make_columns(checkpoint: str, compare: Several[str], geometry: str | None) -> list[Column]:
+def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) -> list[Column]:
     """The columns that the command line asks for; a foreign shape is fitted to the first model's body."""
-    predictors = [odeform.load(name) for name in (checkpoint, *compare)]
-    shape: Geometry = predictors[0].rest
-    if geometry:
-        fit = fit_to(odeform.read_geometry(geometry), predictors[0].rest)
-        shape = fit.geometry
-        print(f"{geometry}: {len(shape.points)} points, scaled by {fit.factor:.4g} to the trained size")
-    return [Column(predictor.model, predictor, shape, foreign=geometry is not None) for predictor in predictors]
-
-
-def open_sequence(path: str) -> Sequence:
-    """A sequence by its path, DATASET/NAME: of a folder, of a packed file, or of a scene's bundled copy."""
-    root, _, name = path.rpartition("/")
-    dataset = open_dataset(root or ".")
-    entry = next((e for e in dataset.select("all") if e.name == name.removesuffix(".npz")), None)
-    if entry is None:
-        raise InputError(f"--sequence {path}: {dataset.root} has no sequence {name!r}")
-    return dataset.read(entry)
+    models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
+    body, fit = models[checkpoint].rest, None
+    if geometry is not None:
+        fit = shape_from(geometry, body)
+        print(describe_fit(fit, geometry, body))
+    return [
+        Column(model.model, model, fit.geometry if fit else model.rest, origin=name, fit=fit)
+        for name, model in ((name, models[name]) for name in (checkpoint, *compare))
+    ]
 
 
 def _serve(args: argparse.Namespace) -> None:
     if args.device == "cuda":
         raise InputError("--device cuda: a motion is a state of 160 numbers, solved on the CPU; expected cpu")
     columns = make_columns(args.checkpoint, args.compare, args.geometry)
-    sequence = open_sequence(args.sequence) if args.sequence else None
+    if args.sequence:
+        columns.append(truth_column(args.sequence))
     from odeform_viz.app import App
 
-    app = App(columns, args.host, args.port, args.record, sequence)
+    app = App(columns, args.host, args.port, args.record)
     print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C ends)", flush=True)
     try:
         while True:
@@ -53,7 +44,7 @@ def _serve(args: argparse.Namespace) -> None:
         app.close()
 
 
-def main(argv: Several[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="odeform-viz", description="See and question learned motion.")
     parser.add_argument("--checkpoint", default="kick", metavar="CKPT", help="path or bundled name (default: kick)")
     parser.add_argument("--compare", nargs="+", default=[], metavar="CKPT", help="further models, side by side")

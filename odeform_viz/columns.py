@@ -5,13 +5,15 @@ import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
+from odeform.geometry.shape import Fit
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform.types import Geometry
 
-__all__ = ["Column", "Columns"]
+__all__ = ["Column", "Columns", "truth_column"]
 
 MOST = 12  # columns; more than that nobody tells apart
 
@@ -24,11 +26,18 @@ class Column:
     source: Predictor | RecordedMotion
     geometry: Geometry
     pinned: Mapping[str, float] | None = None
-    foreign: bool = False
-    """Whether the shape is another than the body that was trained."""
+    origin: str = ""
+    """The checkpoint's name or path as it was asked for, or DATASET/NAME of a record; empty for what was made here."""
+    fit: Fit | None = None
+    """How a shape that was not trained came to lie where the body does; None for the body itself."""
     shown: bool = True
     key: int = -1
     """Given by `Columns`; the same while a column is shown and hidden."""
+
+    @property
+    def foreign(self) -> bool:
+        """Whether the shape is another than the body that was trained."""
+        return self.fit is not None
 
     @property
     def truth(self) -> RecordedMotion | None:
@@ -78,15 +87,24 @@ class Columns:
         with self._lock:
             self._columns = tuple(c for c in self._columns if c.key != key)
 
+    def restart(self, columns: Sequence[Column]) -> None:
+        """Other columns in place of all; unchanged if one of them is refused."""
+        fresh = Columns(self._schema)
+        fresh._keys = self._keys
+        fresh.add(*columns)
+        with self._lock:
+            self._columns = fresh._columns
+
     def show(self, key: int, shown: bool) -> None:
         with self._lock:
             self._columns = tuple(replace(c, shown=shown) if c.key == key else c for c in self._columns)
 
-    def reshape(self, geometry: Geometry, foreign: bool) -> None:
-        """Another shape for all models."""
+    def reshape(self, fit: Fit | None) -> None:
+        """Another shape for all models; None for the body that each was trained on."""
         with self._lock:
             self._columns = tuple(
-                c if c.truth else replace(c, geometry=geometry, foreign=foreign) for c in self._columns
+                replace(c, geometry=fit.geometry if fit else c.predictor.rest, fit=fit) if c.predictor else c
+                for c in self._columns
             )
 
     @classmethod
@@ -100,3 +118,14 @@ class Columns:
 def _unused(label: str, taken: set[str]) -> str:
     names = itertools.chain([label], (f"{label} #{n}" for n in itertools.count(2)))
     return next(name for name in names if name not in taken)
+
+
+def truth_column(origin: str) -> Column:
+    """A sequence by DATASET/NAME: of a folder, of a packed file, or of a scene's bundled copy."""
+    root, _, name = origin.rpartition("/")
+    dataset = open_dataset(root or ".")
+    entry = next((e for e in dataset.select("all") if e.name == name.removesuffix(".npz")), None)
+    if entry is None:
+        raise InputError(f"sequence {origin}: {dataset.root} has no sequence {name!r}")
+    motion = RecordedMotion(dataset.schema, dataset.read(entry))
+    return Column("truth", motion, motion.geometry, origin=origin)

@@ -34,14 +34,15 @@ class Recorder:
         self._stream = rr.RecordingStream("odeform")
         self._stream.save(str(path))
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self._index = 0
+        self.path = path
+        self.frames = 0
         self._known: dict[int, Column] = {}
         self._present: set[int] = set()
 
     def log(self, frame: Frame) -> None:
-        self._stream.set_time(SHOWN, sequence=self._index)
+        self._stream.set_time(SHOWN, sequence=self.frames)
         self._stream.set_time(MOTION, duration=frame.wish.time)
-        self._index += 1
+        self.frames += 1
         for name, value in frame.wish.parameters.items():
             self._stream.log(f"parameters/{name}", rr.Scalars(value))
         fresh = [shown.column for shown in frame.columns if shown.column.key not in self._known]

@@ -1,7 +1,6 @@
 """Frames -> viser handles: columns side by side under one camera, the floor, the pulse."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import viser
@@ -13,24 +12,15 @@ from odeform.model.recorded import RecordedMotion
 from odeform.types import Floats
 from odeform_viz.columns import Column
 from odeform_viz.heat import Spread
-from odeform_viz.session import ColumnFrame, Frame
+from odeform_viz.session import ColumnFrame, Frame, Looks
 from odeform_viz.shapes import Color, show_shape
 
-__all__ = ["Looks", "SceneView", "color_of"]
+__all__ = ["SceneView", "color_of"]
 
 COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (176, 42, 98), (0, 128, 140))
 TRUTH = (70, 74, 82)
 ARROW = (190, 20, 20)
 GHOST = 0.45  # opacity of all but the first where columns overlap
-
-
-@dataclass(frozen=True)
-class Looks:
-    """How columns are shown: one over the other or in a row, errors in colours, the camera at the body's side."""
-
-    overlay: bool = False
-    heat: bool = True
-    follow: bool = True
 
 
 def color_of(columns: Sequence[Column], column: Column) -> Color:

@@ -14,7 +14,7 @@ from odeform.schema import Schema
 from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
-__all__ = ["REACH", "ColumnFrame", "Curves", "Error", "Frame", "Session", "Wish", "same_motions"]
+__all__ = ["REACH", "ColumnFrame", "Curves", "Error", "Frame", "Looks", "Session", "Wish", "same_motions"]
 
 INVISIBLE = 5e-5  # m; a deformation below this cannot be seen on a ball of 0.1 m at any sensible zoom
 SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
@@ -29,6 +29,15 @@ class Wish:
     time: float
     quality: str
     columns: tuple[Column, ...]
+
+
+@dataclass(frozen=True)
+class Looks:
+    """How columns are shown: one over the other or in a row, errors in colours, the camera at the body's side."""
+
+    overlay: bool = False
+    heat: bool = True
+    follow: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,11 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
-from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Vector
+from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Vector, Vectors
 
-__all__ = ["Fit", "fit_to", "surface_shares"]
+__all__ = ["Fit", "difference", "fit_to", "surface_shares"]
 
 
 def surface_shares(geometry: Geometry) -> Perpoint:
@@ -28,6 +29,17 @@ class Fit:
     geometry: Geometry
     factor: float
     shift: Vector
+
+    def undo(self, points: Vectors) -> Vectors:
+        """Points (..., 3) of the fitted shape -> in the units and place of the file that it came from."""
+        return (points - self.shift) / self.factor
+
+
+def difference(geometry: Geometry, reference: Mesh) -> float:
+    """Mean distance in metres between two shapes' points, nearest to nearest, the larger of both ways."""
+    one, other = (np.asarray(shape.points, dtype=float) for shape in (geometry, reference))
+    ways = (KDTree(other).query(one)[0].mean(), KDTree(one).query(other)[0].mean())
+    return float(max(ways))
 
 
 def fit_to(geometry: Geometry, reference: Mesh) -> Fit:

@@ -1,6 +1,7 @@
 """What stands beside what: columns to add, pin, sweep and hide, and how they are arranged."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import viser
 
@@ -25,7 +26,7 @@ def sweep(column: Column, parameters: Mapping[str, float], schema: Schema, swept
     for index in range(SWEEP):
         at = {**parameters, swept.name: swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0)}
         label = f"{swept.name} {at[swept.name]:.3g} {swept.unit}"
-        out.append(Column(label, column.source, column.geometry, pinned=at, foreign=column.foreign))
+        out.append(replace(column, label=label, pinned=at, shown=True))
     return out
 
 
@@ -79,6 +80,9 @@ class ComparePanel:
     def heat(self) -> bool:
         return bool(self._heat.value)
 
+    def set(self, overlay: bool, heat: bool) -> None:
+        self._overlay.value, self._heat.value = overlay, heat
+
     def _guarded(self, action: Callable[[], None]) -> None:
         try:
             action()
@@ -96,13 +100,15 @@ class ComparePanel:
             raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
         like = self._first()
         predictor = odeform.load(self._models[self._model.value])
-        shape = like.geometry if like.foreign else predictor.rest
-        self._columns.add(Column(predictor.model, predictor, shape, foreign=like.foreign))
+        shape = like.geometry if like.fit else predictor.rest
+        self._columns.add(Column(predictor.model, predictor, shape, origin=self._model.value, fit=like.fit))
 
     def _pin(self) -> None:
         like, parameters = self._first(), self._parameters()
         label = pinned_label(like.label, parameters, self._schema)
-        self._columns.add(Column(label, like.source, like.geometry, pinned=parameters, foreign=like.foreign))
+        self._columns.add(
+            Column(label, like.source, like.geometry, pinned=parameters, origin=like.origin, fit=like.fit)
+        )
 
     def _sweep(self) -> None:
         swept = next((p for p in self._schema.learned if p.name == self._swept.value), None)

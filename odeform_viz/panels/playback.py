@@ -69,14 +69,15 @@ class PlaybackPanel:
 
     def _step(self, which: str) -> None:
         if which == "peak":
-            self._jump(self._largest())
+            self.jump(self._largest())
             return
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
         target = {"start": 0, "◀": index - 1, "▶": index + 1}.get(which, index)
-        self._jump(self._window.start + max(target, 0) * frame)
+        self.jump(self._window.start + max(target, 0) * frame)
 
-    def _jump(self, moment: float) -> None:
+    def jump(self, moment: float) -> None:
+        """Pause at a moment."""
         self._clock.pause()
         self._clock.seek(min(max(moment, self._time.min), self._time.max))
         self._refresh_button()

@@ -62,10 +62,10 @@ class TruthPanel:
             self._back = gui.add_button("Sliders to the truth's parameters", color="gray", visible=False)
             self._back.on_click(lambda _: self._return())
 
-    def open(self, sequence: Sequence) -> None:
+    def open(self, sequence: Sequence, origin: str = "") -> None:
         """Show a sequence as truth, and move the sliders to its parameters."""
         motion = RecordedMotion(self._schema, sequence)
-        self._columns.add(Column("truth", motion, motion.geometry))
+        self._columns.add(Column("truth", motion, motion.geometry, origin=origin))
         self._set(sequence.parameters)
         self._changed()
 
@@ -77,7 +77,8 @@ class TruthPanel:
             if chosen == NONE:
                 self._drop()
             elif chosen in self._entries and self._dataset is not None:
-                self.open(self._dataset.read(self._entries[chosen]))
+                entry = self._entries[chosen]
+                self.open(self._dataset.read(entry), f"{self._schema.scene}/{entry.name}")
             else:
                 raise InputError(f"test sequence: expected one of the list, got {chosen!r}")
         except InputError as error:

@@ -10,8 +10,8 @@ import viser
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
-from odeform_viz.scene import Looks, SceneView
-from odeform_viz.session import Session, Wish
+from odeform_viz.scene import SceneView
+from odeform_viz.session import Looks, Session, Wish
 
 
 def test_splats_are_sent_as_they_deform_and_as_given_at_rest(kick: Predictor, monkeypatch: pytest.MonkeyPatch) -> None:

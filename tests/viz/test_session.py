@@ -7,6 +7,7 @@ import pytest
 
 from odeform import InputError
 from odeform.dataset.index import Dataset
+from odeform.geometry.shape import fit_to
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
@@ -100,13 +101,15 @@ def test_the_error_is_that_against_the_truth_at_its_vertices(session: Session, w
     assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rmse_mm, rel=1e-4)
 
 
-def test_without_its_parameters_the_truth_tells_no_error(session: Session, wish: Wish, truth: Column) -> None:
+def test_without_its_parameters_the_truth_tells_no_error(
+    session: Session, wish: Wish, truth: Column, kick: Predictor
+) -> None:
     record = truth.truth
     assert record is not None
     moved = {**record.parameters, "mass": record.parameters["mass"] * 1.05}
     columns = (*wish.columns, truth)
     assert all(s.error is None for s in session.frame(replace(wish, parameters=moved, columns=columns)).columns)
-    foreign = tuple(replace(column, foreign=True) for column in wish.columns)
+    foreign = tuple(replace(column, fit=fit_to(column.geometry, kick.rest)) for column in wish.columns)
     at = replace(wish, parameters=record.parameters, columns=(*foreign, truth))
     assert all(shown.error is None for shown in session.frame(at).columns)
 

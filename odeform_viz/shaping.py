@@ -1,0 +1,36 @@
+"""Another shape than the body that was trained: read, limited, fitted, and what the user is told of it."""
+
+from pathlib import Path
+
+import numpy as np
+
+import odeform
+from odeform.errors import InputError
+from odeform.geometry.shape import Fit, difference, fit_to
+from odeform.types import Mesh
+
+__all__ = ["MOST_POINTS", "describe_fit", "shape_from"]
+
+MOST_POINTS = 200_000  # what is moved and sent at interactive rates
+ALIKE = 0.05  # of the body's size; shapes that lie closer are the body in another discretisation
+
+
+def shape_from(path: str | Path, body: Mesh) -> Fit:
+    """The shape of a file, fitted to the body. `InputError` for what cannot be read or is too large to be shown."""
+    geometry = odeform.read_geometry(path)
+    if len(geometry.points) > MOST_POINTS:
+        raise InputError(
+            f"geometry {Path(path).name}: {len(geometry.points):,} points; expected at most {MOST_POINTS:,}, which can "
+            "be shown moving: decimate it first"
+        )
+    return fit_to(geometry, body)
+
+
+def describe_fit(fit: Fit, name: str, body: Mesh) -> str:
+    """Size, factor, and by how much the shape differs from what was trained."""
+    size = float(np.ptp(body.points, axis=0).max())
+    off = difference(fit.geometry, body)
+    text = f"{Path(name).name}: {len(fit.geometry.points):,} points, scaled by {fit.factor:.4g} to the trained size"
+    if off > ALIKE * size:
+        text += f"; its surface lies {1e3 * off:.0f} mm from the trained body's on average: no such shape was trained"
+    return text
