@@ -1,77 +1,146 @@
-"""How long a drag takes from the slider's message to the mesh's: `python -m odeform_viz.bench`."""
+"""How long the viewer takes from a slider's message to what answers it: `python -m odeform_viz.bench`."""
 
 import argparse
 import sys
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
 import odeform
+from odeform.checkpoint import bundled_checkpoints
+from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.evaluation.bench import ball
+from odeform.predictor import Predictor
+from odeform.types import Floats, GaussianSplats, Mesh
 from odeform_viz.app import App
-from odeform_viz.columns import Column
+from odeform_viz.columns import Column, truth_column
 from odeform_viz.loopback import LoopbackClient
 from odeform_viz.shapes import checker_parts
 
-__all__ = ["drag"]
+__all__ = ["drag", "scrub_splats"]
 
-BODY = "/world/column_0/body/part_0"
+RATE = 20.0  # Hz; a browser sends a slider no more often
+SPLATS = 100_000
 
 
-def drag(checkpoint: str, port: int, messages: int, points: int = 5000, rate: float = 20.0) -> dict[str, float]:
-    """Drag a physical slider at `rate` Hz against a running viewer on this machine.
-
-    Every message asks for a value of its own, so that each answer tells which wish it serves. A wish's latency runs
-    to the first answer that serves it or a newer one. `out_of_order` counts answers to older wishes than the one
-    before, `stale_last` whether the last answer was not to the last wish.
-    """
-    predictor = odeform.load(checkpoint)
-    shape = ball(points, predictor)
-    slider = predictor.schema.parameters[0]
-    values = np.linspace(slider.low, slider.high, messages)
-    moment = 0.02
-    app = App([Column(predictor.model, predictor, shape)], port=port)
-    sent, latency, order = np.zeros(messages), np.full(messages, np.nan), []
+@contextmanager
+def _serving(columns: list[Column], port: int, moment: float) -> Iterator[LoopbackClient]:
+    """A client of a viewer with these columns, paused at a moment."""
+    app = App(columns, port=port)
     try:
         with LoopbackClient(port) as client:
-            client.set("time (s)", moment)  # pauses
-            client.collect(0.5)
-            first = checker_parts(shape)[0][0][0]
-            expected = np.stack([predictor.solve(shape, {slider.name: v}).deformed(moment)[first] for v in values])
-
-            def listen(until: float) -> None:
-                while (left := until - time.perf_counter()) > 0.0:
-                    vertices = client.wait_vertices(BODY, left)
-                    if vertices is not None:
-                        order.append(int(np.abs(expected - vertices[0]).sum(axis=1).argmin()))
-                        waiting = np.isnan(latency[: order[-1] + 1])
-                        latency[: order[-1] + 1][waiting] = time.perf_counter() - sent[: order[-1] + 1][waiting]
-
-            for index, value in enumerate(values):
-                sent[index] = time.perf_counter()
-                client.set(f"{slider.name} ({slider.unit})", float(value))
-                listen(sent[index] + 1.0 / rate)
-            listen(time.perf_counter() + 1.0)
+            client.set("time (s)", moment)
+            client.collect(1.0)
+            yield client
     finally:
         app.close()
+
+
+def _answers(
+    values: Floats, send: Callable[[float], None], wait: Callable[[float], int | None], rate: float
+) -> dict[str, float]:
+    """Send one value after the other; `wait` gives the index of the wish that the next answer serves.
+
+    A wish's latency runs to the first answer that serves it or a newer one. `out_of_order` counts answers to older
+    wishes than the one before, `stale_last` whether the last answer was not to the last wish.
+    """
+    sent, latency, order = np.zeros(len(values)), np.full(len(values), np.nan), []
+
+    def listen(until: float) -> None:
+        while (left := until - time.perf_counter()) > 0.0:
+            served = wait(left)
+            if served is not None:
+                order.append(served)
+                waiting = np.isnan(latency[: served + 1])
+                latency[: served + 1][waiting] = time.perf_counter() - sent[: served + 1][waiting]
+
+    for index, value in enumerate(values):
+        sent[index] = time.perf_counter()
+        send(float(value))
+        listen(sent[index] + 1.0 / rate)
+    listen(time.perf_counter() + 1.0)
     return {
-        "messages": messages,
+        "messages": len(values),
         "answers": len(order),
         "p50_ms": 1e3 * float(np.percentile(latency, 50)),
         "p95_ms": 1e3 * float(np.percentile(latency, 95)),
         "out_of_order": int((np.diff(order) < 0).sum()),
-        "stale_last": int(order[-1] != messages - 1),
+        "stale_last": int(order[-1] != len(values) - 1),
     }
 
 
+def drag(models: list[Predictor], truth: Column | None, port: int, messages: int, points: int) -> dict[str, float]:
+    """Drag a physical slider under models side by side, with the truth of a sequence beside them or without.
+
+    Answers are the vertices of the last model, which are sent last. Each wish asks for a value of its own, so that
+    an answer tells which one it serves.
+    """
+    model = models[-1]
+    shape = ball(points, model)
+    slider = model.schema.parameters[0]
+    values, moment = np.linspace(slider.low, slider.high, messages), 0.3 if model.schema.impact else 0.02
+    columns = [Column(m.model, m, shape) for m in models]
+    columns = [*columns[:1], truth, *columns[1:]] if truth is not None else columns
+    # the last part of the last column
+    part = checker_parts(shape)[-1][0][0]
+    node = f"/world/column_{len(columns) - 1}/body/part_{len(checker_parts(shape)) - 1}"
+    others = truth.source.parameters if truth is not None and truth.truth else {}  # pyright: ignore[reportAttributeAccessIssue]
+    expected = np.stack([model.solve(shape, {**others, slider.name: v}).deformed(moment)[part] for v in values])
+
+    with _serving(columns, port, moment) as client:
+
+        def wait(seconds: float) -> int | None:
+            vertices = client.wait_vertices(node, seconds)
+            return None if vertices is None else int(np.abs(expected - vertices[0]).sum(axis=1).argmin())
+
+        return _answers(values, lambda v: client.set(f"{slider.name} ({slider.unit})", v), wait, RATE)
+
+
+def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]:
+    """Scrub the time of 100,000 splats with their covariances through the moments of the largest deformation."""
+    body: Mesh = ball(SPLATS, model)
+    count = len(body.points)
+    splats = GaussianSplats(body.points, np.tile(1e-6 * np.eye(3), (count, 1, 1)), np.ones((count, 3)), np.ones(count))
+    begin = 0.26 if model.schema.impact else 0.005
+    values = begin + np.linspace(0.0, 0.06, messages)
+    motion = model.solve(splats)
+    expected = np.array([motion.deformed(float(v))[0] for v in np.round(values, 4)])
+
+    with _serving([Column("splats", model, splats)], port, begin) as client:
+
+        def wait(seconds: float) -> int | None:
+            centers = client.wait_splats("/world/column_0/body/splats", seconds)
+            return None if centers is None else int(np.abs(expected - 0.01 * centers[0]).sum(axis=1).argmin())
+
+        return _answers(values, lambda v: client.set("time (s)", round(v, 4)), wait, 10.0)
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m odeform_viz.bench")
+    parser = argparse.ArgumentParser(prog="python -m odeform_viz.bench", description=__doc__)
     parser.add_argument("--checkpoint", default="kick")
-    parser.add_argument("--messages", type=int, default=1000)
+    parser.add_argument("--messages", type=int, default=300)
     parser.add_argument("--port", type=int, default=8097)
     args = parser.parse_args()
-    for key, value in drag(args.checkpoint, args.port, args.messages).items():
-        print(f"{key:<16} {value:.6g}")
+    model = odeform.load(args.checkpoint)
+    scene = model.schema.scene
+    rivals = [odeform.load(path) for name, path in bundled_checkpoints().items() if name.startswith(f"{scene}/")]
+    models = [model, *(r for r in rivals if r.model != model.model)][:3]
+    truth = None
+    if scene in bundled_datasets():
+        truth = truth_column(f"{scene}/{open_dataset(scene).select('test')[0].name}")
+    runs = {
+        "one model, 5,000 points": lambda: drag([model], None, args.port, args.messages, 5000),
+        f"{len(models)} models{' and truth' * (truth is not None)}, 2,500 points": lambda: drag(
+            models, truth, args.port, args.messages, 2500
+        ),
+        "time, 100,000 splats": lambda: scrub_splats(model, args.port, args.messages),
+    }
+    for name, run in runs.items():
+        print(name)
+        for key, value in run().items():
+            print(f"  {key:<14} {value:.6g}")
 
 
 if __name__ == "__main__":

@@ -93,6 +93,17 @@ class LoopbackClient:
                     return message["updates"]["vertices"].reshape(-1, 3)
         return None
 
+    def wait_splats(self, node: str, timeout: float = 5.0) -> np.ndarray | None:
+        """(N, 3) centres of the next update of that node's splats, in its own units."""
+        end = time.monotonic() + timeout
+        while (left := end - time.monotonic()) > 0.0:
+            for message in self.receive(left) or []:
+                if message.get("name") == node and "buffer" in message.get("updates", {}):
+                    # 32 bytes a splat, the centre first (viser's layout)
+                    words = message["updates"]["buffer"].view(np.uint32).reshape(-1, 8)
+                    return np.ascontiguousarray(words[:, :3]).view(np.float32)
+        return None
+
 
 def _decode(raw: bytes) -> list[dict[str, Any]]:
     """Frame: two uint64 (plain and compressed size), zstd-compressed msgpack, then 8-aligned binary arrays."""
