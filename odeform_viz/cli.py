@@ -9,7 +9,7 @@ import odeform
 from odeform.cli import run_guarded
 from odeform.errors import InputError
 from odeform.geometry.shape import fit_to
-from odeform.types import Geometry
+from odeform.types import GaussianSplats, Geometry
 from odeform_viz.session import Column
 
 __all__ = ["main", "make_columns"]
@@ -23,6 +23,8 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
         fit = fit_to(odeform.read_geometry(geometry), predictors[0].rest)
         shape = fit.geometry
         print(f"{geometry}: {len(shape.points)} points, scaled by {fit.factor:.4g} to the trained size")
+        for note in shape.notes if isinstance(shape, GaussianSplats) else ():
+            print(f"note: {geometry}: {note}", file=sys.stderr)
     labels: list[str] = []
     for predictor in predictors:
         count = sum(label.split(" #")[0] == predictor.model for label in labels)

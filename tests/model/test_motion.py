@@ -144,7 +144,7 @@ def test_shape_and_heading_turn_the_motion_where_shape_matters(predictors: dict[
 def test_all_kinds_of_shapes_move_alike(predictors: dict[str, Predictor], model: str) -> None:
     points, count = ball(2).points, len(ball(2).points)
     covariances = np.tile(np.diag([1e-4, 4e-4, 9e-4]), (count, 1, 1))
-    splats = GaussianSplats(points, covariances, np.ones((count, 3)), np.ones(count))
+    splats = GaussianSplats(points, covariances, np.ones((count, 1, 3)), np.ones(count))
     times = GRIDS["few"]
     mesh = predictors[model].solve(ball(2), SETTING).vertices(times)
     cloud = predictors[model].solve(PointCloud(points), SETTING).vertices(times)
