@@ -131,10 +131,13 @@ def _predict(args: argparse.Namespace) -> None:
     from odeform.geometry.reading import read_geometry
     from odeform.geometry.shape import fit_to
     from odeform.predictor import load
+    from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
     geometry = fit_to(read_geometry(args.geometry), predictor.rest).geometry if args.geometry else None
+    for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
+        print(f"note: {args.geometry}: {note}", file=sys.stderr)
     motion = predictor.solve(geometry, parse_settings(args.set), args.quality, until=float(times[-1]))
     write_motion(motion, times, args.out)
     for name in motion.outside:

@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.files import write_aside
+from odeform.geometry.harmonics import rotated_harmonics
+from odeform.geometry.splat_inria import inria_bytes
 from odeform.model.motion import Motion
 from odeform.types import Floats, GaussianSplats, Mesh
 
@@ -31,7 +34,7 @@ def parse_times(text: str) -> Floats:
 
 
 def write_motion(motion: Motion, times: Floats, out: str | Path) -> None:
-    """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name."""
+    """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name (splats as INRIA's code does)."""
     path = Path(out)
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -59,9 +62,14 @@ def _npz(motion: Motion, times: Floats) -> bytes:
 
 
 def _ply(motion: Motion, time: float) -> bytes:
-    vertices = motion.vertices(time)
-    if isinstance(motion.geometry, Mesh):
-        shape: trimesh.Trimesh | trimesh.PointCloud = trimesh.Trimesh(vertices, motion.geometry.faces, process=False)
+    vertices, geometry = motion.vertices(time), motion.geometry
+    if isinstance(geometry, GaussianSplats):
+        # colours turn with the body as a whole
+        harmonics = rotated_harmonics(geometry.harmonics, motion.pose(time)[:3, :3])
+        moved = replace(geometry, points=vertices, covariances=motion.covariances(time), harmonics=harmonics)
+        return inria_bytes(moved)
+    if isinstance(geometry, Mesh):
+        shape: trimesh.Trimesh | trimesh.PointCloud = trimesh.Trimesh(vertices, geometry.faces, process=False)
     else:
         shape = trimesh.PointCloud(vertices)
     data = shape.export(file_type="ply")

@@ -1,6 +1,7 @@
 """Value types shared by all layers. Lengths are metres, times seconds, masses kilograms."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from jaxtyping import Float, Int
 from numpy.typing import NDArray
 
 __all__ = [
+    "SH0",
     "Arrays",
     "Basis",
     "Faces",
@@ -15,6 +17,7 @@ __all__ = [
     "Frames",
     "GaussianSplats",
     "Geometry",
+    "Harmonics",
     "Ints",
     "Matrices",
     "Mesh",
@@ -45,6 +48,9 @@ Rotations = Float[np.ndarray, "*batch 3 3"]
 Matrices = Float[np.ndarray, "points 3 3"]
 Pose = Float[np.ndarray, "*batch 4 4"]
 Basis = Float[np.ndarray, "points 3 modes"]
+Harmonics = Float[np.ndarray, "points harmonics 3"]
+
+SH0 = 0.28209479177387814  # zeroth real spherical harmonic, 1 / (2 sqrt(pi))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +70,23 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class GaussianSplats:
-    """`points` (N, 3) centres in m, `covariances` (N, 3, 3) m^2, `colors` (N, 3) and `opacities` (N,) in [0, 1]."""
+    """`points` (N, 3) centres in m, `covariances` (N, 3, 3) m^2, `opacities` (N,) in [0, 1].
+
+    `harmonics` (N, H, 3) are the coefficients of red, green and blue for H = 1, 4, 9 or 16 spherical harmonics, the
+    constant first (`odeform.geometry.harmonics` has their order and signs). `notes` say what a file had beyond that,
+    or had broken.
+    """
 
     points: Points
     covariances: Float[np.ndarray, "points 3 3"]
-    colors: Points
+    harmonics: Harmonics
     opacities: Perpoint
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def colors(self) -> Points:
+        """(N, 3) in [0, 1]: the constant part, as if seen from all sides at once."""
+        return np.clip(0.5 + SH0 * self.harmonics[:, 0], 0.0, 1.0)
 
 
 Geometry = Mesh | PointCloud | GaussianSplats

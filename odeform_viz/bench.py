@@ -102,7 +102,9 @@ def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]
     """Scrub the time of 100,000 splats with their covariances through the moments of the largest deformation."""
     body: Mesh = ball(SPLATS, model)
     count = len(body.points)
-    splats = GaussianSplats(body.points, np.tile(1e-6 * np.eye(3), (count, 1, 1)), np.ones((count, 3)), np.ones(count))
+    splats = GaussianSplats(
+        body.points, np.tile(1e-6 * np.eye(3), (count, 1, 1)), np.ones((count, 1, 3)), np.ones(count)
+    )
     begin = 0.26 if model.schema.impact else 0.005
     values = begin + np.linspace(0.0, 0.06, messages)
     motion = model.solve(splats)

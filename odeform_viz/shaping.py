@@ -7,7 +7,7 @@ import numpy as np
 import odeform
 from odeform.errors import InputError
 from odeform.geometry.shape import Fit, difference, fit_to
-from odeform.types import Mesh
+from odeform.types import GaussianSplats, Mesh
 
 __all__ = ["MOST_POINTS", "describe_fit", "shape_from"]
 
@@ -27,10 +27,10 @@ def shape_from(path: str | Path, body: Mesh) -> Fit:
 
 
 def describe_fit(fit: Fit, name: str, body: Mesh) -> str:
-    """Size, factor, and by how much the shape differs from what was trained."""
+    """Size, factor, what was wrong with the file, and by how much the shape differs from what was trained."""
     size = float(np.ptp(body.points, axis=0).max())
     off = difference(fit.geometry, body)
     text = f"{Path(name).name}: {len(fit.geometry.points):,} points, scaled by {fit.factor:.4g} to the trained size"
     if off > ALIKE * size:
         text += f"; its surface lies {1e3 * off:.0f} mm from the trained body's on average: no such shape was trained"
-    return text
+    return "; ".join([text, *(fit.geometry.notes if isinstance(fit.geometry, GaussianSplats) else ())])

@@ -8,7 +8,10 @@ import trimesh
 from odeform.cli import main, run_guarded
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
+from odeform.geometry.reading import read_geometry
+from odeform.geometry.splat_inria import inria_bytes
 from odeform.predictor import Predictor, load
+from odeform.types import GaussianSplats
 
 
 def run(*arguments: object) -> int:
@@ -76,6 +79,23 @@ def test_predict_fits_a_foreign_shape(trained: dict[str, Path], tmp_path: Path) 
         start = arrays["vertices"][0]
         assert np.allclose(np.ptp(start, axis=0), [0.2, 0.1, 0.1], atol=1e-5)
         assert start[:, 2].min() == pytest.approx(0.0, abs=1e-5)
+
+
+def test_predict_takes_splats_and_tells_what_it_left_out(
+    trained: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    points = np.random.default_rng(0).normal(size=(9, 3))
+    points[4] = np.nan
+    splats = GaussianSplats(points, np.tile(1e-4 * np.eye(3), (9, 1, 1)), np.zeros((9, 4, 3)), np.ones(9))
+    (tmp_path / "nine.ply").write_bytes(inria_bytes(splats))
+    arguments = ("--geometry", tmp_path / "nine.ply", "--out", tmp_path / "{frame}.ply", "--times", "0:0.2:0.1")
+    assert run("predict", trained["nearest"], *arguments) == 0
+    said = capsys.readouterr()
+    assert said.err.strip() == f"note: {tmp_path / 'nine.ply'}: 1 of 9 splats left out, not finite"
+    assert "2 frames of 8 points" in said.out
+    again = read_geometry(tmp_path / "00001.ply")
+    assert isinstance(again, GaussianSplats)
+    assert again.harmonics.shape == (8, 4, 3)
 
 
 def test_predict_tells_what_is_outside(

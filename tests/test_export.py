@@ -7,6 +7,8 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.export import parse_times, write_motion
+from odeform.geometry.harmonics import harmonic_basis
+from odeform.geometry.reading import read_geometry
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats, PointCloud
 
@@ -28,7 +30,7 @@ def test_impossible_times(text: str) -> None:
 def test_points_and_splats(predictors: dict[str, Predictor], tmp_path: Path) -> None:
     points = np.random.default_rng(0).uniform((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2), size=(8, 3))
     covariances = np.tile(1e-6 * np.diag([1.0, 2.0, 3.0]), (8, 1, 1))
-    splats = GaussianSplats(points, covariances, np.ones((8, 3)), np.ones(8))
+    splats = GaussianSplats(points, covariances, np.random.default_rng(1).normal(size=(8, 4, 3)), np.full(8, 0.7))
     times = np.array([0.0, 0.3])
     for shape, keys in (
         (PointCloud(points), {"times", "parameters", "vertices", "faces"}),
@@ -46,6 +48,27 @@ def test_points_and_splats(predictors: dict[str, Predictor], tmp_path: Path) -> 
                 assert np.allclose(arrays["covariances"][1], motion.covariances(0.3), atol=1e-12)
         write_motion(motion, times, tmp_path / "{frame}.ply")
         assert np.allclose(trimesh.load(tmp_path / "00001.ply").vertices, motion.vertices(0.3), atol=1e-7)
+
+
+def test_splats_are_written_as_splats(predictors: dict[str, Predictor], tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2), size=(8, 3))
+    factors = 1e-3 * rng.normal(size=(8, 3, 3))
+    splats = GaussianSplats(points, factors @ factors.swapaxes(1, 2), rng.normal(size=(8, 16, 3)), np.full(8, 0.7))
+    motion = predictors["nearest"].solve(splats)
+    write_motion(motion, np.array([0.0, 0.5]), tmp_path / "{frame}.ply")
+    seen = rng.normal(size=(20, 3))
+    seen /= np.linalg.norm(seen, axis=1, keepdims=True)
+    for name, time in (("00000.ply", 0.0), ("00001.ply", 0.5)):
+        read = read_geometry(tmp_path / name)
+        assert isinstance(read, GaussianSplats)
+        assert np.array_equal(read.points, motion.vertices(time))
+        assert np.allclose(read.covariances, motion.covariances(time), rtol=1e-4, atol=1e-12)
+        assert np.allclose(read.opacities, 0.7, atol=1e-6)
+        # a side of the body keeps its colour as the body turns
+        moved = harmonic_basis(seen @ motion.pose(time)[:3, :3].T, 3) @ read.harmonics
+        assert np.allclose(moved, harmonic_basis(seen, 3) @ splats.harmonics, atol=1e-5)
+    assert np.abs(motion.pose(0.5)[:3, :3] - np.eye(3)).max() > 1e-3
 
 
 def test_braces_of_others(predictors: dict[str, Predictor], tmp_path: Path) -> None:

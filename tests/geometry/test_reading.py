@@ -3,39 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from odeform.errors import InputError
 from odeform.geometry.reading import read_geometry
-from odeform.types import GaussianSplats, Mesh, PointCloud
+from odeform.types import Mesh, PointCloud
 
 SPHERE = trimesh.creation.icosphere(2, 0.3)
 MESHES = ("obj", "ply", "stl", "glb", "off")
-SPLAT = np.dtype([("xyz", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rot", "u1", 4)])
-INRIA = (
-    *("x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2", "f_rest_0", "opacity"),
-    *("scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"),
-)
-
-
-def inria(columns: dict[str, np.ndarray]) -> bytes:
-    rows = np.stack(list(columns.values()), axis=1).astype("<f4")
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
-    header += [*(f"property float {name}" for name in columns), "end_header", ""]
-    return "\n".join(header).encode() + rows.tobytes()
-
-
-def inria_columns(count: int = 6) -> dict[str, np.ndarray]:
-    rng = np.random.default_rng(0)
-    return {name: rng.normal(size=count) for name in INRIA}
-
-
-def splats(count: int = 5) -> np.ndarray:
-    rng = np.random.default_rng(1)
-    raw = np.zeros(count, SPLAT)
-    raw["xyz"], raw["scale"] = rng.normal(size=(count, 3)), rng.uniform(0.01, 0.1, (count, 3))
-    raw["rgba"], raw["rot"] = rng.integers(0, 256, (count, 4)), rng.integers(0, 256, (count, 4))
-    return raw
 
 
 @pytest.mark.parametrize("ending", MESHES)
@@ -86,38 +60,6 @@ def test_points(tmp_path: Path) -> None:
         assert np.allclose(cloud.points, points, atol=1e-6)
 
 
-def test_inria_splats(tmp_path: Path) -> None:
-    columns = inria_columns()
-    (tmp_path / "splats.ply").write_bytes(inria(columns))
-    read = read_geometry(tmp_path / "splats.ply")
-    assert isinstance(read, GaussianSplats)
-
-    def stack(*names: str) -> np.ndarray:
-        return np.stack([columns[name] for name in names], axis=1)
-
-    assert np.allclose(read.points, stack("x", "y", "z"), atol=1e-6)
-    color = 0.5 + stack("f_dc_0", "f_dc_1", "f_dc_2") / np.sqrt(4.0 * np.pi)
-    assert np.allclose(read.colors, np.clip(color, 0.0, 1.0), atol=1e-6)
-    assert np.allclose(read.opacities, 1.0 / (1.0 + np.exp(-columns["opacity"])), atol=1e-6)
-    rotation = Rotation.from_quat(stack("rot_0", "rot_1", "rot_2", "rot_3"), scalar_first=True).as_matrix()
-    variance = np.exp(stack("scale_0", "scale_1", "scale_2")) ** 2
-    true = np.einsum("nij,nj,nkj->nik", rotation, variance, rotation)
-    assert np.allclose(read.covariances, true, rtol=1e-5, atol=1e-5)
-
-
-def test_splat_file(tmp_path: Path) -> None:
-    raw = splats()
-    (tmp_path / "a.splat").write_bytes(raw.tobytes())
-    read = read_geometry(tmp_path / "a.splat")
-    assert isinstance(read, GaussianSplats)
-    assert np.array_equal(read.points, raw["xyz"])
-    assert np.allclose(read.colors, raw["rgba"][:, :3] / 255.0)
-    assert np.allclose(read.opacities, raw["rgba"][:, 3] / 255.0)
-    rotation = Rotation.from_quat(raw["rot"].astype(float) - 128.0, scalar_first=True).as_matrix()
-    true = np.einsum("nij,nj,nkj->nik", rotation, raw["scale"].astype(float) ** 2, rotation)
-    assert np.allclose(read.covariances, true, atol=1e-9)
-
-
 def damaged() -> dict[str, tuple[str, bytes]]:
     """Name of the damage -> ending and content of a file that has to be refused."""
     files: dict[str, tuple[str, bytes]] = {
@@ -132,14 +74,6 @@ def damaged() -> dict[str, tuple[str, bytes]]:
         "points, plane": ("xyz", b"0 0\n1 1\n2 3\n"),
         "points, words": ("xyz", b"x y z\n0 0 0\n1 1 1\n"),
         "points, empty": ("xyz", b""),
-        "splats, truncated": ("splat", splats().tobytes()[:-7]),
-        "splats, empty": ("splat", b""),
-        "splats, one": ("splat", splats(1).tobytes()),
-        "inria, truncated": ("ply", inria(inria_columns())[:-30]),
-        "inria, one": ("ply", inria(inria_columns(1))),
-        "inria, no rotation": ("ply", inria({k: v for k, v in inria_columns().items() if k != "rot_2"})),
-        "inria, half a color": ("ply", inria({k: v for k, v in inria_columns().items() if k != "f_dc_1"})),
-        "compressed splats": ("ply", b"ply\nformat ascii 1.0\nproperty uint packed_position\nend_header\n"),
         "unknown ending": ("step", b"ISO-10303-21;"),
         "no ending": ("", b"v 0 0 0\n"),
     }
@@ -153,13 +87,6 @@ def damaged() -> dict[str, tuple[str, bytes]]:
         files[f"{ending}, not one"] = (ending, b"hello world\n" * 9)
         nan = broken.export(file_type=ending)
         files[f"{ending}, not finite"] = (ending, nan.encode() if isinstance(nan, str) else nan)
-    for column in ("x", "opacity", "scale_1", "rot_0", "f_dc_0"):
-        columns = inria_columns()
-        columns[column][2] = np.nan
-        files[f"inria, {column} not finite"] = ("ply", inria(columns))
-    raw = splats()
-    raw["scale"][2] = np.nan
-    files["splats, scale not finite"] = ("splat", raw.tobytes())
     return files
 
 

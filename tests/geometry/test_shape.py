@@ -60,10 +60,10 @@ def test_fit_leaves_what_fits() -> None:
 
 def test_fit_scales_splats() -> None:
     points = np.random.default_rng(0).normal(size=(9, 3))
-    splats = GaussianSplats(points, np.tile(np.eye(3), (9, 1, 1)), np.ones((9, 3)), np.ones(9))
+    splats = GaussianSplats(points, np.tile(np.eye(3), (9, 1, 1)), np.ones((9, 4, 3)), np.ones(9))
     fit = fit_to(splats, ball(2))
     assert isinstance(fit.geometry, GaussianSplats)
     assert np.allclose(fit.geometry.covariances, fit.factor**2 * np.eye(3))
-    assert fit.geometry.colors is splats.colors
+    assert fit.geometry.harmonics is splats.harmonics
     moved = replace(splats, points=100.0 * points + 7.0)
     assert np.allclose(fit_to(moved, ball(2)).geometry.points, fit.geometry.points, atol=1e-6)

@@ -45,7 +45,7 @@ def egg() -> Mesh:
 def speckled(points: np.ndarray) -> GaussianSplats:
     """Splats of some millimetres at `points`, each of another shape."""
     halves = 2e-3 * np.random.default_rng(5).normal(size=(len(points), 3, 3))
-    colors = np.ones((len(points), 3))
+    colors = np.ones((len(points), 1, 3))
     return GaussianSplats(points, halves @ halves.swapaxes(1, 2), colors, np.ones(len(points)))
 
 
@@ -155,7 +155,7 @@ def test_shape_and_heading_turn_the_motion_where_shape_matters(predictors: dict[
 def test_all_kinds_of_shapes_move_alike(predictors: dict[str, Predictor], model: str) -> None:
     points, count = ball(2).points, len(ball(2).points)
     covariances = np.tile(np.diag([1e-4, 4e-4, 9e-4]), (count, 1, 1))
-    splats = GaussianSplats(points, covariances, np.ones((count, 3)), np.ones(count))
+    splats = GaussianSplats(points, covariances, np.ones((count, 1, 3)), np.ones(count))
     times = GRIDS["few"]
     mesh = predictors[model].solve(ball(2), SETTING).vertices(times)
     cloud = predictors[model].solve(PointCloud(points), SETTING).vertices(times)

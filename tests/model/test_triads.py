@@ -36,7 +36,7 @@ class Still:
 def splats_at(points: np.ndarray, size: float = 3e-3) -> GaussianSplats:
     halves = size * np.random.default_rng(5).normal(size=(len(points), 3, 3))
     ones = np.ones((len(points), 3))
-    return GaussianSplats(points, halves @ halves.swapaxes(1, 2), ones, ones[:, 0])
+    return GaussianSplats(points, halves @ halves.swapaxes(1, 2), ones[:, None], ones[:, 0])
 
 
 def motion_of(splats: GaussianSplats, space: ReducedSpace, y: Floats) -> Motion:

@@ -10,10 +10,11 @@ import pytest
 from odeform import InputError
 from odeform.predictor import Predictor
 from odeform_viz.app import App
-from odeform_viz.bench import BODY
 from odeform_viz.columns import Column
 from odeform_viz.loopback import LoopbackClient
 from odeform_viz.shapes import checker_parts
+
+BODY = "/world/column_0/body/part_0"
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ def test_splats_are_sent_as_they_deform_and_as_given_at_rest(kick: Predictor, mo
     sent = []
     monkeypatch.setattr(viser.GaussianSplatHandle, "set_gaussians", lambda _, *arrays: sent.append(arrays))
     ones = np.ones((len(kick.rest.points), 3))
-    splats = GaussianSplats(kick.rest.points, np.tile(1e-6 * np.eye(3), (len(ones), 1, 1)), ones, ones[:, 0])
+    splats = GaussianSplats(kick.rest.points, np.tile(1e-6 * np.eye(3), (len(ones), 1, 1)), ones[:, None], ones[:, 0])
     session = Session(kick.schema)
     columns = Columns.of([Column("splats", kick, splats)]).all
     wish = Wish(session.schema.complete({}), 0.02, "balanced", columns)

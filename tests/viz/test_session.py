@@ -123,7 +123,7 @@ def test_at_rest_a_pose_says_it_all(session: Session, wish: Wish) -> None:
 def test_splats_deform_with_the_body(kick: Predictor) -> None:
     halves = 2e-3 * np.random.default_rng(0).normal(size=(len(kick.rest.points), 3, 3))
     ones = np.ones((len(halves), 3))
-    splats = GaussianSplats(kick.rest.points, halves @ halves.swapaxes(1, 2), ones, ones[:, 0])
+    splats = GaussianSplats(kick.rest.points, halves @ halves.swapaxes(1, 2), ones[:, None], ones[:, 0])
     columns = Columns.of([Column("splats", kick, splats), Column("mesh", kick, kick.rest)]).all
     session = Session(kick.schema)
     wish = Wish(session.schema.complete({}), 0.02, "balanced", columns)

@@ -1,0 +1,141 @@
+"""Niantic's .spz: quantised splats, attribute by attribute, versions 1 to 4 (https://github.com/nianticlabs/spz).
+
+Versions up to 3 are one gzip stream, which some tools leave out; version 4 is a stream of zstandard for each attribute
+behind a table of their sizes. The format stores x right, y up, z backward; splats come out as the .ply of the same
+capture has them, x right, y down, z forward.
+"""
+
+import struct
+import zlib
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from odeform.errors import InputError
+from odeform.geometry.ellipsoids import covariances_from_axes, with_fourth
+from odeform.geometry.harmonics import rotated_harmonics
+from odeform.types import Floats, GaussianSplats
+
+__all__ = ["spz_splats"]
+
+Bytes = NDArray[np.uint8]
+
+MAGIC = b"NGSP"
+HEADER = struct.Struct("<4sIIBBBB")  # magic, version, splats, degree, bits of a fraction, flags, streams
+HIGHEST = 3  # degree of harmonics; no viewer shows more
+EXTENDED = 2  # flag: a vendor's records follow
+CONSTANT = 0.15  # a byte of colour is this times the constant harmonic, about one half
+TIGHTEST = 1024  # no stream is packed more than this
+AXES = np.diag([1.0, -1.0, -1.0])
+
+
+class Header(NamedTuple):
+    """What every version starts with; `streams` counts in version 4 only."""
+
+    magic: bytes
+    version: int
+    splats: int
+    degree: int
+    fraction: int
+    flags: int
+    streams: int
+
+    @property
+    def widths(self) -> list[int]:
+        """Bytes a splat of position, opacity, colour, scales, turn and further harmonics, in the order of the file."""
+        position, turn = 6 if self.version == 1 else 9, 3 if self.version < 3 else 4
+        return [position, 1, 3, 3, turn, 3 * ((self.degree + 1) ** 2 - 1)]
+
+
+def spz_splats(data: bytes, path: Path) -> GaussianSplats:
+    """Bytes of a file -> splats."""
+    header, body = _unpacked(data, path)
+    count, widths = header.splats, header.widths
+    if len(body) < count * sum(widths):
+        raise InputError(f"geometry {path}: expected {count * sum(widths)} bytes of {count} splats, got {len(body)}")
+    cuts = np.cumsum([count * width for width in widths])
+    parts = np.split(np.frombuffer(body, np.uint8)[: cuts[-1]], cuts[:-1])
+    points, alphas, colors, scales, turns, further = (
+        part.reshape(count, width) for part, width in zip(parts, widths, strict=True)
+    )
+    harmonics = np.empty((count, (header.degree + 1) ** 2, 3), np.float32)
+    harmonics[:, 0] = (colors / 255.0 - 0.5) / CONSTANT
+    harmonics[:, 1:] = (further.reshape(count, widths[-1] // 3, 3) - 128.0) / 128.0
+    notes = []
+    if header.degree > HIGHEST:
+        notes.append(f"colour beyond degree {HIGHEST} left out")
+    if header.flags & EXTENDED:
+        notes.append("a vendor's extensions left out")
+    quaternions = _three_bytes(turns) if header.version < 3 else _smallest_three(turns)
+    return GaussianSplats(
+        (_positions(points, header) @ AXES).astype(np.float32),
+        AXES @ covariances_from_axes(np.exp(scales / 16.0 - 10.0), quaternions) @ AXES,
+        rotated_harmonics(harmonics[:, : (HIGHEST + 1) ** 2], AXES),
+        alphas[:, 0] / 255.0,
+        tuple(notes),
+    )
+
+
+def _unpacked(data: bytes, path: Path) -> tuple[Header, bytes]:
+    """The header, and the attributes one after the other."""
+    gzip = zlib.decompressobj(wbits=31) if data.startswith(b"\x1f\x8b") else None
+    head = gzip.decompress(data, HEADER.size) if gzip else data[: HEADER.size]
+    if len(head) < HEADER.size or not head.startswith(MAGIC):
+        raise InputError(f"geometry {path}: expected a header that starts with NGSP, got {head[:4]!r}")
+    header = Header(*HEADER.unpack(head))
+    if not 1 <= header.version <= (3 if gzip else 4):
+        raise InputError(f"geometry {path}: expected version 1 to 4 of .spz, got {header.version}")
+    if header.degree > 4 or header.fraction > 23:
+        got = f"degree {header.degree} and {header.fraction} bits"
+        raise InputError(f"geometry {path}: expected harmonics to degree 4 and up to 23 bits of a fraction, got {got}")
+    size = header.splats * sum(header.widths)
+    if size > TIGHTEST * len(data):
+        raise InputError(f"geometry {path}: {len(data)} bytes cannot hold {header.splats} splats")
+    if header.version == 4:
+        return header, _streams(data, header, path)
+    return header, gzip.decompress(gzip.unconsumed_tail, max(size, 1)) if gzip else data[HEADER.size :]
+
+
+def _streams(data: bytes, header: Header, path: Path) -> bytes:
+    sizes = [header.splats * width for width in header.widths if header.splats * width]
+    if header.streams != len(sizes) or len(data) < 32:
+        raise InputError(f"geometry {path}: expected {len(sizes)} streams of .spz, got {header.streams}")
+    (table,) = struct.unpack_from("<I", data, 16)
+    start = table + 16 * len(sizes)
+    if table < 32 or start > len(data):
+        raise InputError(f"geometry {path}: expected a table of streams within {len(data)} bytes, got it at {table}")
+    parts = []
+    for index, size in enumerate(sizes):
+        packed, unpacked = struct.unpack_from("<QQ", data, table + 16 * index)
+        with zstandard.ZstdDecompressor().stream_reader(data[start : start + packed]) as reader:
+            part = reader.read(size)
+        if len(part) < size or unpacked != size:
+            raise InputError(f"geometry {path}: expected {size} bytes in stream {index + 1}, got {len(part)}")
+        parts.append(part)
+        start += packed
+    return b"".join(parts)
+
+
+def _positions(raw: Bytes, header: Header) -> Floats:
+    """(N, 9) bytes of three numbers of 24 bits, `fraction` of them behind the point; (N, 6) of half floats once."""
+    if header.version == 1:
+        return np.ascontiguousarray(raw).view("<f2").astype(float)
+    low, middle, high = np.moveaxis(raw.reshape(-1, 3, 3).astype(np.int32), -1, 0)
+    # the highest byte carries the sign
+    return (low + (middle << 8) + (high.astype(np.uint8).view(np.int8).astype(np.int32) << 16)) * 2.0**-header.fraction
+
+
+def _three_bytes(raw: Bytes) -> Floats:
+    """(N, 3) bytes x, y, z -> (N, 4), w first."""
+    return np.roll(with_fourth(raw / 127.5 - 1.0, np.full(len(raw), 3)), 1, axis=1)
+
+
+def _smallest_three(raw: Bytes) -> Floats:
+    """(N, 4) bytes of a word: place of the largest of x, y, z, w, then a sign and 9 bits for each other -> w first."""
+    word = np.ascontiguousarray(raw).view("<u4")[:, 0]
+    fields = np.stack([word >> 20, word >> 10, word], axis=1)
+    size = (fields & 511) / 511.0 * np.sqrt(0.5)
+    return np.roll(with_fourth(np.where(fields & 512, -size, size), word >> 30), 1, axis=1)
