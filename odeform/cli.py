@@ -96,7 +96,9 @@ def _train(args: argparse.Namespace) -> None:
     window = parse_window(args.window)
     if not 0.0 < args.minutes < float("inf"):
         raise InputError(f"--minutes: expected a positive number, got {args.minutes:g}")
-    request = TrainRequest(args.model, args.seed, args.minutes, window, args.every, args.resume)
+    if args.steps is not None and args.steps < 1:
+        raise InputError(f"--steps: expected a positive number, got {args.steps}")
+    request = TrainRequest(args.model, args.seed, args.minutes, args.steps, window, args.every, args.resume)
     train(dataset, rest, args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
 
 
@@ -202,6 +204,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--every", type=int, default=1, metavar="K", help="train on every k-th frame")
     sub.add_argument("--seed", type=int, default=0, metavar="S")
     sub.add_argument("--minutes", type=float, default=30.0, metavar="M", help="wall time (default 30)")
+    sub.add_argument("--steps", type=int, metavar="N", help="so many steps of training instead: repeatable")
     sub.add_argument("--resume", action="store_true", help="continue an interrupted training (FILE.part)")
 
     sub = command("evaluate", _evaluate, "score checkpoints on a data set")

@@ -42,7 +42,7 @@ def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[
     root, rest, paths = tmp_path_factory.mktemp("models"), get_scene("kick").rest_mesh(), {}
     for model in ("odeform", "pod-rbf", "nearest"):
         paths[model] = root / f"{model}.safetensors"
-        request = TrainRequest(model, seed=1, minutes=0.15)
+        request = TrainRequest(model, seed=1, steps=60)
         train(dataset, rest, paths[model], request, lambda _: None)
     return paths
 

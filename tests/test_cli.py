@@ -192,6 +192,7 @@ BAD = {
     "train: no data set": "train {empty} --out {empty}/a.safetensors",
     "train: unknown model": "train {data} --out {empty}/a.safetensors --model oracle",
     "train: window": "train {data} --out {empty}/a.safetensors --window 0:b",
+    "train: steps": "train {data} --out {empty}/a.safetensors --steps 0",
     "pack: no data set": "pack {empty} --out {empty}/a.odp",
     "pack: ending": "pack {data} --out {empty}/a.zip",
     "pack: no such file": "pack {empty}/a.odp --out {empty}/b.odp",

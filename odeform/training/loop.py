@@ -38,7 +38,9 @@ class TrainConfig:
     """How to train."""
 
     minutes: float = 30.0
-    """Wall time."""
+    """Wall time, unless `steps` are given."""
+    steps: int | None = None
+    """So many steps, however long they take: the same result on a busy machine."""
     seed: int = 0
     batch: int = 64
     """Sequences in a step."""
@@ -194,7 +196,7 @@ class _Trainer:
 
     def _fingerprint(self) -> dict[str, Any]:
         """What has to be the same for a training to go on; how long it may take need not."""
-        config = {k: v for k, v in asdict(self.config).items() if k not in ("minutes", "report")}
+        config = {k: v for k, v in asdict(self.config).items() if k not in ("minutes", "steps", "report")}
         return {"data": self.identity, "network": asdict(self.net.config), "config": config}
 
     def save(self, path: Path) -> None:
@@ -259,17 +261,23 @@ def train_network(
         report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
     seconds = 60.0 * config.minutes
     begin, printed = time.monotonic() - trainer.elapsed, trainer.elapsed
+
+    def spent() -> float:
+        """The share of the budget."""
+        done, budget = (trainer.elapsed, seconds) if config.steps is None else (trainer.done, config.steps)
+        return done / budget if budget else 1.0
+
     try:
-        while (elapsed := time.monotonic() - begin) < seconds:
-            trainer.advance(elapsed / seconds)
-            trainer.elapsed = elapsed
-            if elapsed - printed > config.report:
-                printed = elapsed
+        while (share := spent()) < 1.0:
+            trainer.advance(share)
+            trainer.elapsed = time.monotonic() - begin
+            if trainer.elapsed - printed > config.report:
+                printed = trainer.elapsed
                 trainer.solve_readout(config.ridge)
                 rigid, local = trainer.errors_mm("val")
                 trained, trained_local = trainer.errors_mm("train")
                 report(
-                    f"{100 * elapsed / seconds:.0f} %, step {trainer.done}: rigid {rigid:.3f} mm "
+                    f"{100 * spent():.0f} %, step {trainer.done}: rigid {rigid:.3f} mm "
                     f"(train {trained:.3f}), deformation {local:.4f} mm (train {trained_local:.4f})"
                 )
                 if part is not None:

@@ -34,6 +34,8 @@ class TrainRequest:
     model: str = "odeform"
     seed: int = 0
     minutes: float = 30.0
+    steps: int | None = None
+    """Of training, in place of minutes."""
     window: tuple[int, int] | None = None
     every: int = 1
     resume: bool = False
@@ -45,7 +47,7 @@ def _fit_odeform(
     from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
 
     net = build_network(data, request.seed)
-    config = TrainConfig(minutes=request.minutes, seed=request.seed)
+    config = TrainConfig(request.minutes, request.steps, seed=request.seed)
     val = train_network(net, data, config, report, part, request.resume)
     settings = {"network": asdict(net.config), "qualities": {}, "training": asdict(config), "val": val}
     return {PREFIX + name: value for name, value in network_weights(net).items()}, settings
@@ -117,7 +119,8 @@ def _command(dataset: Dataset, request: TrainRequest) -> list[str]:
     simulate = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
     simulate += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
     options = f" --model {request.model} --seed {request.seed}"
-    options += f" --minutes {request.minutes:g}" if request.model == "odeform" else ""
+    if request.model == "odeform":
+        options += f" --minutes {request.minutes:g}" if request.steps is None else f" --steps {request.steps}"
     options += f" --window {request.window[0]}:{request.window[1]}" if request.window else ""
     options += f" --every {request.every}" if request.every > 1 else ""
     return [simulate, f"odeform train DIR --out FILE{options}"]

@@ -171,7 +171,7 @@ def test_a_sequence_that_ended_is_scored_where_it_lies(dataset: Dataset, predict
     assert by_frame[107] > 10.0
 
 
-def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, Predictor], kick: Predictor) -> None:
+def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
     train = [s.vertices @ rotation_z(s.parameters["azimuth"]) for s in dataset.sequences("train")]
     mean = np.mean(train, axis=0)
     guesses = [
@@ -180,8 +180,6 @@ def test_learning_beats_the_mean_motion(dataset: Dataset, predictors: dict[str, 
     ]
     by_mean = score(*guesses)["rmse_pooled_mm"]
     assert evaluate(predictors["pod-rbf"], dataset, "test")["rmse_pooled_mm"] < 0.75 * by_mean
-    # trained on finer steps than these sequences are made of, and still close
-    assert evaluate(kick, dataset, "test")["rmse_pooled_mm"] < 0.25 * by_mean
 
 
 def test_another_scene(dataset: Dataset, predictors: dict[str, Predictor]) -> None:

@@ -90,6 +90,14 @@ def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) ->
     assert all(np.array_equal(whole[name], again[name]) for name in whole)
 
 
+def test_steps_are_a_budget_that_repeats(data: TrainingData) -> None:
+    """Whatever the machine does meanwhile."""
+    nets = [build_network(data, 0) for _ in range(2)]
+    assert [train_network(net, data, TrainConfig(steps=3, batch=8), silent)["steps"] for net in nets] == [3, 3]
+    one, two = (network_weights(net) for net in nets)
+    assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
 def test_an_interruption_leaves_what_resume_wants(data: TrainingData, tmp_path: Path) -> None:
     part = tmp_path / "a.part"
 
