@@ -21,7 +21,7 @@ class ModelConfig:
     encoder_width: int = 128
     rigid_width: int = 64
     local_width: int = 128
-    decoder_widths: tuple[int, ...] = (192,)
+    decoder_widths: tuple[int, ...] = (512,)
 
     @property
     def state(self) -> int:

@@ -1,0 +1,32 @@
+"""Nested dictionaries and lists of tensors and plain values, taken apart as safetensors can hold them."""
+
+from typing import Any
+
+import torch
+
+__all__ = ["fill", "strip"]
+
+MARK = "tensor:"
+
+
+def strip(tree: Any, tensors: dict[str, torch.Tensor], name: str) -> Any:
+    """The tree as JSON takes it, with names in place of its tensors, which go to `tensors`; they begin with `name`."""
+    if isinstance(tree, torch.Tensor):
+        tensors[name] = tree
+        return MARK + name
+    if isinstance(tree, dict):
+        return {key: strip(value, tensors, f"{name}.{key}") for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [strip(value, tensors, f"{name}.{index}") for index, value in enumerate(tree)]
+    return tree
+
+
+def fill(tree: Any, tensors: dict[str, torch.Tensor]) -> Any:
+    """What `strip` made, whole again; tuples come back as lists. `KeyError` where a tensor is missing."""
+    if isinstance(tree, str) and tree.startswith(MARK):
+        return tensors[tree.removeprefix(MARK)]
+    if isinstance(tree, dict):
+        return {key: fill(value, tensors) for key, value in tree.items()}
+    if isinstance(tree, list):
+        return [fill(value, tensors) for value in tree]
+    return tree
