@@ -22,6 +22,10 @@ class ModelConfig:
     rigid_width: int = 64
     local_width: int = 128
     decoder_widths: tuple[int, ...] = (512,)
+    components: int = 40
+    """Principal components of what a decoder sees, of which its random features are made."""
+    random_features: int = 0
+    """Of each decoder; they are added when the rest is trained."""
 
     @property
     def state(self) -> int:
@@ -45,5 +49,10 @@ class ModelConfig:
             "encoder.head": [self.point_width + self.parameters, self.encoder_width, self.encoder_width, latent],
             "field": [seen, width, width, latent],
             "decoder.hidden": [latent + self.parameters, *self.decoder_widths],
-            "decoder.readout": [latent + self.decoder_widths[-1], outputs],
+            "decoder.random": [
+                latent + self.decoder_widths[-1] + self.parameters,
+                self.components + self.parameters,
+                self.random_features,
+            ],
+            "decoder.readout": [latent + self.decoder_widths[-1] + self.random_features, outputs],
         }

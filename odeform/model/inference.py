@@ -27,6 +27,10 @@ def _silu(x: Floats) -> Floats:
     return x * expit(x)
 
 
+def _same(x: Floats) -> Floats:
+    return x
+
+
 def _layers(weights: Arrays, prefix: str, dtype: type) -> list[tuple[Floats, Floats]]:
     """Weight and bias of each linear layer of an `mlp`, column-major: the faster order for matrix-vector products."""
     out = []
@@ -54,6 +58,8 @@ def check_weights(weights: Arrays, config: ModelConfig) -> None:
             name = f"{branch}_{part}"
             if part == "decoder.readout":
                 wanted[f"{name}.weight"] = (sizes[1], sizes[0])
+                continue
+            if part == "decoder.random" and not config.random_features:
                 continue
             for layer, (before, after) in enumerate(itertools.pairwise(sizes)):
                 wanted[f"{name}.{2 * layer}.weight"] = (after, before)
@@ -83,6 +89,13 @@ def encode(weights: Arrays, config: ModelConfig, pooled: list[Floats], theta: Fl
         head = _layers(weights, f"{branch}_encoder.head", np.float64)
         parts.append(_mlp(head, np.concatenate([standard, theta]), _silu))
     return np.concatenate(parts).astype(dtype)
+
+
+def _folded(layers: list[tuple[Floats, Floats]], theta: Floats) -> list[tuple[Floats, Floats]]:
+    """The same layers without their last inputs, parameters that stay as they are."""
+    (first, bias), *others = layers
+    seen = first.shape[1] - len(theta)
+    return [(first[:, :seen], bias + first[:, seen:] @ theta), *others]
 
 
 Field = Callable[[float, Floats], Floats]
@@ -143,24 +156,22 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
     parts = []
     for branch in config.branches:
         place = slice(0, config.rigid_latent) if branch == "rigid" else slice(config.state - config.local_latent, None)
-        (first, bias), *others = _layers(weights, f"{branch}_decoder.hidden", np.float64)
-        seen = config.latent(branch)
+        nets = [_layers(weights, f"{branch}_decoder.{part}", np.float64) for part in ("hidden", "random")]
         readout = np.asfortranarray(weights[f"{branch}_decoder.readout.weight"].astype(float))
-        parts.append((place, np.asfortranarray(first[:, :seen]), first[:, seen:], bias, others, readout))
+        parts.append((place, nets, readout))
 
     def fold(theta: Floats) -> Decoder:
-        folded = [
-            (place, [(first, bias + seeing @ theta), *others], readout)
-            for place, first, seeing, bias, others, readout in parts
-        ]
+        folded = [(place, [_folded(net, theta) for net in nets if net], readout) for place, nets, readout in parts]
 
         def decode(states: Floats) -> Floats:
             out = []
-            for place, layers, readout in folded:
-                x = features = states[:, place]
-                for matrix, bias in layers:
-                    x = _silu(x @ matrix.T + bias)
-                out.append(np.concatenate([features, x], axis=1) @ readout.T)
+            for place, nets, readout in folded:
+                features = states[:, place]
+                for index, net in enumerate(nets):
+                    # random features are linear in between
+                    seen = _silu(_mlp(net, features, _silu if index == 0 else _same))
+                    features = np.concatenate([features, seen], axis=1)
+                out.append(features @ readout.T)
             if not config.rigid:
                 out.insert(0, np.zeros((len(states), POSE)))
             return np.concatenate(out, axis=1) * gains

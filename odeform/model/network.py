@@ -6,6 +6,7 @@ state per object, whatever the number of its points.
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import torch
 from torch import nn
@@ -63,7 +64,8 @@ class ShapeEncoder(nn.Module):
 class Decoder(nn.Module):
     """Features of a state, and their linear readout, which training solves for rather than descends to.
 
-    Motion is what the features moved since the start, so that y(0) = 0 exactly and no bias is needed.
+    Motion is what the features moved since the start, so that y(0) = 0 exactly and no bias is needed. Random features
+    of all that, if there are any, are drawn once the rest is trained (Rahimi & Recht 2008).
     """
 
     def __init__(self, sizes: dict[str, list[int]]) -> None:
@@ -74,13 +76,21 @@ class Decoder(nn.Module):
             for layer in (nn.Linear(before, after), nn.SiLU())
         ]
         self.hidden = nn.Sequential(*layers)
+        self.random = mlp(sizes["decoder.random"], nn.Identity) if sizes["decoder.random"][-1] else None
         self.readout = nn.Linear(*sizes["decoder.readout"], bias=False)
 
     def features(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
         """(T, B, latent), (B, P) -> (T, B, F), relative to the first of the T."""
-        seen = torch.cat([states, theta.expand(*states.shape[:-1], -1)], dim=-1)
-        features = torch.cat([states, self.hidden(seen)], dim=-1)
+        features = self.trained(states, theta)
+        if self.random is not None:
+            seen = self.random(torch.cat([features, theta.expand(*states.shape[:-1], -1)], dim=-1))
+            features = torch.cat([features, nn.functional.silu(seen)], dim=-1)
         return features - features[:1]
+
+    def trained(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(T, B, latent), (B, P) -> (T, B, latent + width): the state and what descent has made of it."""
+        seen = torch.cat([states, theta.expand(*states.shape[:-1], -1)], dim=-1)
+        return torch.cat([states, self.hidden(seen)], dim=-1)
 
 
 class ODeformNet(nn.Module):
@@ -107,6 +117,15 @@ class ODeformNet(nn.Module):
         self.local_decoder = Decoder(sizes)
         self.register_buffer("gains", torch.ones(POSE + config.modes))
         self.register_buffer("time_scale", torch.ones(()))
+
+    def widen(self, count: int) -> None:
+        """Room for that many random features in each decoder, in place."""
+        self.config = replace(self.config, random_features=count)
+        for branch, decoder in zip(self.config.branches, self.decoders, strict=True):
+            like = decoder.readout.weight
+            wider = Decoder(self.config.sizes(branch)).to(like)
+            wider.hidden.load_state_dict(decoder.hidden.state_dict())
+            setattr(self, f"{branch}_decoder", wider)
 
     @property
     def encoders(self) -> list[ShapeEncoder]:

@@ -2,13 +2,14 @@
 
 The readout of the decoders is linear, so its best value for any states is known: a least-squares solve. Each step
 solves for it on its batch and descends in everything else (variable projection, Golub & Pereyra 1973): descent shapes
-the states, and the last millimetres, which it would take hours for, come from the solve.
+the states, and the last millimetres, which it would take hours for, come from the solve. Once that is done, random
+features of what the decoders see widen them, and one solve in double precision uses them all.
 """
 
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
 from odeform.model.reduced import POSE
 from odeform.training.losses import Metric, balanced
+from odeform.training.readout import NormalEquations, random_layer
 from odeform.training.tree import fill, strip
 from odeform.types import Arrays
 
@@ -51,9 +53,13 @@ class TrainConfig:
     """Share of the motion that is rolled out at first, and share of the time in which it grows to the whole."""
     ridge: float = 1e-6
     """Of the readout's least squares, relative to the mean square of a feature."""
+    random_features: int = 1500
+    """Of each decoder, added at the end."""
+    last_ridges: tuple[float, ...] = (1e-6, 1e-8, 1e-10)
+    """Of the last solve, in which validation chooses for each decoder."""
     longest: float = 0.01
     """Seconds; longer frames are integrated in several steps."""
-    report: float = 20.0
+    report: float = 60.0
     """Seconds between lines of progress, and between saved states."""
 
 
@@ -88,26 +94,6 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
 
 def _shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.as_tensor(data.rest / data.space.arm).float(), torch.as_tensor(data.weights).float()
-
-
-class _Readout:
-    """Normal equations of one decoder's readout, in double precision; features may come in chunks."""
-
-    def __init__(self) -> None:
-        self._gram: torch.Tensor | None = None
-
-    def add(self, features: torch.Tensor, truth: torch.Tensor) -> None:
-        """(T, B, F) and (T, B, outputs), without frame 0, where features and truth vanish."""
-        x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
-        gram, cross = x.T @ x, x.T @ y
-        self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)
-
-    def solve(self, ridge: float) -> torch.Tensor:
-        """(outputs, F)."""
-        assert self._gram is not None
-        gram = self._gram.clone()
-        gram.diagonal().add_(ridge * gram.diagonal().mean() + 1e-30)
-        return torch.linalg.solve(gram, self._cross).T.float()
 
 
 def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
@@ -158,10 +144,10 @@ class _Trainer:
         predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
         for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
             features = decoder.features(states[..., place], theta)
-            readout = _Readout()
+            readout = NormalEquations()
             # every other frame tells as much, and a solve costs as much as the roll-out
             readout.add(features.detach()[::2], truth[::2][..., out])
-            decoder.readout.weight.data = readout.solve(self.config.ridge)
+            decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
             predicted.append(decoder.readout(features))
         return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:])[-len(self.outputs) :])
 
@@ -180,27 +166,69 @@ class _Trainer:
             self.optimiser.step()
         self.done += 1
 
+    def _chunks(self, split: str) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
+        """Rows of a split, their parameters, their whole roll-outs."""
+        for rows in torch.arange(len(self.theta[split])).split(CHUNK):
+            theta = self.theta[split][rows]
+            yield rows, theta, self.states(theta, self.frames)
+
     @torch.no_grad()
+    def equations(self) -> list[NormalEquations]:
+        """Of the readout of each decoder, from all training sequences."""
+        all_of = [NormalEquations() for _ in self.net.decoders]
+        for rows, theta, states in self._chunks("train"):
+            for equations, decoder, place, out in zip(
+                all_of, self.net.decoders, self.net.places, self.outputs, strict=True
+            ):
+                equations.add(decoder.features(states[..., place], theta), self.truth["train"][:, rows][..., out])
+        return all_of
+
     def solve_readout(self, ridge: float) -> None:
         """The readout of all training sequences."""
-        readouts = [_Readout() for _ in self.net.decoders]
-        for rows in torch.arange(len(self.theta["train"])).split(CHUNK):
-            theta = self.theta["train"][rows]
-            states = self.states(theta, self.frames)
-            for readout, decoder, place, out in zip(
-                readouts, self.net.decoders, self.net.places, self.outputs, strict=True
-            ):
-                readout.add(decoder.features(states[..., place], theta), self.truth["train"][:, rows][..., out])
-        for readout, decoder in zip(readouts, self.net.decoders, strict=True):
-            decoder.readout.weight.data = readout.solve(ridge)
+        for equations, decoder in zip(self.equations(), self.net.decoders, strict=True):
+            decoder.readout.weight.data = equations.solve(ridge).to(decoder.readout.weight.dtype)
+
+    @torch.no_grad()
+    def widen(self) -> None:
+        """Random features for each decoder; the readout of all, in double precision, in which the network then is.
+
+        The large weights of a solve over many features cancel: single precision would leave its rounding.
+        """
+        net = self.net.double()
+        self.metric.double()
+        self.truth, self.theta = ({k: v.double() for k, v in x.items()} for x in (self.truth, self.theta))
+        self.shape = self.shape[0].double(), self.shape[1].double()
+        net.widen(self.config.random_features)
+        for decoder, place in zip(net.decoders, net.places, strict=True):
+            assert decoder.random is not None
+            seen = [
+                torch.cat([decoder.trained(states[..., place], theta), theta.expand(len(states), -1, -1)], dim=-1)
+                for _, theta, states in self._chunks("train")
+            ]
+            layer = random_layer(
+                [x.flatten(0, 1) for x in seen],
+                net.config.parameters,
+                net.config.components,
+                net.config.random_features,
+                torch.Generator(self.device).manual_seed(self.config.seed),
+            )
+            decoder.random.load_state_dict(layer)
+        all_of, errors = self.equations(), []
+        solved = [[equations.solve(ridge) for equations in all_of] for ridge in self.config.last_ridges]
+        for readouts in solved:
+            for decoder, readout in zip(net.decoders, readouts, strict=True):
+                decoder.readout.weight.data = readout
+            errors.append(self.errors_mm("val")[-len(all_of) :])
+        for index, decoder in enumerate(net.decoders):
+            best = min(range(len(solved)), key=lambda at: errors[at][index])
+            decoder.readout.weight.data = solved[best][index]
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         total = torch.zeros(2, device=self.device)
-        for rows in torch.arange(len(self.theta[split])).split(CHUNK):
-            theta = self.theta[split][rows]
-            predicted = self.net.decode(self.states(theta, self.frames), theta)
+        for rows, theta, states in self._chunks(split):
+            predicted = self.net.decode(states, theta)
             total += len(rows) * torch.stack(self.metric(predicted[1:], self.truth[split][1:, rows]))
         rigid, local = (total / len(self.theta[split]) / 3.0).sqrt().tolist()
         return rigid, local
@@ -297,7 +325,10 @@ def train_network(
         torch.set_num_threads(threads)
     if part is not None:
         trainer.save(part)
-    trainer.solve_readout(config.ridge)
+    if config.random_features:
+        trainer.widen()
+    else:
+        trainer.solve_readout(config.ridge)
     rigid, local = trainer.errors_mm("val")
     net.cpu()
     return {
@@ -309,4 +340,6 @@ def train_network(
 
 
 def network_weights(net: ODeformNet) -> Arrays:
-    return {name: value.detach().cpu().numpy() for name, value in net.state_dict().items()}
+    """All in single precision but readouts, whose large weights cancel."""
+    state = {name: value.detach().cpu() for name, value in net.state_dict().items()}
+    return {k: (v if k.endswith("readout.weight") else v.float()).numpy() for k, v in state.items()}

@@ -22,7 +22,7 @@ def shape(level: int = 3, stretch: float = 1.0) -> Shape:
     return torch.as_tensor(mesh.points).float(), torch.as_tensor(surface_shares(mesh)).float()
 
 
-def network(rigid: bool) -> ODeformNet:
+def network(rigid: bool, random_features: int = 0) -> ODeformNet:
     """Untrained, but with every buffer different from what would hide a mistake."""
     torch.manual_seed(0)
     net = ODeformNet(ModelConfig(parameters=4, modes=7, rigid=rigid))
@@ -31,13 +31,16 @@ def network(rigid: bool) -> ODeformNet:
     for encoder in net.encoders:
         encoder.standardise([shape(stretch=s) for s in (0.7, 1.0, 1.6)])
         assert (encoder.pooled_gain > 0.0).any()
+    if random_features:
+        net.widen(random_features)
     return net
 
 
 @pytest.mark.parametrize("rigid", [True, False])
+@pytest.mark.parametrize("random_features", [0, 30])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_inference_equals_the_network(rigid: bool, dtype: type) -> None:
-    net = network(rigid)
+def test_inference_equals_the_network(rigid: bool, random_features: int, dtype: type) -> None:
+    net = network(rigid, random_features)
     weights, config = network_weights(net), net.config
     points, shares = shape(stretch=1.3)
     theta = torch.tensor([[0.3, -0.8, 1.2, 0.0]])

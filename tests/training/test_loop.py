@@ -9,8 +9,10 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare
+from odeform.model.inference import encode, make_decoder, make_field, pool_shape
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
+from odeform.solver.integrate import Quality, integrate
 from odeform.training.loop import TrainConfig, _Trainer, build_network, network_weights, train_network
 from odeform.training.train import TrainRequest, train
 
@@ -56,7 +58,7 @@ def test_descent_lowers_what_the_readout_leaves(data: TrainingData) -> None:
 def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
     """No small change of the readout lowers the training error."""
     net = build_network(data, 0)
-    train_network(net, data, TrainConfig(minutes=0.0), silent)
+    train_network(net, data, TrainConfig(steps=0, random_features=0), silent)
     trainer = _Trainer(net, data, TrainConfig(), torch.device("cpu"))
     best = np.square(trainer.errors_mm("train"))
     generator = torch.Generator().manual_seed(0)
@@ -68,6 +70,28 @@ def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
                 decoder.readout.weight.data = solved + sign * change
                 assert trainer.errors_mm("train")[index] ** 2 > best[index]
         decoder.readout.weight.data = solved
+
+
+def test_random_features_leave_less(data: TrainingData) -> None:
+    """Of the training sequences, the more of them the less; and what a checkpoint keeps says the same."""
+    left = []
+    for count in (0, 40, 400):
+        net = build_network(data, 0)
+        train_network(net, data, TrainConfig(steps=10, random_features=count, last_ridges=(1e-10,)), silent)
+        weights = network_weights(net)
+        assert all(w.dtype == np.float32 for name, w in weights.items() if not name.endswith("readout.weight"))
+        pooled = pool_shape(weights, net.config, data.rest / data.space.arm, data.weights)
+        squares = []
+        for theta, truth in zip(data.theta["train"], data.reduced["train"], strict=True):
+            start = encode(weights, net.config, pooled, theta, np.float64)
+            field = make_field(weights, net.config, np.float64)(theta)
+            stop = float(data.times[-1])
+            solution = integrate(field, start, Quality("rk4", step=float(data.times[1]) / 2.0), stop)
+            y = make_decoder(weights, net.config)(theta)(solution.sample(data.times))
+            squares.append((((y - y[0] - truth)[:, 6:]) ** 2).mean())
+        left.append(np.sqrt(np.mean(squares)))
+    assert left[1] < 0.95 * left[0]
+    assert left[2] < 0.8 * left[1]
 
 
 def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) -> None:
