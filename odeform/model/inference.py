@@ -181,6 +181,9 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
     return fold
 
 
+RECENT = 4  # answers that are kept: pose, deformation and gradient of a moment are asked for one after the other
+
+
 class LatentTrajectory:
     """A solved state z(t), decoded where asked. Grows when asked for later times; never changes."""
 
@@ -200,6 +203,7 @@ class LatentTrajectory:
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         self._origin = decode(start[None])
         self._span = until
+        self._recent: tuple[tuple[bytes, Floats], ...] = ()
 
     def _extend(self, until: float) -> Solution:
         if self._solution.end < until:
@@ -211,9 +215,16 @@ class LatentTrajectory:
         return float("inf") if self._solution.status is Status.OK else self._solution.end
 
     def reduced(self, times: Floats) -> Floats:
-        solution = self._extend(float(np.max(times)))
-        # y(0) = 0 to the last bit: the product over many rows rounds otherwise than that over one
-        return (self._decode(solution.sample(times)) - self._origin) * (np.asarray(times) > 0.0)[:, None]
+        asked = np.asarray(times, dtype=float)
+        key = asked.tobytes()
+        known = next((y for other, y in self._recent if other == key), None)
+        if known is None:
+            solution = self._extend(float(asked.max()))
+            # y(0) = 0 to the last bit: the product over many rows rounds otherwise than that over one
+            known = (self._decode(solution.sample(asked)) - self._origin) * (asked > 0.0)[:, None]
+            known.flags.writeable = False
+            self._recent = ((key, known), *self._recent)[:RECENT]
+        return known
 
     @cached_property
     def _error_mm(self) -> float | None:

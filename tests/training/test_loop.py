@@ -77,7 +77,7 @@ def test_random_features_leave_less(data: TrainingData) -> None:
     left = []
     for count in (0, 40, 400):
         net = build_network(data, 0)
-        train_network(net, data, TrainConfig(steps=10, random_features=count, last_ridges=(1e-10,)), silent)
+        train_network(net, data, TrainConfig(steps=2, random_features=count, last_ridges=(1e-10,)), silent)
         weights = network_weights(net)
         assert all(w.dtype == np.float32 for name, w in weights.items() if not name.endswith("readout.weight"))
         pooled = pool_shape(weights, net.config, data.rest / data.space.arm, data.weights)
