@@ -1,0 +1,81 @@
+"""How a shape lies in the scene: guessed, and corrected by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from odeform.geometry.shape import Fit
+from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.types import Rotations
+from odeform_viz.gizmos import PlaceGizmo
+
+__all__ = ["AlignmentPanel"]
+
+BY_HAND = "by hand"
+
+
+class AlignmentPanel:
+    """Which axis is up, how large, and arrows and rings in the scene; what they say is handed on."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        hold: Callable[[], None],
+        turn: Callable[[Rotations | None], None],
+        put: Callable[[Similarity], None],
+    ) -> None:
+        """`hold` stops at rest; `turn` fits the shape anew under a rotation, or as guessed; `put` takes a place."""
+        self._hold, self._turn, self._put = hold, turn, put
+        self._fit: Fit | None = None
+        self._gizmo = PlaceGizmo(server, self._dragged)
+        gui = server.gui
+        self._folder = gui.add_folder("Alignment", expand_by_default=False, visible=False)
+        with self._folder:
+            self._up = gui.add_dropdown("up in the file", (*UPRIGHT, BY_HAND), hint="captures often have -y")
+            self._factor = gui.add_number("factor", 1.0, hint="from the units of the file to metres")
+            self._drag = gui.add_checkbox(
+                "arrows and rings", False, hint="drag the shape at rest; it follows on release"
+            )
+            back = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
+        self._up.on_update(lambda event: event.client_id is None or self._upright())
+        self._factor.on_update(lambda event: event.client_id is None or self._scale())
+        self._drag.on_update(lambda event: event.client_id is None or self._show_gizmo())
+        back.on_click(lambda _: self._turn(None))
+
+    def show(self, fit: Fit | None) -> None:
+        """How a shape lies; None for the body that was trained."""
+        self._fit = fit
+        self._folder.visible = fit is not None
+        if fit is None:
+            self._drag.value = False
+        else:
+            named = (name for name, turn in UPRIGHT.items() if np.allclose(turn, fit.place.rotation))
+            self._up.value, self._factor.value = next(named, BY_HAND), float(f"{fit.place.factor:.6g}")
+        self._show_gizmo()
+
+    def _show_gizmo(self) -> None:
+        if self._fit is not None and self._drag.value:
+            self._hold()
+            self._gizmo.show(self._fit)
+        else:
+            self._gizmo.hide()
+
+    def _upright(self) -> None:
+        if self._up.value in UPRIGHT:
+            self._turn(UPRIGHT[self._up.value])
+
+    def _scale(self) -> None:
+        """About the foot of what moves, which keeps it on the floor."""
+        factor = float(self._factor.value)
+        if self._fit is None or not (np.isfinite(factor) and factor > 0.0):
+            return
+        points = np.asarray(self._fit.geometry.points, dtype=float)
+        low, high = points.min(axis=0), points.max(axis=0)
+        foot = np.array([*(0.5 * (low + high))[:2], low[2] - self._fit.lift])
+        more = factor / self._fit.place.factor
+        self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.place)
+
+    def _dragged(self, motion: Similarity) -> None:
+        if self._fit is not None:
+            self._put(motion @ self._fit.place)
