@@ -1,4 +1,4 @@
-"""Shapes by path or by name: those that travel with the package; and the part of a shape that is kept beside its file."""
+"""Shapes by path or by name, those that travel with the package; and the part of each that is to move."""
 
 from pathlib import Path
 

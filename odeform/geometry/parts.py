@@ -11,7 +11,7 @@ from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
 
 __all__ = ["joined", "most_visible", "split", "subset"]
 
-Bare = TypeVar("Bare", GaussianSplats, PointCloud)
+Bare = TypeVar("Bare", bound=GaussianSplats | PointCloud)
 
 
 def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None]:

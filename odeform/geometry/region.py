@@ -26,7 +26,7 @@ class Sphere:
 
     def inside(self, points: Points) -> Mask:
         """(N,) which points lie in it or on it."""
-        return ((np.asarray(points, dtype=float) - self.centre) ** 2).sum(axis=1) <= self.radius**2
+        return np.linalg.norm(np.asarray(points, dtype=float) - self.centre, axis=1) <= self.radius
 
     def moved(self, by: Similarity) -> "Sphere":
         return Sphere(by.points(self.centre), by.factor * self.radius)

@@ -86,7 +86,7 @@ def fit_to(
         place = _standing(points, rotation, np.asarray(reference.points, dtype=float), lift)
     fitted = place.shape(part)
     if lift:
-        fitted = replace(fitted, points=fitted.points + np.float32([0.0, 0.0, lift]))
+        fitted = replace(fitted, points=fitted.points + np.array([0.0, 0.0, lift], np.float32))
     return Fit(geometry, region, place, fitted, left, lift)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.types import Floats, GaussianSplats, Mesh, PointCloud, Rotations, Vector, Vectors
+from odeform.types import Floats, GaussianSplats, Geometry, Rotations, Vector, Vectors
 
 __all__ = ["UPRIGHT", "Similarity"]
 
-Shape = TypeVar("Shape", Mesh, PointCloud, GaussianSplats)
+Shape = TypeVar("Shape", bound=Geometry)
 
 UPRIGHT: dict[str, Rotations] = {
     name: np.round(rotation_from_vector(0.5 * np.pi * np.array(quarters)))

@@ -9,6 +9,7 @@ from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.gizmos import PlaceGizmo
+from odeform_viz.panels.by_hand import on_hand
 
 __all__ = ["AlignmentPanel"]
 
@@ -38,9 +39,9 @@ class AlignmentPanel:
                 "arrows and rings", False, hint="drag the shape at rest; it follows on release"
             )
             back = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
-        self._up.on_update(lambda event: event.client_id is None or self._upright())
-        self._factor.on_update(lambda event: event.client_id is None or self._scale())
-        self._drag.on_update(lambda event: event.client_id is None or self._show_gizmo())
+        on_hand(self._up, self._upright)
+        on_hand(self._factor, self._scale)
+        on_hand(self._drag, self._show_gizmo)
         back.on_click(lambda _: self._turn(None))
 
     def show(self, fit: Fit | None) -> None:

@@ -9,6 +9,7 @@ import viser
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
 from odeform_viz.gizmos import RegionGizmo
+from odeform_viz.panels.by_hand import on_hand
 
 __all__ = ["PartPanel"]
 
@@ -38,9 +39,9 @@ class PartPanel:
             self._edges = gui.add_vector3("edges (%)", (FIRST,) * 3, min=(0.5,) * 3, step=0.5, hint="of its extent")
             self._said = gui.add_markdown("")
             self._go = gui.add_button("Use this part")
-        self._kind.on_update(lambda event: event.client_id is None or self._choose(self._kind.value))
-        for size in (self._radius, self._edges):
-            size.on_update(lambda event: event.client_id is None or self._resize())
+        on_hand(self._kind, lambda: self._choose(self._kind.value))
+        on_hand(self._radius, self._resize)
+        on_hand(self._edges, self._resize)
         self._go.on_click(lambda _: self._take())
         self._choosing(False)
 
