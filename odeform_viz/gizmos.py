@@ -9,13 +9,43 @@ import viser.transforms as vtf
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
-from odeform.types import Floats, Rotations
+from odeform.types import Floats, Points, Rotations
 
-__all__ = ["PlaceGizmo", "RegionGizmo"]
+__all__ = ["PlaceGizmo", "RegionGizmo", "Vantage"]
 
 COLOR = (214, 96, 48)
-VEIL, LINES = 0.16, 0.5  # opacities of a region and its edges
+VEIL, LINES = 0.22, 0.6  # opacities of a region and its edges
 GHOST = 4000  # points that show where a shape is being put
+ASIDE = np.array([-0.85, -0.62, 0.62])  # where a vantage is seen from, in units of what is seen
+PANEL = np.array([0.08, -0.14, 0.0])  # what the panel covers: look past it
+
+
+class Vantage:
+    """Moves the cameras of all pages to see something whole, and back."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._before: dict[int, tuple[Floats, Floats]] = {}
+
+    def look(self, points: Points) -> None:
+        low, high = np.min(points, axis=0), np.max(points, axis=0)
+        centre, reach = 0.5 * (low + high), float((high - low).max())
+        for key, client in self._server.get_clients().items():
+            self._before.setdefault(key, (client.camera.position, client.camera.look_at))
+            _move(client, centre + (ASIDE + PANEL) * 1.5 * reach, centre + PANEL * reach)
+
+    def back(self) -> None:
+        for key, client in self._server.get_clients().items():
+            if key in self._before:
+                _move(client, *self._before[key])
+        self._before.clear()
+
+
+def _move(client: viser.ClientHandle, position: Floats, look_at: Floats) -> None:
+    with client.atomic():
+        # the position first: it takes what is looked at along
+        client.camera.position = position
+        client.camera.look_at = look_at
 
 
 class RegionGizmo:
@@ -26,47 +56,45 @@ class RegionGizmo:
     def __init__(self, server: viser.ViserServer, moved: Callable[[], None]) -> None:
         """`moved` is called whenever a hand has moved it."""
         self._server, self._moved = server, moved
-        self._controls: viser.TransformControlsHandle | None = None
-        self._size: Floats | float = 0.0
+        self._shown: tuple[Region, viser.TransformControlsHandle] | None = None
 
     def show(self, region: Region) -> None:
-        """At that place; a region of another kind or size replaces the one before."""
+        """In place of the one before."""
+        sphere = isinstance(region, Sphere)
+        reach = region.radius if sphere else 0.5 * float(np.max(region.size))
         with self._server.atomic():
             self.hide()
-            self._size = region.radius if isinstance(region, Sphere) else np.asarray(region.size, dtype=float)
-            reach = 0.5 * float(np.max(2.0 * region.radius if isinstance(region, Sphere) else self._size))
-            self._controls = self._server.scene.add_transform_controls(
+            controls = self._server.scene.add_transform_controls(
                 self.ROOT,
                 scale=1.6 * reach,
-                disable_rotations=isinstance(region, Sphere),
+                disable_rotations=sphere,
                 depth_test=False,
                 position=region.centre,
-                wxyz=_quaternion(np.eye(3) if isinstance(region, Sphere) else region.rotation),
+                wxyz=vtf.SO3.from_matrix(np.eye(3) if sphere else region.rotation).wxyz,
             )
-            self._controls.on_update(lambda _: self._moved())
             for name, wireframe, opacity in (("veil", False, VEIL), ("lines", True, LINES)):
-                at, look = f"{self.ROOT}/{name}", {"wireframe": wireframe, "opacity": opacity, "cast_shadow": False}
-                if isinstance(region, Sphere):
-                    self._server.scene.add_icosphere(
-                        at, region.radius, COLOR, subdivisions=2 if wireframe else 4, **look
-                    )
-                else:
-                    self._server.scene.add_box(at, COLOR, tuple(self._size), **look)
+                add = self._server.scene.add_icosphere if sphere else self._server.scene.add_box
+                shape = {"radius": region.radius, "subdivisions": 3} if sphere else {"dimensions": region.size}
+                look = {"wireframe": wireframe, "opacity": opacity, "cast_shadow": False}
+                add(f"{self.ROOT}/{name}", color=COLOR, **shape, **look)  # pyright: ignore[reportArgumentType]
+        controls.on_update(lambda _: self._moved())
+        self._shown = region, controls
 
     def hide(self) -> None:
-        if self._controls is not None:
-            self._controls.remove()
-            self._controls = None
+        if self._shown is not None:
+            self._shown[1].remove()
+            self._shown = None
 
     @property
     def region(self) -> Region | None:
         """As it now lies; None while hidden."""
-        if self._controls is None:
+        if self._shown is None:
             return None
-        centre = np.asarray(self._controls.position, dtype=float)
-        if isinstance(self._size, float):
-            return Sphere(centre, self._size)
-        return Box(centre, self._size, _rotation(self._controls))
+        region, controls = self._shown
+        centre = np.asarray(controls.position, dtype=float)
+        if isinstance(region, Sphere):
+            return Sphere(centre, region.radius)
+        return Box(centre, region.size, _rotation(controls))
 
 
 class PlaceGizmo:
@@ -82,23 +110,23 @@ class PlaceGizmo:
     def show(self, fit: Fit) -> None:
         points = np.asarray(fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)
-        # what is lifted is moved where it stands
-        start, lift = 0.5 * (low + high), np.array([0.0, 0.0, fit.lift])
+        start, size = 0.5 * (low + high), float((high - low).max())
         with self._server.atomic():
             self.hide()
             controls = self._server.scene.add_transform_controls(
-                self.ROOT, scale=0.9 * float((high - low).max()), depth_test=False, position=start
+                self.ROOT, scale=0.9 * size, depth_test=False, position=start
             )
             ghost = (points - start)[:: -(-len(points) // GHOST)].astype(np.float32)
             self._server.scene.add_point_cloud(
-                f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.008 * float((high - low).max()), precision="float32"
+                f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.008 * size, precision="float32"
             )
         self._controls = controls
+        foot = start - [0.0, 0.0, fit.lift]  # what is lifted is moved where it stands
 
         def dragged(event: viser.TransformControlsEvent) -> None:
             if event.phase == "end":
-                turn = _rotation(controls)
-                self._moved(Similarity(1.0, turn, np.asarray(controls.position) - lift - turn @ (start - lift)))
+                turn, shift = _rotation(controls), np.asarray(controls.position, dtype=float) - start
+                self._moved(Similarity(1.0, turn, shift + foot - turn @ foot))
 
         controls.on_update(dragged)
 
@@ -106,10 +134,6 @@ class PlaceGizmo:
         if self._controls is not None:
             self._controls.remove()
             self._controls = None
-
-
-def _quaternion(rotation: Rotations) -> Floats:
-    return vtf.SO3.from_matrix(rotation).wxyz
 
 
 def _rotation(controls: viser.TransformControlsHandle) -> Rotations:

@@ -21,7 +21,7 @@ def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None
     """
     inside = region.inside(geometry.points)
     if isinstance(geometry, Mesh):
-        within = inside[geometry.faces].all(axis=1)
+        within = np.asarray(inside[geometry.faces].all(axis=1))
         if not within.any():
             raise InputError(f"the region holds none of the {len(within):,} faces; move it or make it larger")
         return _of_faces(geometry, within), None if within.all() else _of_faces(geometry, ~within)

@@ -14,7 +14,7 @@ from odeform.types import Points, Rotations, Vector
 
 __all__ = ["Box", "Mask", "Region", "Sphere", "read_region", "region_to_json"]
 
-Mask = Bool[np.ndarray, "points"]
+Mask = Bool[np.ndarray, " points"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Sphere:
 
     def inside(self, points: Points) -> Mask:
         """(N,) which points lie in it or on it."""
-        return np.linalg.norm(np.asarray(points, dtype=float) - self.centre, axis=1) <= self.radius
+        return np.asarray(np.linalg.norm(np.asarray(points, dtype=float) - self.centre, axis=1) <= self.radius)
 
     def moved(self, by: Similarity) -> "Sphere":
         return Sphere(by.points(self.centre), by.factor * self.radius)
@@ -43,7 +43,7 @@ class Box:
     def inside(self, points: Points) -> Mask:
         """(N,) which points lie in it or on it."""
         local = (np.asarray(points, dtype=float) - self.centre) @ self.rotation
-        return (np.abs(local) <= 0.5 * np.asarray(self.size)).all(axis=1)
+        return np.asarray((np.abs(local) <= 0.5 * np.asarray(self.size)).all(axis=1))
 
     def moved(self, by: Similarity) -> "Box":
         return Box(by.points(self.centre), by.factor * np.asarray(self.size), by.rotation @ self.rotation)

@@ -8,12 +8,12 @@ import viser
 
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
-from odeform_viz.gizmos import RegionGizmo
+from odeform_viz.gizmos import RegionGizmo, Vantage
 from odeform_viz.panels.by_hand import on_hand
 
-__all__ = ["PartPanel"]
+__all__ = ["PartPanel", "region_like"]
 
-KINDS = ("everything", "sphere", "box")
+KINDS: tuple[str, ...] = ("everything", "sphere", "box")
 FIRST = 30.0  # % of the shape's extent that a new region has
 
 
@@ -21,22 +21,19 @@ class PartPanel:
     """Shows a region over the whole shape at rest; says how much it holds; hands it on when told to."""
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        whole: Callable[[], Fit],
-        use: Callable[[Region | None], None],
+        self, server: viser.ViserServer, whole: Callable[[], Fit | None], use: Callable[[Region | None], None]
     ) -> None:
         """`whole` lays the whole shape out at rest and returns its fit; `use` makes a region's part move, or all."""
         self._whole, self._use = whole, use
         self._fit: Fit | None = None
-        self._gizmo = RegionGizmo(server, self._count)
+        self._gizmo, self._vantage = RegionGizmo(server, self._count), Vantage(server)
         self._lock = threading.Lock()
         gui = server.gui
         self._folder = gui.add_folder("Part that moves", expand_by_default=False, visible=False)
         with self._folder:
             self._kind = gui.add_dropdown("part", KINDS, hint="the rest stands still; drag the region by its arrows")
             self._radius = gui.add_slider("radius (%)", 0.5, 100.0, 0.5, 0.5 * FIRST, hint="of the shape's extent")
-            self._edges = gui.add_vector3("edges (%)", (FIRST,) * 3, min=(0.5,) * 3, step=0.5, hint="of its extent")
+            self._edges = gui.add_vector3("edges (%)", (FIRST, FIRST, FIRST), step=0.5, hint="of the shape's extent")
             self._said = gui.add_markdown("")
             self._go = gui.add_button("Use this part")
         on_hand(self._kind, lambda: self._choose(self._kind.value))
@@ -48,6 +45,7 @@ class PartPanel:
     def show(self, fit: Fit | None) -> None:
         """What moves now; None for the body that was trained."""
         self._gizmo.hide()
+        self._vantage.back()
         self._fit = fit
         self._folder.visible = fit is not None
         self._kind.value = _kind_of(fit.region) if fit else KINDS[0]
@@ -62,29 +60,19 @@ class PartPanel:
         if self._fit is None or kind not in KINDS:
             return
         if kind == KINDS[0]:
-            self._gizmo.hide()
             self._use(None)
             return
-        known = self._fit.region
+        known = self._chosen() or self._fit.region
         fit = self._whole()
-        points = np.asarray(fit.source.points, dtype=float)
-        centre, extent = np.median(points, axis=0), _extent(fit)
-        if known is not None:
-            centre = np.asarray(known.centre)
-        # what was chosen before, as the other kind of region if need be
-        edge = 0.01 * FIRST * extent
-        if isinstance(known, Sphere):
-            edge = 2.0 * known.radius
-        elif isinstance(known, Box):
-            edge = float(np.max(known.size))
-        region: Region = known if known is not None and _kind_of(known) == kind else Sphere(centre, 0.5 * edge)
-        if kind == "box" and isinstance(region, Sphere):
-            region = Box(centre, np.full(3, edge))
-        self._fit, self._kind.value = fit, kind
+        if fit is None:
+            return
+        region, extent = region_like(known, kind, fit), _extent(fit)
+        self._kind.value = kind
         if isinstance(region, Sphere):
             self._radius.value = round(100.0 * region.radius / extent, 1)
         else:
             self._edges.value = tuple(np.round(100.0 * np.asarray(region.size) / extent, 1))
+        self._vantage.look(fit.geometry.points)
         self._gizmo.show(region.moved(fit.place))
         self._choosing(True)
         self._count()
@@ -97,26 +85,37 @@ class PartPanel:
         if isinstance(region, Sphere):
             self._gizmo.show(Sphere(region.centre, share * float(self._radius.value)))
         else:
-            self._gizmo.show(Box(region.centre, share * np.asarray(self._edges.value), region.rotation))
+            self._gizmo.show(Box(region.centre, share * np.abs(self._edges.value), region.rotation))
         self._count()
 
     def _chosen(self) -> Region | None:
-        """The region in the units of the file."""
+        """The region on show, in the units of the file."""
         region = self._gizmo.region
         return None if region is None or self._fit is None else region.moved(self._fit.place.inverse)
 
     def _count(self) -> None:
         with self._lock:  # the last to get in reads the newest place
             region = self._chosen()
-            if region is None or self._fit is None:
-                return
-            inside = int(region.inside(self._fit.source.points).sum())
-            self._said.content = f"**{inside:,}** of {len(self._fit.source.points):,} points inside"
+            if region is not None and self._fit is not None:
+                inside = int(region.inside(self._fit.source.points).sum())
+                self._said.content = f"**{inside:,}** of {len(self._fit.source.points):,} points inside"
 
     def _take(self) -> None:
         region = self._chosen()
         if region is not None:
             self._use(region)
+
+
+def region_like(known: Region | None, kind: str, fit: Fit) -> Region:
+    """A sphere or a box in the units of the file: as known, or as large; the first in the middle of the shape."""
+    if known is None:
+        known = Sphere(np.median(np.asarray(fit.source.points, dtype=float), axis=0), 0.005 * FIRST * _extent(fit))
+    if _kind_of(known) == kind:
+        return known
+    if isinstance(known, Sphere):
+        # upright where the shape lies
+        return Box(known.centre, np.full(3, 2.0 * known.radius), fit.place.rotation.T)
+    return Sphere(known.centre, 0.5 * float(np.max(known.size)))
 
 
 def _kind_of(region: Region | None) -> str:

@@ -4,6 +4,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import viser
 
 from odeform.errors import InputError
@@ -40,6 +41,7 @@ class ShapePanel:
         self._fit = next((column.fit for column in columns.all if column.fit), None)
         self._name = "the shape"
         self._turned: Rotations | None = None  # by hand; None as guessed
+        self._guess = self._fit.place.factor if self._fit else 1.0
         gui = server.gui
         with gui.add_folder("Shape", expand_by_default=False):
             self._text = gui.add_markdown(TRAINED)
@@ -79,8 +81,10 @@ class ShapePanel:
         self._name, self._turned = name, None
         self._adopt(fit)
 
-    def _adopt(self, fit: Fit | None) -> None:
+    def _adopt(self, fit: Fit | None, guessed: bool = True) -> None:
         self._fit = fit
+        if fit is not None and guessed:
+            self._guess = fit.place.factor
         self._columns.reshape(fit)
         self._show()
         self._changed()
@@ -89,19 +93,22 @@ class ShapePanel:
         self._text.content = describe_fit(self._fit, self._name, self._body) if self._fit else TRAINED
         self._back.visible = self._fit is not None
         self._part.show(self._fit)
-        self._alignment.show(self._fit)
+        self._alignment.show(self._fit, self._guess)
 
     def _refit(self, region: Region | None, rotation: Rotations | None, place: Similarity | None = None) -> None:
         """The same shape, otherwise; it stays as it is where that cannot be."""
         fit = self._fit
         if fit is not None:
-            self._guarded(lambda: self._adopt(fit_to(fit.source, self._body, region, rotation, place)))
+            self._guarded(lambda: self._adopt(fit_to(fit.source, self._body, region, rotation, place), place is None))
 
-    def _lay_out(self) -> Fit:
-        """The whole shape at rest, upright as it was."""
-        assert self._fit is not None
-        self._hold()
-        self._refit(None, self._fit.place.rotation)
+    def _lay_out(self) -> Fit | None:
+        """The whole shape at rest, upright as it was; a part taken from it then stays so."""
+        if self._fit is not None:
+            self._hold()
+            upright = self._fit.place.rotation
+            if not np.array_equal(upright, np.eye(3)):
+                self._turned = upright
+            self._refit(None, upright)
         return self._fit
 
     def _use(self, region: Region | None) -> None:
