@@ -223,7 +223,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("checkpoint", metavar="CKPT")
     sub.add_argument("--out", required=True, metavar="FILE", help=".npz, or .ply with {frame} in its name")
     sub.add_argument(
-        "--geometry", metavar="FILE", help="a mesh, points or splats, or volleyball; fitted to the trained body"
+        "--geometry", metavar="FILE", help="a mesh, points or splats (bundled: volleyball), moved as the body"
     )
     sub.add_argument("--set", nargs="*", action="extend", default=[], metavar="NAME=VALUE")
     sub.add_argument("--times", metavar="START:STOP:STEP", help="seconds, half-open (default: the trained frames)")

@@ -9,15 +9,14 @@ import viser.transforms as vtf
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
-from odeform.types import Floats, Points, Rotations
+from odeform.types import Floats, Rotations, Vector
 
-__all__ = ["PlaceGizmo", "RegionGizmo", "Vantage"]
+__all__ = ["PlaceGizmo", "RegionGizmo", "Vantage", "reach_of"]
 
 COLOR = (214, 96, 48)
-VEIL, LINES = 0.22, 0.6  # opacities of a region and its edges
 GHOST = 4000  # points that show where a shape is being put
-ASIDE = np.array([-0.85, -0.62, 0.62])  # where a vantage is seen from, in units of what is seen
-PANEL = np.array([0.08, -0.14, 0.0])  # what the panel covers: look past it
+ASIDE = np.array([-0.85, -0.62, 0.62])  # where things are looked at from
+PANEL = np.array([0.16, -0.28, 0.0])  # what the panel covers: look past it
 
 
 class Vantage:
@@ -27,12 +26,11 @@ class Vantage:
         self._server = server
         self._before: dict[int, tuple[Floats, Floats]] = {}
 
-    def look(self, points: Points) -> None:
-        low, high = np.min(points, axis=0), np.max(points, axis=0)
-        centre, reach = 0.5 * (low + high), float((high - low).max())
+    def look(self, centre: Vector, reach: float) -> None:
+        """At a place, from as far as shows `reach` metres around it."""
         for key, client in self._server.get_clients().items():
             self._before.setdefault(key, (client.camera.position, client.camera.look_at))
-            _move(client, centre + (ASIDE + PANEL) * 1.5 * reach, centre + PANEL * reach)
+            _move(client, centre + (ASIDE + PANEL) * 3.0 * reach, centre + PANEL * reach)
 
     def back(self) -> None:
         for key, client in self._server.get_clients().items():
@@ -61,22 +59,21 @@ class RegionGizmo:
     def show(self, region: Region) -> None:
         """In place of the one before."""
         sphere = isinstance(region, Sphere)
-        reach = region.radius if sphere else 0.5 * float(np.max(region.size))
         with self._server.atomic():
             self.hide()
             controls = self._server.scene.add_transform_controls(
                 self.ROOT,
-                scale=1.6 * reach,
+                scale=2.5 * reach_of(region),
                 disable_rotations=sphere,
-                depth_test=False,
                 position=region.centre,
                 wxyz=vtf.SO3.from_matrix(np.eye(3) if sphere else region.rotation).wxyz,
             )
-            for name, wireframe, opacity in (("veil", False, VEIL), ("lines", True, LINES)):
-                add = self._server.scene.add_icosphere if sphere else self._server.scene.add_box
-                shape = {"radius": region.radius, "subdivisions": 3} if sphere else {"dimensions": region.size}
-                look = {"wireframe": wireframe, "opacity": opacity, "cast_shadow": False}
-                add(f"{self.ROOT}/{name}", color=COLOR, **shape, **look)  # pyright: ignore[reportArgumentType]
+            # edges alone: a veil, however thin, would hide the splats behind it
+            at, scene = f"{self.ROOT}/edges", self._server.scene
+            if sphere:
+                scene.add_icosphere(at, region.radius, COLOR, subdivisions=2, wireframe=True, cast_shadow=False)
+            else:
+                scene.add_box(at, COLOR, region.size, wireframe=True, cast_shadow=False)
         controls.on_update(lambda _: self._moved())
         self._shown = region, controls
 
@@ -113,12 +110,10 @@ class PlaceGizmo:
         start, size = 0.5 * (low + high), float((high - low).max())
         with self._server.atomic():
             self.hide()
-            controls = self._server.scene.add_transform_controls(
-                self.ROOT, scale=0.9 * size, depth_test=False, position=start
-            )
-            ghost = (points - start)[:: -(-len(points) // GHOST)].astype(np.float32)
+            controls = self._server.scene.add_transform_controls(self.ROOT, scale=1.6 * size, position=start)
+            ghost = np.random.default_rng(0).permutation(points - start)[:GHOST].astype(np.float32)
             self._server.scene.add_point_cloud(
-                f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.008 * size, precision="float32"
+                f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.004 * size, point_shape="circle", precision="float32"
             )
         self._controls = controls
         foot = start - [0.0, 0.0, fit.lift]  # what is lifted is moved where it stands
@@ -134,6 +129,11 @@ class PlaceGizmo:
         if self._controls is not None:
             self._controls.remove()
             self._controls = None
+
+
+def reach_of(region: Region) -> float:
+    """Metres from its centre to its farthest side."""
+    return region.radius if isinstance(region, Sphere) else 0.5 * float(np.max(region.size))
 
 
 def _rotation(controls: viser.TransformControlsHandle) -> Rotations:

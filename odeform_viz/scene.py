@@ -9,7 +9,7 @@ import viser.transforms as vtf
 from odeform.geometry.rigid import rotation_z
 from odeform.model.motion import Motion
 from odeform.model.recorded import RecordedMotion
-from odeform.types import Floats, Geometry
+from odeform.types import Floats, GaussianSplats, Geometry
 from odeform_viz.columns import Column
 from odeform_viz.heat import Spread
 from odeform_viz.session import ColumnFrame, Frame, Looks
@@ -220,6 +220,9 @@ class SceneView:
 
     def _show_still(self, frame: Frame) -> None:
         """What stands still of a shape, sent once, and once for all columns; it brings a floor of its own."""
+        # splats on the floor would sink into it by half
+        splats = any(isinstance(shown.column.geometry, GaussianSplats) for shown in frame.columns)
+        self._floor.position = (0.0, 0.0, -0.01 * self._size if splats else 0.0)
         fits = (column.fit for column in frame.wish.columns if column.shown and column.fit)
         wished = next((fit.still for fit in fits if fit.still), None)
         if wished is (self._still and self._still[0]):

@@ -61,7 +61,9 @@ class AlignmentPanel:
         if self._fit is not None and self._drag.value:
             self._hold()
             self._gizmo.show(self._fit)
-            self._vantage.look(self._fit.geometry.points)
+            points = np.asarray(self._fit.geometry.points, dtype=float)
+            low, high = points.min(axis=0), points.max(axis=0)
+            self._vantage.look(0.5 * (low + high), 1.2 * float((high - low).max()))
         else:
             self._gizmo.hide()
             self._vantage.back()

@@ -8,7 +8,7 @@ import viser
 
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
-from odeform_viz.gizmos import RegionGizmo, Vantage
+from odeform_viz.gizmos import RegionGizmo, Vantage, reach_of
 from odeform_viz.panels.by_hand import on_hand
 
 __all__ = ["PartPanel", "region_like"]
@@ -72,8 +72,9 @@ class PartPanel:
             self._radius.value = round(100.0 * region.radius / extent, 1)
         else:
             self._edges.value = tuple(np.round(100.0 * np.asarray(region.size) / extent, 1))
-        self._vantage.look(fit.geometry.points)
-        self._gizmo.show(region.moved(fit.place))
+        shown = region.moved(fit.place)
+        self._vantage.look(shown.centre, 3.0 * reach_of(shown))
+        self._gizmo.show(shown)
         self._choosing(True)
         self._count()
 
@@ -115,7 +116,7 @@ def region_like(known: Region | None, kind: str, fit: Fit) -> Region:
     if isinstance(known, Sphere):
         # upright where the shape lies
         return Box(known.centre, np.full(3, 2.0 * known.radius), fit.place.rotation.T)
-    return Sphere(known.centre, 0.5 * float(np.max(known.size)))
+    return Sphere(known.centre, reach_of(known))
 
 
 def _kind_of(region: Region | None) -> str:
