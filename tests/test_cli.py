@@ -9,6 +9,7 @@ from odeform.cli import main, run_guarded
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.geometry.reading import read_geometry
+from odeform.geometry.shape import fit_to
 from odeform.geometry.splat_inria import inria_bytes
 from odeform.predictor import Predictor, load
 from odeform.types import GaussianSplats

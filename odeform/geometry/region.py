@@ -65,9 +65,14 @@ def read_region(path: Path) -> Region:
     try:
         ((kind, values),) = json.loads(path.read_text()).items()
         numbers = {name: np.asarray(value, dtype=float) for name, value in values.items()}
-        region: Region = {"sphere": Sphere, "box": Box}[kind](**numbers)
         if not all(np.isfinite(value).all() for value in numbers.values()):
             raise ValueError("not finite")
+        if kind == "sphere":
+            region: Region = Sphere(numbers["centre"], float(numbers["radius"]))
+        elif kind == "box":
+            region = Box(numbers["centre"], numbers["size"], numbers["rotation"])
+        else:
+            raise ValueError(f"got {kind!r}")
         region.inside(np.zeros((1, 3)))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"region {path}: expected a sphere or a box in JSON: {error}") from None

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 from odeform.geometry.parts import joined, split
 from odeform.geometry.region import Region
 from odeform.geometry.similarity import UPRIGHT, Similarity
-from odeform.types import Geometry, Mesh, Perpoint, Points, Rotations
+from odeform.types import Floats, Geometry, Mesh, Perpoint, Points, Rotations
 
 __all__ = ["Fit", "difference", "fit_to", "surface_shares"]
 
@@ -90,7 +90,7 @@ def fit_to(
     return Fit(geometry, region, place, fitted, left, lift)
 
 
-def _standing(points: Points, rotation: Rotations | None, target: Points, lift: float) -> Similarity:
+def _standing(points: Points, rotation: Rotations | None, target: Floats, lift: float) -> Similarity:
     """Of the extent of `target`, and where it stands less `lift`."""
     rotation = np.eye(3) if rotation is None else rotation
     turned = points @ rotation.T
@@ -102,13 +102,13 @@ def _standing(points: Points, rotation: Rotations | None, target: Points, lift: 
     return Similarity(factor, rotation, goal - factor * foot)
 
 
-def _together(points: Points) -> Points:
+def _together(points: Floats) -> Floats:
     """Without those far off, as captures have them: beyond half as far again as 19 of 20 are from the middle."""
     away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     return points[away <= 1.5 * np.quantile(away, 0.95)]
 
 
-def _up(part: Points, left: Points) -> str:
+def _up(part: Points, left: Floats) -> str:
     """The axis along which a part rises from what surrounds it: away from the points within twice its reach."""
     centre = 0.5 * (part.min(axis=0) + part.max(axis=0))
     away = left - centre

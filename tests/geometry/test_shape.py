@@ -106,7 +106,7 @@ def test_what_stands_still_is_not_lifted_with_a_body_that_is_dropped() -> None:
 
 def test_far_points_of_a_part_do_not_count() -> None:
     shape, _ = scene("+z", factor=1.0)
-    part = PointCloud(np.concatenate([shape.points, shape.points[:1] + [0.0, 0.0, 0.9]]))
+    part = PointCloud(np.concatenate([shape.points, shape.points[:1] + np.array([0.0, 0.0, 0.9])]))
     fit = fit_to(part, ball(2), Sphere(np.array([7.0, -30.0, 2.71]), 0.7105))
     assert np.ptp(fit.geometry.points, axis=0).max() > 0.5
     assert fit.place.factor == pytest.approx(1.0, abs=1e-3)
