@@ -36,10 +36,12 @@ class PartPanel:
             self._edges = gui.add_vector3("edges (%)", (FIRST, FIRST, FIRST), step=0.5, hint="of the shape's extent")
             self._said = gui.add_markdown("")
             self._go = gui.add_button("Use this part")
+            self._change = gui.add_button("Change the region", color="gray", hint="shows it over the whole shape")
         on_hand(self._kind, lambda: self._choose(self._kind.value))
         on_hand(self._radius, self._resize)
         on_hand(self._edges, self._resize)
         self._go.on_click(lambda _: self._take())
+        self._change.on_click(lambda _: self._choose(self._kind.value))
         self._choosing(False)
 
     def show(self, fit: Fit | None) -> None:
@@ -55,6 +57,7 @@ class PartPanel:
         self._radius.visible = choosing and self._kind.value == "sphere"
         self._edges.visible = choosing and self._kind.value == "box"
         self._said.visible = self._go.visible = choosing
+        self._change.visible = not choosing and self._kind.value != KINDS[0]
 
     def _choose(self, kind: str) -> None:
         if self._fit is None or kind not in KINDS:

@@ -63,6 +63,7 @@ class ShapePanel:
             action()
         except (InputError, OSError) as error:
             self._say(str(error))
+            self._text.content = f"⚠ **{error}**"  # what is said elsewhere goes with the next frame
 
     def _uploaded(self, file: viser.UploadedFile) -> None:
         if len(file.content) > LARGEST:

@@ -110,24 +110,24 @@ def test_small_splats_keep_their_size_as_float16(
 
 def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
     with LoopbackClient(port) as client:
-        client.set("part", "sphere")
-        client.collect(1.5)
+        client.set("Change the region", True)
+        client.collect(2.0)
         assert f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text()
         assert app.columns.all[0].fit is not None
         assert app.columns.all[0].fit.left is None  # the whole scene lies at rest while one chooses
         client.set("radius (%)", 1.0)
-        client.collect(0.7)
-        assert f"**{BALL:,}**" not in client.text()
-        client.set("radius (%)", 3.5)
-        client.collect(0.7)
-        app._shape._part._take()
-        client.collect(0.7)
+        client.collect(1.0)
+        smaller = int(client.text().split("**")[1].replace(",", ""))
+        assert 0 < smaller < BALL
+        client.set("Use this part", True)
+        client.collect(1.0)
     fit = app.columns.all[0].fit
     assert fit is not None
     assert isinstance(fit.region, Sphere)
-    assert len(fit.geometry.points) == BALL
+    assert len(fit.geometry.points) == smaller
     assert fit.left is not None
-    assert np.array_equal(fit.place.rotation, UPRIGHT["-y"])
+    assert len(fit.left.points) == BALL + REST - smaller
+    assert np.array_equal(fit.place.rotation, UPRIGHT["-y"])  # as it lay while one chose
 
 
 def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
