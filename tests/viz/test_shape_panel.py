@@ -115,7 +115,7 @@ def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
         assert f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text()
         assert app.columns.all[0].fit is not None
         assert app.columns.all[0].fit.left is None  # the whole scene lies at rest while one chooses
-        client.set("radius (%)", 1.0)
+        client.set("radius (%)", 3.4)  # the ball is hollow: its top alone
         client.collect(1.0)
         smaller = int(client.text().split("**")[1].replace(",", ""))
         assert 0 < smaller < BALL
