@@ -130,18 +130,22 @@ def _evaluate(args: argparse.Namespace) -> None:
 
 def _predict(args: argparse.Namespace) -> None:
     from odeform.export import parse_times, write_motion
-    from odeform.geometry.reading import read_geometry
+    from odeform.geometry.bundled import read_shape
     from odeform.geometry.shape import fit_to
     from odeform.predictor import load
     from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
-    geometry = fit_to(read_geometry(args.geometry), predictor.rest).geometry if args.geometry else None
+    fit = None
+    if args.geometry is not None:
+        shape, region = read_shape(args.geometry)
+        fit = fit_to(shape, predictor.rest, region)
+    geometry = fit.geometry if fit else None
     for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
         print(f"note: {args.geometry}: {note}", file=sys.stderr)
     motion = predictor.solve(geometry, parse_settings(args.set), args.quality, until=float(times[-1]))
-    write_motion(motion, times, args.out)
+    write_motion(motion, times, args.out, fit)
     for name in motion.outside:
         print(f"note: {name} = {motion.parameters[name]:g} is outside the trained range", file=sys.stderr)
     print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {motion.stats.status}")
@@ -218,7 +222,9 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("predict", _predict, "predict one motion and write it to a file")
     sub.add_argument("checkpoint", metavar="CKPT")
     sub.add_argument("--out", required=True, metavar="FILE", help=".npz, or .ply with {frame} in its name")
-    sub.add_argument("--geometry", metavar="FILE", help="a mesh, points or splats; fitted to the trained body")
+    sub.add_argument(
+        "--geometry", metavar="FILE", help="a mesh, points or splats (bundled: volleyball), moved as the body"
+    )
     sub.add_argument("--set", nargs="*", action="extend", default=[], metavar="NAME=VALUE")
     sub.add_argument("--times", metavar="START:STOP:STEP", help="seconds, half-open (default: the trained frames)")
     sub.add_argument("--quality", default="balanced", metavar="NAME")

@@ -11,9 +11,11 @@ import trimesh
 from odeform.errors import InputError
 from odeform.files import write_aside
 from odeform.geometry.harmonics import rotated_harmonics
+from odeform.geometry.shape import Fit
+from odeform.geometry.similarity import Similarity
 from odeform.geometry.splat_inria import inria_bytes
 from odeform.model.motion import Motion
-from odeform.types import Floats, GaussianSplats, Mesh
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh
 
 __all__ = ["parse_times", "write_motion"]
 
@@ -33,26 +35,31 @@ def parse_times(text: str) -> Floats:
     return np.arange(start, stop, step)
 
 
-def write_motion(motion: Motion, times: Floats, out: str | Path) -> None:
-    """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name (splats as INRIA's code does)."""
+def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None = None) -> None:
+    """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name (splats as INRIA's code does).
+
+    A shape that was fitted goes back to the units and place of its file; a `.ply` also has what stands still.
+    """
     path = Path(out)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        write_aside(path, _npz(motion, times))
+        write_aside(path, _npz(motion, times, fit.place.inverse if fit else Similarity()))
     elif suffix == ".ply" and "{frame}" in path.name:
         for frame, time in enumerate(times):
-            write_aside(path.with_name(path.name.replace("{frame}", f"{frame:05d}")), _ply(motion, float(time)))
+            write_aside(path.with_name(path.name.replace("{frame}", f"{frame:05d}")), _ply(motion, float(time), fit))
     else:
         raise InputError(f"--out {out}: expected a name ending in .npz, or in .ply with {{frame}} in it")
 
 
-def _npz(motion: Motion, times: Floats) -> bytes:
+def _npz(motion: Motion, times: Floats, back: Similarity) -> bytes:
     geometry = motion.geometry
     arrays = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
-    frames = motion.vertices(times)
+    frames = back.points(motion.vertices(times)).astype(np.float32)
     if isinstance(geometry, GaussianSplats):
         arrays["centers"] = frames
-        arrays["covariances"] = np.stack([motion.covariances(float(t)) for t in times]).astype(np.float32)
+        arrays["covariances"] = np.stack(
+            [back.covariances(motion.covariances(float(t))) for t in times], dtype=np.float32
+        )
     else:
         arrays["vertices"] = frames
         arrays["faces"] = np.asarray(geometry.faces if isinstance(geometry, Mesh) else np.zeros((0, 3)), dtype=np.int32)
@@ -61,16 +68,24 @@ def _npz(motion: Motion, times: Floats) -> bytes:
     return buffer.getvalue()
 
 
-def _ply(motion: Motion, time: float) -> bytes:
-    vertices, geometry = motion.vertices(time), motion.geometry
-    if isinstance(geometry, GaussianSplats):
-        # colours turn with the body as a whole
-        harmonics = rotated_harmonics(geometry.harmonics, motion.pose(time)[:3, :3])
-        moved = replace(geometry, points=vertices, covariances=motion.covariances(time), harmonics=harmonics)
-        return inria_bytes(moved)
-    if isinstance(geometry, Mesh):
-        shape: trimesh.Trimesh | trimesh.PointCloud = trimesh.Trimesh(vertices, geometry.faces, process=False)
+def _ply(motion: Motion, time: float, fit: Fit | None) -> bytes:
+    moved = _moved(motion, time)
+    shape = fit.undo(moved) if fit else moved
+    if isinstance(shape, GaussianSplats):
+        return inria_bytes(shape)
+    if isinstance(shape, Mesh):
+        out: trimesh.Trimesh | trimesh.PointCloud = trimesh.Trimesh(shape.points, shape.faces, process=False)
     else:
-        shape = trimesh.PointCloud(vertices)
-    data = shape.export(file_type="ply")
+        out = trimesh.PointCloud(shape.points)
+    data = out.export(file_type="ply")
     return data if isinstance(data, bytes) else str(data).encode()
+
+
+def _moved(motion: Motion, time: float) -> Geometry:
+    geometry = motion.geometry
+    moved = replace(geometry, points=motion.vertices(time))
+    if not isinstance(moved, GaussianSplats):
+        return moved
+    # colours turn with the body as a whole
+    harmonics = rotated_harmonics(moved.harmonics, motion.pose(time)[:3, :3])
+    return replace(moved, covariances=motion.covariances(time), harmonics=harmonics)

@@ -5,6 +5,7 @@ import io
 import socket
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,8 @@ class App:
             samples = _training_samples(columns[0])
             self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
             body = columns[0].source.rest  # pyright: ignore[reportAttributeAccessIssue]
-            self._shape = ShapePanel(self.server, self.columns, body, self._changed, self._say)
+            hold = partial(self._playback.jump, schema.window.start)
+            self._shape = ShapePanel(self.server, self.columns, body, hold, self._changed, self._say)
             with gui.add_folder("View"):
                 self._follow = gui.add_checkbox("follow the body", initial_value=True)
                 self._follow.on_update(lambda _: wake())
@@ -188,9 +190,9 @@ class App:
         motion = self.session.motion(column, wish)
         assert isinstance(motion, Motion)
         if path.suffix == ".ply":
-            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"))
+            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
             return path.with_name(f"{path.stem}_{0:05d}.ply")
-        write_motion(motion, self.session.schema.window.times, path)
+        write_motion(motion, self.session.schema.window.times, path, column.fit)
         return path
 
     def _say(self, message: str) -> None:

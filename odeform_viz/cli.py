@@ -48,7 +48,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="odeform-viz", description="See and question learned motion.")
     parser.add_argument("--checkpoint", default="kick", metavar="CKPT", help="path or bundled name (default: kick)")
     parser.add_argument("--compare", nargs="+", default=[], metavar="CKPT", help="further models, side by side")
-    parser.add_argument("--geometry", metavar="FILE", help="a mesh, points or Gaussian splats to move instead")
+    parser.add_argument(
+        "--geometry", metavar="FILE", help="a mesh, points or Gaussian splats to move instead (bundled: volleyball)"
+    )
     parser.add_argument("--sequence", metavar="PATH", help="show a sequence of a data set as truth: DATASET/NAME")
     parser.add_argument("--host", default="127.0.0.1", metavar="H")
     parser.add_argument("--port", type=int, default=8080, metavar="N")

@@ -9,7 +9,7 @@ import viser.transforms as vtf
 from odeform.geometry.rigid import rotation_z
 from odeform.model.motion import Motion
 from odeform.model.recorded import RecordedMotion
-from odeform.types import Floats
+from odeform.types import Floats, GaussianSplats, Geometry
 from odeform_viz.columns import Column
 from odeform_viz.heat import Spread
 from odeform_viz.session import ColumnFrame, Frame, Looks
@@ -19,6 +19,7 @@ __all__ = ["SceneView", "color_of"]
 
 COLORS = ((206, 78, 26), (30, 92, 190), (48, 132, 66), (126, 66, 172), (176, 42, 98), (0, 128, 140))
 TRUTH = (70, 74, 82)
+STILL = (188, 190, 186)
 ARROW = (190, 20, 20)
 GHOST = 0.45  # opacity of all but the first where columns overlap
 
@@ -158,6 +159,7 @@ class SceneView:
         """`extent` is the size of a body in metres, `columns` how many are to be in view at first."""
         self._server, self._size = server, extent
         self._views: dict[int, tuple[Column, _ColumnView]] = {}
+        self._still: tuple[Geometry, viser.FrameHandle] | None = None
         self._set_stage(columns)
 
     def _set_stage(self, columns: int) -> None:
@@ -169,7 +171,7 @@ class SceneView:
         server.initial_camera.look_at = (0.3 * size, -0.45 * size, 0.45 * size)
         server.initial_camera.fov = 0.7
         self._world = server.scene.add_frame("/world", show_axes=False)
-        server.scene.add_grid(
+        self._floor = server.scene.add_grid(
             "/world/floor",
             infinite_grid=True,
             cell_size=0.1,
@@ -189,6 +191,7 @@ class SceneView:
         """
         with self._server.atomic():
             self._match(frame)
+            self._show_still(frame)
             several = len(frame.columns) > 1
             for index, shown in enumerate(frame.columns):
                 view = self._views[shown.column.key][1]
@@ -214,6 +217,23 @@ class SceneView:
             if shown.column.key not in self._views:
                 color = color_of(frame.wish.columns, shown.column)
                 self._views[shown.column.key] = (shown.column, _ColumnView(self._server, shown.column, color))
+
+    def _show_still(self, frame: Frame) -> None:
+        """What stands still of a shape, sent once, and once for all columns; it brings a floor of its own."""
+        # splats on the floor would sink into it by half
+        splats = any(isinstance(shown.column.geometry, GaussianSplats) for shown in frame.columns)
+        self._floor.position = (0.0, 0.0, -0.01 * self._size if splats else 0.0)
+        fits = (column.fit for column in frame.wish.columns if column.shown and column.fit)
+        wished = next((fit.still for fit in fits if fit.still), None)
+        if wished is (self._still and self._still[0]):
+            return
+        if self._still is not None:
+            self._still[1].remove()
+            self._still = None
+        if wished is not None:
+            self._still = (wished, self._server.scene.add_frame("/world/still", show_axes=False))
+            show_shape(self._server, "/world/still", wished, STILL)
+        self._floor.visible = wished is None
 
     def _offset(self, frame: Frame, looks: Looks) -> tuple[float, float, float]:
         """Following moves the world past the camera, which stays in the user's hand."""

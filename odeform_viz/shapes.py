@@ -106,21 +106,19 @@ class _CloudView:
 
 
 class _SplatView:
-    # covariances travel as float16, which loses splats under half a millimetre: send centimetres, scale the node
-    SCALE = 0.01
-
     def __init__(self, server: viser.ViserServer, root: str, splats: GaussianSplats) -> None:
+        self._scale = _unit(splats)
         self._look = (splats.colors.astype(np.float32), splats.opacities[:, None].astype(np.float32))
-        self._covariances = (splats.covariances / self.SCALE**2).astype(np.float32)
+        self._covariances = (splats.covariances / self._scale**2).astype(np.float32)
         self._handle = server.scene.add_gaussian_splats(
-            f"{root}/splats", self._scaled(splats.points), self._covariances, *self._look, scale=self.SCALE
+            f"{root}/splats", self._scaled(splats.points), self._covariances, *self._look, scale=self._scale
         )
 
     def _scaled(self, points: Floats) -> Points:
-        return (points / self.SCALE).astype(np.float32)
+        return (points / self._scale).astype(np.float32)
 
     def move(self, points: Points, covariances: Floats | None = None) -> None:
-        shown = self._covariances if covariances is None else covariances / np.float32(self.SCALE**2)
+        shown = self._covariances if covariances is None else covariances / np.float32(self._scale**2)
         self._handle.set_gaussians(self._scaled(points), shown, *self._look)
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
@@ -128,3 +126,12 @@ class _SplatView:
 
     def fade(self, opacity: float | None) -> None:
         """Splats have opacities of their own."""
+
+
+def _unit(splats: GaussianSplats) -> float:
+    """The metres to send splats in, in a node of that scale: centimetres, or less where the smaller splats need it.
+
+    Covariances travel as float16, which loses those of splats under a hundredth of a unit.
+    """
+    sizes = np.sqrt(0.5 * np.trace(splats.covariances, axis1=1, axis2=2))
+    return float(np.clip(10.0 * np.quantile(sizes, 0.05), 1e-6, 0.01))

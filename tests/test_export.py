@@ -9,6 +9,10 @@ from odeform.errors import InputError
 from odeform.export import parse_times, write_motion
 from odeform.geometry.harmonics import harmonic_basis
 from odeform.geometry.reading import read_geometry
+from odeform.geometry.region import Sphere
+from odeform.geometry.rigid import rotation_from_vector
+from odeform.geometry.shape import fit_to
+from odeform.geometry.similarity import Similarity
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats, PointCloud
 
@@ -69,6 +73,41 @@ def test_splats_are_written_as_splats(predictors: dict[str, Predictor], tmp_path
         moved = harmonic_basis(seen @ motion.pose(time)[:3, :3].T, 3) @ read.harmonics
         assert np.allclose(moved, harmonic_basis(seen, 3) @ splats.harmonics, atol=1e-5)
     assert np.abs(motion.pose(0.5)[:3, :3] - np.eye(3)).max() > 1e-3
+
+
+def test_a_part_goes_back_to_where_its_file_has_it_and_with_it_the_rest(kick: Predictor, tmp_path: Path) -> None:
+    """Turned, in feet, far from the origin: what moves is undone, what stands still is the file's."""
+    rng = np.random.default_rng(2)
+    directions = rng.normal(size=(200, 3))
+    ball = 0.1 * directions / np.linalg.norm(directions, axis=1, keepdims=True) + [0.0, 0.0, 0.1]
+    floor = np.concatenate([rng.uniform(-1.0, 1.0, (300, 2)), np.full((300, 1), -0.01)], axis=1)
+    half = 1e-3 * rng.normal(size=(500, 3, 3))
+    scene = GaussianSplats(
+        np.concatenate([ball, floor]), half @ half.swapaxes(1, 2), rng.normal(size=(500, 4, 3)), np.full(500, 0.7)
+    )
+    away = Similarity(3.28, rotation_from_vector(np.array([1.5, 0.1, -0.2])), np.array([20.0, -6.0, 1.0]))
+    file = away.shape(scene)
+    region = Sphere(np.array([0.0, 0.0, 0.105]), 0.1052).moved(away)
+    fit = fit_to(file, kick.rest, region, place=away.inverse)
+    motion = kick.solve(fit.geometry)
+    times = np.array([0.0, 0.02, 0.3])
+    write_motion(motion, times, tmp_path / "{frame}.ply", fit)
+    write_motion(motion, times, tmp_path / "a.npz", fit)
+    start, early, late = (read_geometry(tmp_path / f"0000{frame}.ply") for frame in range(3))
+    for name, tolerance in (("points", 5e-6), ("harmonics", 1e-5), ("covariances", 1e-9), ("opacities", 1e-6)):
+        assert np.allclose(getattr(start, name), getattr(file, name), atol=tolerance), name
+    for frame, (moved, time) in enumerate(zip((start, early, late), times, strict=True)):
+        assert isinstance(moved, GaussianSplats)
+        for name in ("points", "harmonics"):
+            assert np.array_equal(getattr(moved, name)[200:], getattr(file, name)[200:].astype(np.float32))
+        assert np.allclose(away.inverse.points(moved.points[:200]), motion.vertices(float(time)), atol=2e-6)
+        assert np.allclose(
+            away.inverse.covariances(moved.covariances[:200]), motion.covariances(float(time)), rtol=1e-3, atol=1e-10
+        )
+        with np.load(tmp_path / "a.npz") as arrays:
+            assert np.allclose(arrays["centers"][frame], moved.points[:200], atol=5e-6)
+            assert np.allclose(arrays["covariances"][frame], moved.covariances[:200], rtol=1e-3, atol=1e-9)
+    assert np.abs(late.points[:200] - start.points[:200]).max() > 0.3
 
 
 def test_braces_of_others(predictors: dict[str, Predictor], tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
+from odeform.geometry.parts import subset
 from odeform.geometry.splat_files import holds_splats, read_splats
 from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
 
@@ -48,7 +49,8 @@ def _validated(geometry: Geometry, path: Path) -> Geometry:
     bad = int(broken.sum())
     # a capture of a million splats has a few that training lost; of a mesh or a scan every point is meant
     if isinstance(geometry, GaussianSplats) and 0 < bad <= count // 2:
-        geometry = _without(geometry, broken)
+        note = f"{bad} of {count} splats left out, not finite"
+        geometry = replace(subset(geometry, ~broken), notes=(*geometry.notes, note))
     elif bad:
         raise InputError(f"geometry {path}: {bad} of {count} points are not finite")
     points = geometry.points
@@ -75,18 +77,6 @@ def _broken(geometry: Geometry) -> NDArray[np.bool_]:
             finite = np.isfinite(part.astype(np.float32, copy=False))
             broken |= ~finite.all(axis=tuple(range(1, part.ndim)))
     return broken
-
-
-def _without(splats: GaussianSplats, broken: NDArray[np.bool_]) -> GaussianSplats:
-    kept = ~broken
-    return replace(
-        splats,
-        points=splats.points[kept],
-        covariances=splats.covariances[kept],
-        harmonics=splats.harmonics[kept],
-        opacities=splats.opacities[kept],
-        notes=(*splats.notes, f"{int(broken.sum())} of {len(broken)} splats left out, not finite"),
-    )
 
 
 def _from_trimesh(path: Path) -> Geometry:

@@ -7,6 +7,7 @@ capture has them, x right, y down, z forward.
 
 import struct
 import zlib
+from gzip import compress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,11 +16,11 @@ import zstandard
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
-from odeform.geometry.ellipsoids import covariances_from_axes, with_fourth
+from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_axes, with_fourth
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.types import Floats, GaussianSplats
 
-__all__ = ["spz_splats"]
+__all__ = ["spz_bytes", "spz_splats"]
 
 Bytes = NDArray[np.uint8]
 
@@ -77,6 +78,23 @@ def spz_splats(data: bytes, path: Path) -> GaussianSplats:
         alphas[:, 0] / 255.0,
         tuple(notes),
     )
+
+
+def spz_bytes(splats: GaussianSplats, fraction: int = 12) -> bytes:
+    """Splats of one colour each -> a file of version 3, places rounded to 2^-`fraction` of a unit."""
+    if splats.harmonics.shape[1] != 1:
+        raise ValueError(f"expected the constant harmonic alone, got {splats.harmonics.shape[1]} coefficients")
+    scales, quaternions = axes_from_covariances(AXES @ splats.covariances @ AXES)
+    header = HEADER.pack(MAGIC, 3, len(splats.points), 0, fraction, 0, 0)
+    parts = [
+        np.rint((splats.points @ AXES) * 2.0**fraction).astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3],
+        _byte(255.0 * splats.opacities),
+        _byte(255.0 * (0.5 + CONSTANT * splats.harmonics[:, 0])),
+        _byte(16.0 * (np.log(np.maximum(scales, 1e-9)) + 10.0)),
+        _packed_turns(quaternions),
+    ]
+    # without a time in it: the same splats are the same bytes
+    return compress(header + b"".join(part.tobytes() for part in parts), mtime=0)
 
 
 def _unpacked(data: bytes, path: Path) -> tuple[Header, bytes]:
@@ -139,3 +157,20 @@ def _smallest_three(raw: Bytes) -> Floats:
     fields = np.stack([word >> 20, word >> 10, word], axis=1)
     size = (fields & 511) / 511.0 * np.sqrt(0.5)
     return np.roll(with_fourth(np.where(fields & 512, -size, size), word >> 30), 1, axis=1)
+
+
+def _byte(values: Floats) -> Bytes:
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+
+
+def _packed_turns(quaternions: Floats) -> Bytes:
+    """What `_smallest_three` reads."""
+    xyzw = np.roll(quaternions, -1, axis=1)
+    place = np.abs(xyzw).argmax(axis=1)
+    rows = np.arange(len(xyzw))
+    xyzw = xyzw * np.where(xyzw[rows, place] < 0.0, -1.0, 1.0)[:, None]
+    others = xyzw[np.arange(4) != place[:, None]].reshape(-1, 3)
+    size = np.rint(np.minimum(np.abs(others) * np.sqrt(2.0), 1.0) * 511).astype(np.uint32)
+    fields = size | (others < 0.0).astype(np.uint32) << 9
+    word = place.astype(np.uint32) << 30 | fields[:, 0] << 20 | fields[:, 1] << 10 | fields[:, 2]
+    return word.astype("<u4").view(np.uint8).reshape(-1, 4)

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from odeform.errors import InputError
+from odeform.geometry.region import Sphere
 from odeform.geometry.shape import fit_to, surface_shares
+from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 
@@ -48,13 +51,13 @@ def test_fit_stands_on_the_same_floor() -> None:
     assert (high - low).max() == pytest.approx(0.2, abs=1e-6)
     assert np.allclose(0.5 * (low + high)[:2], [1.0, 2.0], atol=1e-6)
     assert low[2] == pytest.approx(0.0, abs=1e-6)
-    assert np.allclose(fit.geometry.points, fit.factor * shape.points + fit.shift, atol=1e-5)
+    assert np.allclose(fit.geometry.points, fit.place.factor * shape.points + fit.place.shift, atol=1e-5)
 
 
 def test_fit_leaves_what_fits() -> None:
     reference = ball(2)
     fit = fit_to(reference, reference)
-    assert fit.factor == 1.0
+    assert fit.place.factor == 1.0
     assert np.allclose(fit.geometry.points, reference.points, atol=1e-7)
 
 
@@ -63,7 +66,63 @@ def test_fit_scales_splats() -> None:
     splats = GaussianSplats(points, np.tile(np.eye(3), (9, 1, 1)), np.ones((9, 4, 3)), np.ones(9))
     fit = fit_to(splats, ball(2))
     assert isinstance(fit.geometry, GaussianSplats)
-    assert np.allclose(fit.geometry.covariances, fit.factor**2 * np.eye(3))
+    assert np.allclose(fit.geometry.covariances, fit.place.factor**2 * np.eye(3))
     assert fit.geometry.harmonics is splats.harmonics
     moved = replace(splats, points=100.0 * points + 7.0)
     assert np.allclose(fit_to(moved, ball(2)).geometry.points, fit.geometry.points, atol=1e-6)
+
+
+def scene(up: str, factor: float = 40.0) -> tuple[PointCloud, Sphere]:
+    """A ball on a large floor in a file with its own units and its own way up, and a region about the ball."""
+    rng = np.random.default_rng(4)
+    around = np.concatenate([rng.uniform(-1.0, 1.0, (4000, 2)), np.full((4000, 1), -2e-3)], axis=1)
+    place = Similarity(factor, UPRIGHT[up].T, np.array([7.0, -30.0, 2.0]))
+    points = place.points(np.concatenate([ball(3).points, around]))
+    return PointCloud(points), Sphere(np.array([0.0, 0.0, 0.102]), 0.1025).moved(place)
+
+
+@pytest.mark.parametrize("up", UPRIGHT)
+def test_a_part_is_turned_so_that_its_surroundings_are_below(up: str) -> None:
+    shape, region = scene(up)
+    fit = fit_to(shape, ball(2), region)
+    assert np.array_equal(fit.place.rotation, UPRIGHT[up])
+    assert len(fit.geometry.points) == 642
+    assert np.allclose(fit.geometry.points.min(axis=0), [-0.1, -0.1, 0.0], atol=1e-5)
+    assert fit.still is not None
+    assert np.allclose(fit.still.points[:, 2], -2e-3, atol=1e-5)
+    # an own turn, and an own place, are taken as they are
+    assert np.array_equal(fit_to(shape, ball(2), region, UPRIGHT["+x"]).place.rotation, UPRIGHT["+x"])
+    assert fit_to(shape, ball(2), region, place=fit.place).place is fit.place
+
+
+def test_what_stands_still_is_not_lifted_with_a_body_that_is_dropped() -> None:
+    shape, region = scene("+z")
+    fit = fit_to(shape, ball(2, centre=(0.0, 0.0, 0.5)), region)
+    assert fit.lift == pytest.approx(0.4)
+    assert fit.geometry.points[:, 2].min() == pytest.approx(0.4, abs=1e-5)
+    assert fit.still is not None
+    assert np.allclose(fit.still.points[:, 2], -2e-3, atol=1e-5)
+
+
+def test_far_points_of_a_part_do_not_count() -> None:
+    shape, _ = scene("+z", factor=1.0)
+    part = PointCloud(np.concatenate([shape.points, shape.points[:1] + np.array([0.0, 0.0, 0.9])]))
+    fit = fit_to(part, ball(2), Sphere(np.array([7.0, -30.0, 2.71]), 0.7105))
+    assert np.ptp(fit.geometry.points, axis=0).max() > 0.5
+    assert fit.place.factor == pytest.approx(1.0, abs=1e-3)
+
+
+def test_undone_it_is_the_file_again() -> None:
+    shape, region = scene("-y")
+    fit = fit_to(shape, ball(2), region)
+    back = fit.undo(fit.geometry)
+    inside = region.inside(shape.points)
+    assert np.allclose(back.points, np.concatenate([shape.points[inside], shape.points[~inside]]), atol=1e-4)
+    assert fit.left is not None
+    assert np.array_equal(back.points[inside.sum() :], fit.left.points)  # what stood still, to the last bit
+
+
+def test_an_empty_region_is_refused() -> None:
+    shape, _ = scene("+z")
+    with pytest.raises(InputError, match="region holds 0 of"):
+        fit_to(shape, ball(2), Sphere(np.array([1e3, 0.0, 0.0]), 1.0))

@@ -1,0 +1,67 @@
+"""Similarities: a turn, a factor and a shift, of anything that lies in space."""
+
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+
+from odeform.geometry.harmonics import rotated_harmonics
+from odeform.geometry.rigid import rotation_from_vector
+from odeform.types import Floats, GaussianSplats, Geometry, Rotations, Vector, Vectors
+
+__all__ = ["UPRIGHT", "Similarity"]
+
+Shape = TypeVar("Shape", bound=Geometry)
+
+UPRIGHT: dict[str, Rotations] = {
+    name: np.round(rotation_from_vector(0.5 * np.pi * np.array(quarters)))
+    for name, quarters in {
+        "+z": (0.0, 0.0, 0.0),
+        "-z": (2.0, 0.0, 0.0),
+        "+y": (1.0, 0.0, 0.0),
+        "-y": (-1.0, 0.0, 0.0),
+        "+x": (0.0, -1.0, 0.0),
+        "-x": (0.0, 1.0, 0.0),
+    }.items()
+}
+"""By the axis of a file that points up, the turn that makes it z."""
+
+
+def _eye() -> Rotations:
+    return np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """x -> factor * rotation x + shift, the shift in metres. The identity unless told otherwise."""
+
+    factor: float = 1.0
+    rotation: Rotations = field(default_factory=_eye)
+    shift: Vector = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def inverse(self) -> "Similarity":
+        back = self.rotation.T
+        return Similarity(1.0 / self.factor, back, -(back @ self.shift) / self.factor)
+
+    def __matmul__(self, first: "Similarity") -> "Similarity":
+        """Both, `first` before this one."""
+        return Similarity(self.factor * first.factor, self.rotation @ first.rotation, self.points(first.shift))
+
+    def points(self, points: Vectors) -> Vectors:
+        """(..., 3) metres, in double precision."""
+        return self.factor * (np.asarray(points, dtype=float) @ self.rotation.T) + self.shift
+
+    def covariances(self, covariances: Floats) -> Floats:
+        """(..., 3, 3) m^2."""
+        return self.factor**2 * (self.rotation @ covariances @ self.rotation.T)
+
+    def shape(self, shape: Shape) -> Shape:
+        """A shape with all that has a place or a direction, its points as float32."""
+        moved = replace(shape, points=self.points(shape.points).astype(np.float32))
+        if not isinstance(moved, GaussianSplats):
+            return moved
+        turned = moved.harmonics
+        if not np.array_equal(self.rotation, np.eye(3)):
+            turned = rotated_harmonics(turned, self.rotation)
+        return replace(moved, covariances=self.covariances(moved.covariances), harmonics=turned)

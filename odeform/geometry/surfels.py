@@ -1,0 +1,68 @@
+"""Flat splats that tile surfaces: what scenes are made of whose splats come from a formula, not from photographs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from odeform.types import SH0, Floats, GaussianSplats, Points, Vector, Vectors
+
+__all__ = ["Surfels", "grid", "joined_surfels", "sphere_surfels", "splats_of", "tiles"]
+
+THICKNESS = 4e-4  # m, one standard deviation
+COVER = 0.62  # standard deviations a pitch: neighbours overlap until no gap shows
+OPACITY = 0.97
+
+
+@dataclass(frozen=True, eq=False)
+class Surfels:
+    """`points` (N, 3) m, unit tangents `along` and `across` (N, 3), `sizes` (N, 2) standard deviations in m, `colors`
+    (N, 3) in [0, 1]."""
+
+    points: Points
+    along: Vectors
+    across: Vectors
+    sizes: Floats
+    colors: Points
+
+
+def grid(one: Floats, other: Floats) -> tuple[Floats, Floats]:
+    """(N,) and (N,): every one with every other."""
+    first, second = np.meshgrid(one, other)
+    return first.ravel(), second.ravel()
+
+
+def tiles(
+    corner: Vector, along: Vector, across: Vector, at: Floats, pitch: Floats, colors: Points, cover: float = COVER
+) -> Surfels:
+    """In the plane through `corner`: at (N, 2) m along two unit vectors, for tiles of `pitch` (N, 2) or (2,) m."""
+    count = len(at)
+    points = corner + at[:, :1] * along + at[:, 1:] * across
+    sizes = np.broadcast_to(cover * pitch, (count, 2))
+    return Surfels(points, np.tile(along, (count, 1)), np.tile(across, (count, 1)), sizes, colors)
+
+
+def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
+    """White round ones along a Fibonacci spiral, each of the same share of a sphere."""
+    index = np.arange(count) + 0.5
+    z, angle = 1.0 - 2.0 * index / count, index * np.pi * (3.0 - np.sqrt(5.0))
+    flat = np.sqrt(1.0 - z**2)
+    normals = np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
+    along = np.stack([-np.sin(angle), np.cos(angle), np.zeros(count)], axis=1)
+    sizes = np.full((count, 2), COVER * radius * np.sqrt(4.0 * np.pi / count))
+    return Surfels(centre + radius * normals, along, np.cross(normals, along), sizes, np.ones((count, 3)))
+
+
+def joined_surfels(parts: list[Surfels]) -> Surfels:
+    return Surfels(*(np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])))
+
+
+def splats_of(surfels: Surfels) -> GaussianSplats:
+    normals = np.cross(surfels.along, surfels.across)
+    axes = [surfels.along * surfels.sizes[:, :1], surfels.across * surfels.sizes[:, 1:], THICKNESS * normals]
+    half = np.stack(axes, axis=2)
+    return GaussianSplats(
+        surfels.points.astype(np.float32),
+        half @ half.swapaxes(1, 2),
+        ((np.clip(surfels.colors, 0.0, 1.0) - 0.5) / SH0).astype(np.float32)[:, None],
+        np.full(len(half), OPACITY),
+    )

@@ -1,0 +1,88 @@
+"""How a shape lies in the scene: guessed, and corrected by hand."""
+
+from collections.abc import Callable
+
+import numpy as np
+import viser
+
+from odeform.geometry.shape import Fit
+from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.types import Rotations
+from odeform_viz.gizmos import PlaceGizmo, Vantage
+from odeform_viz.panels.by_hand import on_hand
+
+__all__ = ["AlignmentPanel"]
+
+BY_HAND = "by hand"
+
+
+class AlignmentPanel:
+    """Which axis is up, how large, and arrows and rings in the scene; what they say is handed on."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        hold: Callable[[], None],
+        turn: Callable[[Rotations | None], None],
+        put: Callable[[Similarity], None],
+    ) -> None:
+        """`hold` stops at rest; `turn` fits the shape anew under a rotation, or as guessed; `put` takes a place."""
+        self._hold, self._turn, self._put = hold, turn, put
+        self._fit: Fit | None = None
+        self._guess = 1.0
+        self._gizmo, self._vantage = PlaceGizmo(server, self._dragged), Vantage(server)
+        gui = server.gui
+        self._folder = gui.add_folder("Alignment", expand_by_default=False, visible=False)
+        with self._folder:
+            self._up = gui.add_dropdown("up in the file", (*UPRIGHT, BY_HAND), hint="captures often have -y")
+            self._size = gui.add_number("size (%)", 100.0, min=1.0, step=0.5, hint="of the trained body's")
+            self._drag = gui.add_checkbox(
+                "arrows and rings", False, hint="drag the shape at rest; it follows on release"
+            )
+            back = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
+        on_hand(self._up, self._upright)
+        on_hand(self._size, self._scale)
+        on_hand(self._drag, self._show_gizmo)
+        back.on_click(lambda _: self._turn(None))
+
+    def show(self, fit: Fit | None, guess: float) -> None:
+        """How a shape lies, None for the body that was trained; and the factor that was guessed."""
+        self._fit, self._guess = fit, guess
+        self._folder.visible = fit is not None
+        if fit is None:
+            self._drag.value = False
+        else:
+            named = (name for name, turn in UPRIGHT.items() if np.allclose(turn, fit.place.rotation))
+            self._up.value = next(named, BY_HAND)
+            self._size.value = round(100.0 * fit.place.factor / guess, 2)
+        self._show_gizmo()
+
+    def _show_gizmo(self) -> None:
+        if self._fit is not None and self._drag.value:
+            self._hold()
+            self._gizmo.show(self._fit)
+            points = np.asarray(self._fit.geometry.points, dtype=float)
+            low, high = points.min(axis=0), points.max(axis=0)
+            self._vantage.look(0.5 * (low + high), 1.2 * float((high - low).max()))
+        else:
+            self._gizmo.hide()
+            self._vantage.back()
+
+    def _upright(self) -> None:
+        if self._up.value in UPRIGHT:
+            self._turn(UPRIGHT[self._up.value])
+
+    def _scale(self) -> None:
+        """About the foot of what moves, which keeps it on the floor."""
+        size = float(self._size.value)
+        if self._fit is None or not (np.isfinite(size) and size > 0.0):
+            return
+        points = np.asarray(self._fit.geometry.points, dtype=float)
+        low, high = points.min(axis=0), points.max(axis=0)
+        foot = np.array([*(0.5 * (low + high))[:2], low[2] - self._fit.lift])
+        more = 0.01 * size * self._guess / self._fit.place.factor
+        self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.place)
+
+    def _dragged(self, motion: Similarity) -> None:
+        if self._fit is not None:
+            self._put(motion @ self._fit.place)

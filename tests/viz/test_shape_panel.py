@@ -1,0 +1,203 @@
+"""A part of a scene that moves while the rest stands still, seen through the protocol."""
+
+import socket
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from odeform.geometry.region import Box, Sphere
+from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.predictor import Predictor
+from odeform.types import GaussianSplats, PointCloud
+from odeform_viz.app import App
+from odeform_viz.columns import Column, Columns
+from odeform_viz.gizmos import RegionGizmo
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.panels.part import region_like
+from odeform_viz.scene import SceneView
+from odeform_viz.session import Looks, Session, Wish
+from odeform_viz.shaping import describe_fit, shape_from
+
+BALL, REST = 24_000, 27_482  # splats of the bundled scene
+
+
+@pytest.fixture
+def port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def server(port: int) -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(port=port, verbose=False)
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def app(kick: Predictor, port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[App]:
+    fit = shape_from("volleyball", kick.rest)
+    app = App([Column("odeform", kick, fit.geometry, fit=fit)], port=port)
+    app._playback.jump(0.0)
+    yield app
+    app.close()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_what_stands_still_is_sent_once_for_all_columns(
+    kick: Predictor, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[tuple[str, int]] = []
+    moved: list[Any] = []
+    add = viser.SceneApi.add_gaussian_splats
+
+    def counted(self: viser.SceneApi, name: str, centers: np.ndarray, *rest: Any, **options: Any) -> Any:
+        made.append((name, len(centers)))
+        return add(self, name, centers, *rest, **options)
+
+    monkeypatch.setattr(viser.SceneApi, "add_gaussian_splats", counted)
+    monkeypatch.setattr(viser.GaussianSplatHandle, "set_gaussians", lambda handle, *arrays: moved.append(handle))
+    fit = shape_from("volleyball", kick.rest)
+    columns = Columns.of([Column(name, kick, fit.geometry, fit=fit) for name in ("a", "b")])
+    session, view = Session(kick.schema), SceneView(server, 0.2, 2)
+    wish = Wish(session.schema.complete({}), 0.01, "balanced", columns.all)
+    for time in (0.01, 0.02):
+        view.publish(session.frame(replace(wish, time=time)), Looks(), None)
+    assert sorted(made) == [
+        ("/world/column_0/body/splats", BALL),
+        ("/world/column_1/body/splats", BALL),
+        ("/world/still/splats", REST),
+    ]
+    assert {handle.name for handle in moved} == {name for name, count in made if count == BALL}
+    assert not view._floor.visible
+    # back to the trained body: it goes, and the floor of the viewer is there again
+    columns.reshape(None)
+    view.publish(session.frame(replace(wish, columns=columns.all)), Looks(), None)
+    assert view._still is None
+    assert view._floor.visible
+
+
+def test_small_splats_keep_their_size_as_float16(
+    kick: Predictor, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent: list[tuple[np.ndarray, float]] = []
+    add = viser.SceneApi.add_gaussian_splats
+
+    def kept(
+        self: viser.SceneApi, name: str, centers: np.ndarray, covariances: np.ndarray, *rest: Any, **o: Any
+    ) -> Any:
+        sent.append((covariances, o["scale"]))
+        return add(self, name, centers, covariances, *rest, **o)
+
+    monkeypatch.setattr(viser.SceneApi, "add_gaussian_splats", kept)
+    count = len(kick.rest.points)
+    for sigma in (1e-3, 2e-5):
+        covariances = np.tile(sigma**2 * np.eye(3), (count, 1, 1))
+        splats = GaussianSplats(kick.rest.points, covariances, np.ones((count, 1, 3)), np.ones(count))
+        session, columns = Session(kick.schema), Columns.of([Column("splats", kick, splats)]).all
+        wish = Wish(session.schema.complete({}), 0.0, "balanced", columns)
+        SceneView(server, 0.2, 1).publish(session.frame(wish), Looks(), None)
+        shown, scale = sent[-1]
+        assert np.allclose(
+            scale**2 * shown.astype(np.float16).astype(float), covariances, rtol=1e-3, atol=1e-3 * sigma**2
+        )
+
+
+def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
+    with LoopbackClient(port) as client:
+        client.set("Change the region", True)
+        client.collect(2.0)
+        assert f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text()
+        assert app.columns.all[0].fit is not None
+        assert app.columns.all[0].fit.left is None  # the whole scene lies at rest while one chooses
+        client.set("radius (%)", 3.4)  # the ball is hollow: its top alone
+        client.collect(1.0)
+        smaller = int(client.text().split("**")[1].replace(",", ""))
+        assert 0 < smaller < BALL
+        client.set("Use this part", True)
+        client.collect(1.0)
+    fit = app.columns.all[0].fit
+    assert fit is not None
+    assert isinstance(fit.region, Sphere)
+    assert len(fit.geometry.points) == smaller
+    assert fit.left is not None
+    assert len(fit.left.points) == BALL + REST - smaller
+    assert np.array_equal(fit.place.rotation, UPRIGHT["-y"])  # as it lay while one chose
+
+
+def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
+    before = app.columns.all
+    with LoopbackClient(port) as client:
+        app._shape._use(Box(np.full(3, 50.0), np.ones(3)))
+        client.collect(0.5)
+        assert f"the region holds 0 of the {BALL + REST:,} points" in client.text()
+    assert app.columns.all is before
+
+
+def test_alignment_by_hand_and_back(app: App, port: int) -> None:
+    def place() -> Similarity:
+        fit = app.columns.all[0].fit
+        assert fit is not None
+        return fit.place
+
+    guessed = place()
+    with LoopbackClient(port) as client:
+        client.set("size (%)", 150.0)
+        client.collect(1.0)
+        assert place().factor == pytest.approx(1.5 * guessed.factor)
+        assert app.columns.all[0].geometry.points[:, 2].min() == pytest.approx(0.0, abs=1e-5)
+        client.set("up in the file", "+y")
+        client.collect(1.0)
+        assert np.array_equal(place().rotation, UPRIGHT["+y"])
+    app._shape._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
+    assert np.allclose(place().rotation, UPRIGHT["-z"] @ UPRIGHT["+y"])
+    app._shape._turn(None)
+    assert place().factor == guessed.factor
+    assert np.array_equal(place().rotation, guessed.rotation)
+    assert np.array_equal(place().shift, guessed.shift)
+
+
+def test_a_region_as_it_is_dragged(server: viser.ViserServer) -> None:
+    gizmo = RegionGizmo(server, lambda: None)
+    assert gizmo.region is None
+    box = Box(np.array([0.1, 0.2, 0.3]), np.array([0.4, 0.5, 0.6]), UPRIGHT["+x"])
+    gizmo.show(box)
+    again = gizmo.region
+    assert isinstance(again, Box)
+    assert np.allclose(again.rotation, box.rotation)
+    assert gizmo._shown is not None
+    gizmo._shown[1].position = (1.0, 1.0, 1.0)
+    moved = gizmo.region
+    assert isinstance(moved, Box)
+    assert np.allclose(moved.centre, 1.0)
+    gizmo.hide()
+    assert gizmo.region is None
+
+
+def test_a_region_of_another_kind_is_about_the_same(kick: Predictor) -> None:
+    fit = shape_from("volleyball", kick.rest)
+    box = region_like(fit.region, "box", fit)
+    assert isinstance(box, Box)
+    sphere = region_like(box, "sphere", fit)
+    assert isinstance(sphere, Sphere)
+    assert isinstance(fit.region, Sphere)
+    assert sphere.radius == pytest.approx(fit.region.radius)
+    assert region_like(box, "box", fit) is box
+
+
+def test_too_many_points_are_refused_or_thinned_out_with_a_word(
+    kick: Predictor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("odeform_viz.shaping.MOST_POINTS", 30_000)
+    fit = shape_from("volleyball", kick.rest)
+    assert len(fit.source.points) == 30_000
+    assert "the 30,000 most visible of 51,482 splats" in describe_fit(fit, "volleyball", kick.rest)
+    cloud = PointCloud(np.random.default_rng(0).normal(size=(30_001, 3)))
+    monkeypatch.setattr("odeform_viz.shaping.read_shape", lambda _: (cloud, None))
+    with pytest.raises(ValueError, match="30,001 points; expected at most 30,000"):
+        shape_from("cloud.ply", kick.rest)
