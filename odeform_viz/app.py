@@ -20,13 +20,16 @@ from odeform.types import Floats
 from odeform_viz.clock import Clock
 from odeform_viz.columns import Column, Columns
 from odeform_viz.heat import scale_for
+from odeform_viz.memory import Tidy, share_arenas
+from odeform_viz.notices import Notices
 from odeform_viz.panels.compare import ComparePanel
+from odeform_viz.panels.help import HelpPanel
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.plots import PlotPanel
 from odeform_viz.panels.record import RecordPanel
 from odeform_viz.panels.shape import ShapePanel
-from odeform_viz.panels.status import StatusPanel
+from odeform_viz.panels.status import MomentPanel, StatusPanel
 from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
 from odeform_viz.scene import SceneView, color_of
@@ -57,6 +60,8 @@ class App:
         _require_free(host, port)
         # the worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
         sys.setswitchinterval(SWITCH)
+        share_arenas()
+        self._tidy = Tidy()
         self._recorder = Recorder(record) if record else None
         self._record_to = record
         with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
@@ -71,7 +76,6 @@ class App:
         self.server.gui.set_panel_label(f"ODeform · {self.session.schema.scene}")
         self._worker = Worker(self._serve)
         self._build(columns)
-        self.server.gui.add_command("Play or pause", hotkey="K").on_trigger(lambda _: self._playback.toggle())
         self._shown: Frame | None = None
         self._looks = Looks()
         self._heat: float | None = None
@@ -85,7 +89,9 @@ class App:
     def _build(self, columns: Sequence[Column]) -> None:
         schema, gui, wake = self.session.schema, self.server.gui, self._worker.wake
         self.clock = Clock(schema.window.start, schema.window.stop)
-        self._playback = PlaybackPanel(self.server, schema.window, self.clock, wake, self._largest)
+        say = self._say = Notices(self.server).say
+        self._playback = PlaybackPanel(self.server, schema.window, self.clock, wake, self._largest, say)
+        self._moment = MomentPanel(self.server)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Explore"):
             qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
@@ -93,7 +99,7 @@ class App:
             self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
             body = columns[0].source.rest  # pyright: ignore[reportAttributeAccessIssue]
             hold = partial(self._playback.jump, schema.window.start)
-            self._shape = ShapePanel(self.server, self.columns, body, hold, self._changed, self._say)
+            self._shape = ShapePanel(self.server, self.columns, body, hold, self._changed, say)
             with gui.add_folder("View"):
                 self._follow = gui.add_checkbox("follow the body", initial_value=True)
                 self._follow.on_update(lambda _: wake())
@@ -102,15 +108,26 @@ class App:
         with tabs.add_tab("Compare"):
             models = {n: str(p) for n, p in bundled_checkpoints().items() if n.startswith(f"{schema.scene}/")}
             dataset = open_dataset(schema.scene) if schema.scene in bundled_datasets() else None
-            read, say = self._parameters.parameters, self._say
-            self._truth = TruthPanel(
-                self.server, schema, self.columns, dataset, read, self._parameters.set, self._changed, say
-            )
-            self._compare = ComparePanel(self.server, schema, self.columns, models, read, wake, say)
+            read, move = self._parameters.parameters, self._parameters.set
+            taught = columns[0].predictor.checkpoint.provenance.get("fixed", {}) if columns[0].predictor else {}
+            self._truth = TruthPanel(self.server, schema, self.columns, dataset, taught, read, move, self._changed, say)
+            self._compare = ComparePanel(self.server, schema, self.columns, models, read, self._changed, say)
         with tabs.add_tab("Record"):
             self._take = RecordPanel(
-                self.server, schema.scene, self._record, self._save, self._restore, self._export, self._say
+                self.server, schema.scene, self._record, self._save, self._restore, self._export, say
             )
+        with tabs.add_tab("Help"):
+            play, look = self._playback, self._compare
+            keys = {
+                "K": ("play or pause", play.toggle),
+                "J": ("a frame back", lambda: play.step("◀")),
+                "L": ("a frame on", lambda: play.step("▶")),
+                "0": ("to the start", lambda: play.step("start")),
+                "P": ("to the peak of the deformation", lambda: play.step("peak")),
+                "O": ("columns overlaid or in a row", look.toggle_overlay),
+                "C": ("error colours on or off", look.toggle_heat),
+            }
+            HelpPanel(self.server, keys)
         self._status = StatusPanel(self.server)
         self._plots = PlotPanel(self.server, schema.window)
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
@@ -140,6 +157,7 @@ class App:
         return self.session.largest_deformation(self._wish())
 
     def _changed(self) -> None:
+        self._truth.refresh()
         self._compare.refresh()
         self._worker.wake()
 
@@ -195,9 +213,6 @@ class App:
         write_motion(motion, self.session.schema.window.times, path, column.fit)
         return path
 
-    def _say(self, message: str) -> None:
-        self._status.show_error(message)
-
     def _serve(self) -> float | None:
         """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
         try:
@@ -209,8 +224,9 @@ class App:
             elif not self._settled:
                 self._settled = True
                 self._describe(self._shown)
+                self._tidy()
         except InputError as error:
-            self._status.show_error(str(error))
+            self._moment.show_error(str(error))
             self._shown, self._settled = None, True  # what comes next is shown, even if it was before
         if self.clock.playing:
             return TICK
@@ -240,9 +256,10 @@ class App:
         truth = frame.truth.column.truth if frame.truth else None
         away = truth is not None and not truth.of(frame.wish.parameters)
         self._truth.show(away)
-        self._status.show(frame, self._settled, self._heat, away)
+        self._moment.show(frame, self._heat, away)
+        self._status.show(frame, self._settled)
         lines = [
-            (shown.column.label, color_of(frame.wish.columns, shown.column), self.session.curves(shown, frame.wish))
+            (shown.column.label, color_of(shown.column), self.session.curves(shown, frame.wish))
             for shown in frame.columns
         ]
         self._plots.show(lines, frame.wish.time)
@@ -264,7 +281,7 @@ def _about(column: Column) -> str:
     fixed = ", ".join(f"{name} {value:.4g}" for name, value in provenance.get("fixed", {}).items())
     lines = [*column.source.schema.notes, f"Fixed: {fixed}."]
     lines += [f"Made by `{command}`." for command in provenance.get("command", [])]
-    return "\n\n".join([*lines, "Press K to play or pause."])
+    return "\n\n".join(lines)
 
 
 def _require_free(host: str, port: int) -> None:

@@ -2,9 +2,11 @@
 
 import argparse
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 
@@ -15,9 +17,10 @@ from odeform.evaluation.bench import ball
 from odeform.predictor import Predictor
 from odeform.types import Floats, GaussianSplats, Mesh
 from odeform_viz.app import App
+from odeform_viz.checker import checker_parts
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.loopback import LoopbackClient
-from odeform_viz.shapes import checker_parts
+from odeform_viz.soak import soak
 
 __all__ = ["drag", "scrub_splats"]
 
@@ -83,11 +86,12 @@ def drag(models: list[Predictor], truth: Column | None, port: int, messages: int
     values, moment = np.linspace(slider.low, slider.high, messages), 0.3 if model.schema.impact else 0.02
     columns = [Column(m.model, m, shape) for m in models]
     columns = [*columns[:1], truth, *columns[1:]] if truth is not None else columns
-    # the last part of the last column
-    part = checker_parts(shape)[-1][0][0]
-    node = f"/world/column_{len(columns) - 1}/body/part_{len(checker_parts(shape)) - 1}"
+    # what is sent last
+    parts = checker_parts(shape)
+    node = f"/world/column_{len(columns) - 1}/body/part_{len(parts) - 1}"
     others = truth.source.parameters if truth is not None and truth.truth else {}  # pyright: ignore[reportAttributeAccessIssue]
-    expected = np.stack([model.solve(shape, {**others, slider.name: v}).deformed(moment)[part] for v in values])
+    motions = (model.solve(shape, {**others, slider.name: v}) for v in values)
+    expected = np.stack([parts[-1].of(motion.deformed(moment))[0] for motion in motions])
 
     with _serving(columns, port, moment) as client:
 
@@ -119,19 +123,40 @@ def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]
         return _answers(values, lambda v: client.set("time (s)", round(v, 4)), wait, 10.0)
 
 
+def _soak(model: Predictor, rivals: list[Predictor], truth: Column | None, port: int, wishes: int) -> None:
+    shown = [(model, model.schema.scene), *((r, f"{model.schema.scene}/{r.model}") for r in rivals[:1])]
+    columns = [Column(m.model, m, m.rest, origin=name) for m, name in shown]
+    app = App([*columns, truth] if truth is not None else columns, port=port)
+    try:
+        with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
+            done = soak(app, port, wishes, Path(folder))
+    finally:
+        app.close()
+    print(f"{done.wishes} wishes in {done.wall_s:.0f} s, {done.refused} refused, {len(done.errors)} errors")
+    print(f"newest frame last: {sum(done.newest_last)} of {len(done.newest_last)} times")
+    print(f"resident MB after each tenth: {', '.join(f'{mb:.0f}' for mb in done.resident_mb)}: {done.growth:+.1%}")
+    for error in dict.fromkeys(done.errors):
+        print(error)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m odeform_viz.bench", description=__doc__)
     parser.add_argument("--checkpoint", default="kick")
     parser.add_argument("--messages", type=int, default=300)
     parser.add_argument("--port", type=int, default=8097)
+    parser.add_argument("--soak", type=int, nargs="?", const=10_000, metavar="N", help="random wishes, default 10,000")
     args = parser.parse_args()
     model = odeform.load(args.checkpoint)
     scene = model.schema.scene
-    rivals = [odeform.load(path) for name, path in bundled_checkpoints().items() if name.startswith(f"{scene}/")]
-    models = [model, *(r for r in rivals if r.model != model.model)][:3]
+    bundled = [odeform.load(path) for name, path in bundled_checkpoints().items() if name.startswith(f"{scene}/")]
+    rivals = [r for r in bundled if r.model != model.model]
+    models = [model, *rivals][:3]
     truth = None
     if scene in bundled_datasets():
         truth = truth_column(f"{scene}/{open_dataset(scene).select('test')[0].name}")
+    if args.soak:
+        _soak(model, rivals, truth, args.port, args.soak)
+        return
     runs = {
         "one model, 5,000 points": lambda: drag([model], None, args.port, args.messages, 5000),
         f"{len(models)} models{' and truth' * (truth is not None)}, 2,500 points": lambda: drag(

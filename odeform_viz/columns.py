@@ -33,6 +33,8 @@ class Column:
     shown: bool = True
     key: int = -1
     """Given by `Columns`; the same while a column is shown and hidden."""
+    place: int = -1
+    """Given by `Columns`: the lowest that no other model has, for a colour of its own while it lasts."""
 
     @property
     def foreign(self) -> bool:
@@ -70,7 +72,10 @@ class Columns:
                 if column.truth is not None:
                     kept = [c for c in kept if c.truth is None]
                 label = f"{column.label} (no {', '.join(lacks)})" if lacks else column.label
-                kept.append(replace(column, label=_unused(label, {c.label for c in kept}), key=next(self._keys)))
+                taken = {c.place for c in kept if c.predictor}
+                place = next(n for n in itertools.count() if n not in taken)
+                label = _unused(label, {c.label for c in kept})
+                kept.append(replace(column, label=label, key=next(self._keys), place=place))
             if len(kept) > MOST:
                 raise InputError(f"{len(kept)} columns: expected at most {MOST}; remove some first")
             self._columns = tuple(kept)

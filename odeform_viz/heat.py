@@ -6,7 +6,7 @@ from scipy.spatial import KDTree
 
 from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
-__all__ = ["BANDS", "Spread", "bands_of", "scale_for"]
+__all__ = ["BANDS", "Spread", "bands_of", "levels_of", "scale_for"]
 
 # eight even samples of viridis: even steps to the eye, also in grey and to the colour-blind
 BANDS = (
@@ -34,12 +34,17 @@ class Spread:
         return (self._share * values[self._index]).sum(axis=1)
 
 
+def levels_of(values: Perpoint, top: float) -> Ints:
+    """(N,) the band of each value, the last open above `top`."""
+    return np.clip((values / top * len(BANDS)).astype(int), 0, len(BANDS) - 1)
+
+
 def bands_of(values: Perpoint, faces: Faces, top: float) -> list[tuple[Ints, Ints] | None]:
-    """A mesh by the band that each face's mean value falls in, the last open above `top`.
+    """A mesh by the band that each face's mean value falls in.
 
     For each band the vertices (M,) it uses and its faces (F, 3) among them; None where it is empty.
     """
-    level = np.clip((values[faces].mean(axis=1) / top * len(BANDS)).astype(int), 0, len(BANDS) - 1)
+    level = levels_of(values[faces].mean(axis=1), top)
     parts: list[tuple[Ints, Ints] | None] = []
     for band in range(len(BANDS)):
         chosen = faces[level == band]

@@ -29,9 +29,12 @@ class Job:
     done: Callable[[Any], None]
     failed: Callable[[str], None]
     progress: Callable[[float], None] = lambda _: None
-    _cancelled: threading.Event = field(default_factory=threading.Event)
+    running: bool = field(default=False, init=False)
+    """Until the result is in, or cancelled."""
+    _cancelled: threading.Event = field(default_factory=threading.Event, init=False)
 
     def start(self) -> None:
+        self.running = True
         # a fresh interpreter: this one has threads, whose locks a fork would copy as they happen to be
         context = multiprocessing.get_context("spawn")
         self._inbox, outbox = context.Pipe(duplex=False)
@@ -41,13 +44,10 @@ class Job:
         self._thread = threading.Thread(target=self._listen, name="odeform-job", daemon=True)
         self._thread.start()
 
-    @property
-    def running(self) -> bool:
-        return self._thread.is_alive()
-
     def cancel(self) -> None:
         self._cancelled.set()
         self._process.terminate()
+        self.running = False
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout=5.0)
 
@@ -61,6 +61,7 @@ class Job:
                 kind, value = "failed", f"the process ended with exit code {self._process.exitcode}"
             if self._cancelled.is_set():
                 return
+            self.running = kind == "progress"
             {"progress": self.progress, "done": self.done, "failed": self.failed}[kind](value)
         self._process.join(timeout=5.0)
 

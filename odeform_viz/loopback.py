@@ -2,6 +2,9 @@
 
 import struct
 import time
+import uuid
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import msgspec
@@ -10,7 +13,28 @@ import viser
 import zstandard
 from websockets.sync.client import connect
 
-__all__ = ["LoopbackClient"]
+__all__ = ["Control", "LoopbackClient"]
+
+PART = 1 << 19  # bytes of a file in one message
+
+
+@dataclass
+class Control:
+    """Something in a panel: its `kind` is that of viser's message, such as `Slider` or `ButtonGroup`."""
+
+    uuid: str
+    kind: str
+    value: Any
+    props: dict[str, Any] = field(repr=False)
+
+    @property
+    def visible(self) -> bool:
+        return self.props.get("visible", True)
+
+    @property
+    def text(self) -> str:
+        """Markdown or HTML, empty while it is hidden."""
+        return self.props.get("_markdown", self.props.get("content", "")) if self.visible else ""
 
 
 class LoopbackClient:
@@ -23,8 +47,15 @@ class LoopbackClient:
             max_size=None,
             compression=None,
         )
-        self.controls: dict[str, str] = {}
-        self.texts: dict[str, str] = {}
+        self._controls: dict[str, Control] = {}
+        self._commands: dict[str, str] = {}
+        self.said: list[str] = []
+        """Notifications, the newest last."""
+        self.nodes: set[str] = set()
+        """Names of the scene's nodes."""
+        self.downloads: dict[str, bytes] = {}
+        """Files that came, by name."""
+        self._arriving: dict[str, str] = {}
         # the server calls back only for clients whose camera it knows
         camera = {
             "type": "ViewerCameraMessage",
@@ -47,10 +78,38 @@ class LoopbackClient:
     def __exit__(self, *_: object) -> None:
         self._socket.close()
 
+    def _send(self, kind: str, **content: Any) -> None:
+        self._socket.send(msgspec.msgpack.encode({"type": kind, **content}))
+
+    @property
+    def controls(self) -> dict[str, Control]:
+        """Those that are there now, by label; of several with one label the newest."""
+        return {c.props["label"]: c for c in self._controls.values() if "label" in c.props and c.kind != "Folder"}
+
+    @property
+    def commands(self) -> list[str]:
+        return list(self._commands)
+
     def set(self, label: str, value: Any) -> None:
-        """Move the control of that label."""
-        message = {"type": "GuiUpdateMessage", "uuid": self.controls[label], "updates": {"value": value}}
-        self._socket.send(msgspec.msgpack.encode(message))
+        """Move the control of that label; a button group takes the name of the button."""
+        control = self.controls[label]
+        self._send("GuiUpdateMessage", uuid=control.uuid, updates={"value": value})
+        control.value = value
+
+    def click(self, label: str) -> None:
+        self.set(label, True)
+
+    def press(self, command: str) -> None:
+        """Trigger a command, as its hot key does."""
+        self._send("CommandTriggerMessage", uuid=self._commands[command])
+
+    def upload(self, label: str, name: str, content: bytes) -> None:
+        parts = [content[at : at + PART] for at in range(0, len(content), PART)]
+        ids = {"source_component_uuid": self.controls[label].uuid, "transfer_uuid": uuid.uuid4().hex}
+        about = {"filename": name, "mime_type": "", "part_count": len(parts), "size_bytes": len(content)}
+        self._send("FileTransferStartUpload", **ids, **about)
+        for index, part in enumerate(parts):
+            self._send("FileTransferPart", **ids, part_index=index, content=part)
 
     def collect(self, seconds: float) -> list[dict[str, Any]]:
         """All messages of the next `seconds`."""
@@ -71,18 +130,45 @@ class LoopbackClient:
             self._note(message)
         return messages
 
+    def until(self, holds: Callable[[], bool], seconds: float = 10.0) -> bool:
+        """Listen until something holds, or for that long; whether it does."""
+        end = time.monotonic() + seconds
+        while not holds() and time.monotonic() < end:
+            self.receive(0.1)
+        return holds()
+
     def _note(self, message: dict[str, Any]) -> None:
-        props = message.get("props", {})
-        if isinstance(props, dict) and "label" in props and "uuid" in message:
-            self.controls[props["label"]] = message["uuid"]
-        if message["type"] == "GuiMarkdownMessage":
-            self.texts[message["uuid"]] = props["_markdown"]
-        if message["type"] == "GuiUpdateMessage" and message["uuid"] in self.texts:
-            self.texts[message["uuid"]] = message["updates"].get("_markdown", self.texts[message["uuid"]])
+        kind, props = message["type"], message.get("props", {})
+        if kind == "RegisterCommandMessage":
+            self._commands[props["label"]] = message["uuid"]
+        elif kind == "NotificationShowMessage":
+            self.said.append(props["body"])
+        elif kind == "GuiUpdateMessage":
+            self._update(message["uuid"], message["updates"])
+        elif kind == "GuiRemoveMessage":
+            self._controls.pop(message["uuid"], None)
+        elif kind == "RemoveSceneNodeMessage":
+            self.nodes.discard(message["name"])
+        elif kind == "FileTransferStartDownload":
+            self._arriving[message["transfer_uuid"]] = message["filename"]
+            self.downloads[message["filename"]] = b""
+        elif kind == "FileTransferPart" and message["transfer_uuid"] in self._arriving:
+            self.downloads[self._arriving[message["transfer_uuid"]]] += bytes(message["content"])
+        elif kind.startswith("Gui") and props:
+            name = kind.removeprefix("Gui").removesuffix("Message")
+            self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), props)
+        elif "name" in message and "props" in message:
+            self.nodes.add(message["name"])
+
+    def _update(self, changed: str, updates: dict[str, Any]) -> None:
+        control = self._controls.get(changed)
+        if control is not None:
+            control.value = updates.get("value", control.value)
+            control.props.update({name: value for name, value in updates.items() if name in control.props})
 
     def text(self) -> str:
-        """Everything that stands in the page's Markdown."""
-        return "\n".join(self.texts.values())
+        """Everything that stands in the page, as Markdown and HTML."""
+        return "\n".join(filter(None, (control.text for control in self._controls.values())))
 
     def wait_vertices(self, node: str, timeout: float = 5.0) -> np.ndarray | None:
         """(N, 3) of the next update of that node's vertices."""

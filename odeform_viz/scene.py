@@ -1,7 +1,5 @@
 """Frames -> viser handles: columns side by side under one camera, the floor, the pulse."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import viser
 import viser.transforms as vtf
@@ -24,10 +22,9 @@ ARROW = (190, 20, 20)
 GHOST = 0.45  # opacity of all but the first where columns overlap
 
 
-def color_of(columns: Sequence[Column], column: Column) -> Color:
-    """Models in the order of the palette, the truth in grey."""
-    models = [c.key for c in columns if c.truth is None]
-    return TRUTH if column.truth else COLORS[models.index(column.key) % len(COLORS)]
+def color_of(column: Column) -> Color:
+    """A model's by its place, the truth grey."""
+    return TRUTH if column.truth else COLORS[column.place % len(COLORS)]
 
 
 class _ColumnView:
@@ -215,8 +212,8 @@ class SceneView:
                 view.hide()
         for shown in frame.columns:
             if shown.column.key not in self._views:
-                color = color_of(frame.wish.columns, shown.column)
-                self._views[shown.column.key] = (shown.column, _ColumnView(self._server, shown.column, color))
+                view = _ColumnView(self._server, shown.column, color_of(shown.column))
+                self._views[shown.column.key] = (shown.column, view)
 
     def _show_still(self, frame: Frame) -> None:
         """What stands still of a shape, sent once, and once for all columns; it brings a floor of its own."""

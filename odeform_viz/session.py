@@ -1,5 +1,6 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -114,10 +115,14 @@ def same_motions(one: Frame, other: Frame) -> bool:
 
 
 class Session:
-    """Columns under one set of parameters and one time. Integrates only when parameters or quality change."""
+    """Columns under one set of parameters and one time. Integrates only when parameters or quality change.
+
+    The worker asks for frames while callbacks ask for a peak or an export: one at a time.
+    """
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
+        self._lock = threading.RLock()
         self._solved: dict[tuple[int, int], tuple[tuple[object, ...], Motion]] = {}
         self._curves: dict[int, tuple[object, object, Curves]] = {}
 
@@ -130,7 +135,8 @@ class Session:
         source = column.source
         if isinstance(source, RecordedMotion):
             return source
-        return self._solve(column, source, 0, column.geometry, wish)
+        with self._lock:
+            return self._solve(column, source, 0, column.geometry, wish)
 
     def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> Motion:
         names = {p.name for p in source.schema.parameters}
@@ -154,9 +160,10 @@ class Session:
         if not np.isfinite(wish.time) or wish.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {wish.time}")
         kept = {column.key for column in wish.columns}
-        self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
-        self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
-        return Frame(wish, tuple(self._column(column, wish) for column in wish.columns if column.shown))
+        with self._lock:
+            self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
+            self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
+            return Frame(wish, tuple(self._column(column, wish) for column in wish.columns if column.shown))
 
     def _column(self, column: Column, wish: Wish) -> ColumnFrame:
         motion, time = self.motion(column, wish), wish.time

@@ -5,10 +5,11 @@ from typing import Protocol
 import numpy as np
 import viser
 
-from odeform.types import Floats, GaussianSplats, Geometry, Ints, Mesh, Perpoint, Points
-from odeform_viz.heat import BANDS, bands_of
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Perpoint, Points
+from odeform_viz.checker import checker_parts
+from odeform_viz.heat import BANDS, bands_of, levels_of
 
-__all__ = ["Color", "ShapeView", "checker_parts", "show_shape"]
+__all__ = ["Color", "ShapeView", "show_shape"]
 
 Color = tuple[int, int, int]
 
@@ -32,37 +33,22 @@ def show_shape(server: viser.ViserServer, root: str, geometry: Geometry, color: 
     return _CloudView(server, root, geometry.points, color)
 
 
-def checker_parts(mesh: Mesh) -> list[tuple[Ints, Ints]]:
-    """A mesh in two parts, octants about its centre in turn: for each the vertices (M,) it uses and its faces (F, 3).
-
-    A body of one colour hides how it turns.
-    """
-    points = np.asarray(mesh.points, dtype=float)
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    odd = np.prod(points[mesh.faces].mean(axis=1) - centre, axis=1) > 0.0
-    parts = []
-    for faces in (mesh.faces[odd], mesh.faces[~odd]):
-        used, local = np.unique(faces, return_inverse=True)
-        parts.append((used, local.reshape(-1, 3)))
-    return [part for part in parts if len(part[0])]
-
-
 class _MeshView:
     def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
         self._server, self._root, self._mesh = server, root, mesh
         points = np.asarray(mesh.points, dtype=np.float32)
         red, green, blue = (round(0.45 * c + 0.55 * 235) for c in color)
         self._parts = []
-        for index, ((used, faces), shade) in enumerate(
-            zip(checker_parts(mesh), (color, (red, green, blue)), strict=False)
-        ):
-            handle = server.scene.add_mesh_simple(f"{root}/part_{index}", points[used], faces, color=shade)
-            self._parts.append((handle, used))
+        shades = (color, (red, green, blue))
+        for index, (part, shade) in enumerate(zip(checker_parts(mesh), shades, strict=False)):
+            name = f"{root}/part_{index}"
+            self._parts.append((server.scene.add_mesh_simple(name, part.of(points), part.faces, color=shade), part))
         self._bands: list[viser.MeshHandle | None] = [None] * len(BANDS)
+        self._opacity: float | None = None
 
     def move(self, points: Points, covariances: Floats | None = None) -> None:
-        for handle, used in self._parts:
-            handle.vertices = points[used]
+        for handle, part in self._parts:
+            handle.vertices = part.of(points)
             handle.visible = True
         for band in self._bands:
             if band is not None:
@@ -80,10 +66,11 @@ class _MeshView:
             used, faces = part
             # as a new node of the same name: vertices and faces that change apart would not fit for a moment
             self._bands[index] = self._server.scene.add_mesh_simple(
-                f"{self._root}/band_{index}", points[used], faces, color=BANDS[index]
+                f"{self._root}/band_{index}", points[used], faces, color=BANDS[index], opacity=self._opacity
             )
 
     def fade(self, opacity: float | None) -> None:
+        self._opacity = opacity
         for handle, _ in self._parts:
             handle.opacity = opacity
 
@@ -91,15 +78,18 @@ class _MeshView:
 class _CloudView:
     def __init__(self, server: viser.ViserServer, root: str, points: Points, color: Color) -> None:
         points = np.asarray(points, dtype=np.float32)
+        self._color = np.tile(np.array(color, dtype=np.uint8), (len(points), 1))
         self._cloud = server.scene.add_point_cloud(
-            f"{root}/points", points, color, point_size=0.003, precision="float32"
+            f"{root}/points", points, self._color, point_size=0.003, precision="float32"
         )
 
     def move(self, points: Points, covariances: Floats | None = None) -> None:
         self._cloud.points = points
+        self._cloud.colors = self._color
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
-        self.move(points)
+        self._cloud.points = points
+        self._cloud.colors = np.array(BANDS, dtype=np.uint8)[levels_of(values, top)]
 
     def fade(self, opacity: float | None) -> None:
         """Points are seen through anyway."""

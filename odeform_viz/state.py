@@ -1,6 +1,7 @@
 """The whole state of the page as a file: who opens it sees the same."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -88,13 +89,21 @@ def state_from_json(data: bytes, scene: str) -> PageState:
             raise InputError(f"state: expected a file that ODeform saved, of format {FORMAT}")
         raw["columns"], raw["notes"] = tuple(raw["columns"]), tuple(raw["notes"])
         state = PageState(**raw)
+        if not math.isfinite(state.time):
+            raise InputError(f"state: expected a time in seconds, got {state.time}")
+        if not isinstance(state.parameters, dict):
+            raise InputError(f"state: expected parameters by name, got {state.parameters}")
         if state.scene != scene:
             raise InputError(f"state: it is of scene {state.scene}, not {scene}")
         for column in state.columns:
             if set(column) != {"origin", "label", "pinned", "shown"}:
                 raise InputError(f"state: a column with {', '.join(column)}; expected origin, label, pinned, shown")
+            if not isinstance(column["pinned"], dict | None) or not isinstance(column["origin"], str):
+                raise InputError(f"state: column {column['label']}: expected a name and parameters by name")
+        if all(column["pinned"] is not None for column in state.columns):
+            raise InputError("state: no model under the sliders")
         return state
     except InputError:
         raise
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"state: not a file that ODeform saved: {error}") from None

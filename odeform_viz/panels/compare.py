@@ -1,6 +1,7 @@
 """What stands beside what: columns to add, pin, sweep and hide, and how they are arranged."""
 
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import replace
 
 import viser
@@ -40,13 +41,16 @@ class ComparePanel:
         columns: Columns,
         models: Mapping[str, str],
         parameters: Callable[[], dict[str, float]],
-        wake: Callable[[], None],
+        changed: Callable[[], None],
         say: Callable[[str], None],
     ) -> None:
-        """`models` are the checkpoints at hand, by name; `parameters` reads the sliders; `say` shows a message."""
+        """`models` are the checkpoints at hand, by name; `parameters` reads the sliders; `changed` is called after the
+        columns or their arrangement have; `say` shows a message.
+        """
         self._server, self._schema, self._columns = server, schema, columns
-        self._models, self._parameters, self._wake, self._say = models, parameters, wake, say
+        self._models, self._parameters, self._changed, self._say = models, parameters, changed, say
         self._boxes: dict[int, viser.GuiCheckboxHandle] = {}
+        self._refreshing = threading.Lock()
         gui = server.gui
         self._folder = gui.add_folder("Columns")
         with self._folder:
@@ -69,7 +73,7 @@ class ComparePanel:
             self._overlay = gui.add_checkbox("overlay", False, hint="one over the other instead of side by side")
             self._heat = gui.add_checkbox("error colours", True, hint="distance to the truth on the surface")
             for box in (self._overlay, self._heat):
-                box.on_update(lambda _: wake())
+                box.on_update(lambda _: changed())
         self.refresh()
 
     @property
@@ -83,13 +87,18 @@ class ComparePanel:
     def set(self, overlay: bool, heat: bool) -> None:
         self._overlay.value, self._heat.value = overlay, heat
 
+    def toggle_overlay(self) -> None:
+        self._overlay.value = not self._overlay.value
+
+    def toggle_heat(self) -> None:
+        self._heat.value = not self._heat.value
+
     def _guarded(self, action: Callable[[], None]) -> None:
         try:
             action()
         except InputError as error:
             self._say(str(error))
-        self.refresh()
-        self._wake()
+        self._changed()
 
     def _first(self) -> Column:
         """The model that is pinned and swept: the first under the sliders."""
@@ -114,9 +123,10 @@ class ComparePanel:
         swept = next((p for p in self._schema.learned if p.name == self._swept.value), None)
         if swept is None:
             raise InputError(f"parameter: expected one that is learned, got {self._swept.value!r}")
-        for column in self._columns.all:
-            self._columns.show(column.key, False)
+        before = self._columns.all
         self._columns.add(*sweep(self._first(), self._parameters(), self._schema, swept))
+        for column in before:
+            self._columns.show(column.key, False)
 
     def _remove_hidden(self) -> None:
         first = self._first()
@@ -125,20 +135,29 @@ class ComparePanel:
                 self._columns.remove(column.key)
 
     def refresh(self) -> None:
-        """One box a column."""
-        at_hand = {column.key: column for column in self._columns.all}
-        for key in [key for key in self._boxes if key not in at_hand]:
-            self._boxes.pop(key).remove()
-        with self._folder:
-            for key, column in at_hand.items():
-                if key not in self._boxes:
-                    box = self._server.gui.add_checkbox(column.label, column.shown, hint="show this column")
-                    box.on_update(lambda event, key=key: self._tick(key, bool(event.target.value)))
-                    self._boxes[key] = box
-                self._boxes[key].value = column.shown
-        self._clear.visible = len(at_hand) > 1 and any(not c.shown for c in at_hand.values())
+        """One box a column; called from whatever thread changed the columns."""
+        with self._refreshing:
+            at_hand = {column.key: column for column in self._columns.all}
+            for key in [key for key in self._boxes if key not in at_hand]:
+                self._boxes.pop(key).remove()
+            with self._folder:
+                for key, column in at_hand.items():
+                    if key not in self._boxes:
+                        box = self._server.gui.add_checkbox(column.label, column.shown, hint="show this column")
+                        box.on_update(self._ticked(key))
+                        self._boxes[key] = box
+                    self._boxes[key].value = column.shown
+            self._clear.visible = self._removable()
 
-    def _tick(self, key: int, shown: bool) -> None:
-        self._columns.show(key, shown)
-        self._clear.visible = any(not c.shown for c in self._columns.all)
-        self._wake()
+    def _removable(self) -> bool:
+        return any(not c.shown for c in self._columns.all if c is not self._first())
+
+    def _ticked(self, key: int) -> Callable[[viser.GuiEvent], Coroutine[None, None, None]]:
+        async def show(event: viser.GuiEvent) -> None:
+            # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
+            if event.client_id is not None:
+                self._columns.show(key, bool(event.target.value))
+                self._clear.visible = self._removable()
+                self._changed()
+
+        return show

@@ -1,5 +1,6 @@
 """Sliders of the scene's parameters, where they were trained, presets; and how finely to integrate."""
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -11,6 +12,7 @@ from odeform.types import Floats
 
 __all__ = ["ParameterPanel", "presets", "slider_range"]
 
+OWN = "–"  # stands for values that are no preset
 BEYOND = 0.2  # of the trained span that a slider reaches beyond it
 TICKS = 160  # places along a slider that a training sample can be seen at
 
@@ -24,6 +26,11 @@ def slider_range(parameter: Parameter) -> tuple[float, float]:
     if parameter.low >= 0.0:
         low = max(low, 0.5 * parameter.low)
     return low, parameter.high + margin
+
+
+def slider_step(low: float, high: float) -> float:
+    """A decimal that divides the slider into 200 steps or more: what is read off it has no digits to spare."""
+    return 10.0 ** math.floor(math.log10((high - low) / 200.0))
 
 
 def presets(schema: Schema) -> dict[str, dict[str, float]]:
@@ -93,7 +100,7 @@ class ParameterPanel:
                     f"{parameter.name} ({parameter.unit})",
                     min=round(low, 4),
                     max=round(high, 4),
-                    step=round((high - low) / 1000, 5),
+                    step=slider_step(low, high),
                     initial_value=parameter.default,
                     marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}")),
                     hint=f"{parameter.description}; trained from {parameter.low:.3g} to {parameter.high:.3g}",
@@ -102,8 +109,8 @@ class ParameterPanel:
                 self._sliders[parameter.name] = slider
                 if parameter.role != "azimuth":
                     self._strips[parameter.name] = gui.add_html("")
-            preset = gui.add_dropdown("preset", tuple(self._presets), hint="corners of the trained range")
-            preset.on_update(lambda event: self._choose(str(event.target.value), event.client_id is not None))
+            self._preset = gui.add_dropdown("preset", (OWN, *self._presets), hint="corners of the trained range")
+            self._preset.on_update(self._choose)
             reset = gui.add_button_group("reset", ("all", *(p.name for p in schema.parameters)))
             reset.on_click(lambda event: self._reset(str(event.target.value)))
             self._quality = None
@@ -115,18 +122,20 @@ class ParameterPanel:
                 self._quality.on_update(lambda _: wake())
         self.show()
 
-    def _choose(self, name: str, by_hand: bool) -> None:
-        if by_hand and name in self._presets:
-            self.set(self._presets[name])
+    async def _choose(self, event: viser.GuiEvent) -> None:
+        # a coroutine runs at once where the message came in, before the worker shows what the sliders still say
+        if event.client_id is not None and self._preset.value in self._presets:
+            self.set(self._presets[self._preset.value])
 
     def _reset(self, name: str) -> None:
         defaults = self._presets["defaults"]
-        self.set(defaults if name == "all" else {name: defaults[name]})
+        self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
 
     def set(self, parameters: Mapping[str, float]) -> None:
-        """Move the sliders. `InputError` for what the scene has not or no motion can have."""
-        complete = self._schema.complete({**self.parameters(), **parameters})
-        for name, slider in self._sliders.items():
+        """Move the sliders of these. `InputError` for what the scene has not or no motion can have."""
+        complete = self._schema.complete(parameters)
+        for name in parameters:
+            slider = self._sliders[name]
             slider.value = min(max(complete[name], slider.min), slider.max)
 
     def set_quality(self, name: str) -> None:
@@ -134,7 +143,13 @@ class ParameterPanel:
             self._quality.value = name
 
     def parameters(self) -> dict[str, float]:
-        return {name: slider.value for name, slider in self._sliders.items()}
+        """What the sliders say. `InputError` for what no hand could move them to."""
+        values = {name: slider.value for name, slider in self._sliders.items()}
+        for name, slider in self._sliders.items():
+            if not slider.min <= values[name] <= slider.max:
+                reach = f"from {slider.min:g} to {slider.max:g}"
+                raise InputError(f"{name}: expected a finite number {reach}, got {values[name]:g}")
+        return values
 
     def quality(self) -> str:
         value = self._quality.value if self._quality else "balanced"
@@ -144,10 +159,13 @@ class ParameterPanel:
 
     def show(self) -> None:
         """Refresh what stands at the sliders; called by the worker."""
+        values = {name: slider.value for name, slider in self._sliders.items()}
+        preset = next((name for name, preset in self._presets.items() if preset == values), OWN)
+        if self._preset.value != preset:
+            self._preset.value = preset
         for parameter in self._schema.parameters:
             strip = self._strips.get(parameter.name)
             if strip is not None:
-                value = self._sliders[parameter.name].value
-                content = samples_svg(parameter, self._samples.get(parameter.name), value)
+                content = samples_svg(parameter, self._samples.get(parameter.name), values[parameter.name])
                 if strip.content != content:
                     strip.content = content

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import viser
 
+from odeform.errors import InputError
 from odeform.schema import Window
 from odeform_viz.clock import Clock
 from odeform_viz.session import REACH
@@ -23,7 +24,10 @@ class PlaybackPanel:
         clock: Clock,
         wake: Callable[[], None],
         largest: Callable[[], float],
+        say: Callable[[str], None],
     ) -> None:
+        """`largest` finds the moment of the largest deformation; `say` shows a message."""
+        self._say = say
         self._clock, self._wake, self._window, self._largest = clock, wake, window, largest
         span = window.stop - window.start
         with server.gui.add_folder("Time"):
@@ -40,7 +44,7 @@ class PlaybackPanel:
             self._play = server.gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._play.on_click(lambda _: self.toggle())
             go = server.gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
-            go.on_click(lambda event: self._step(event.target.value))
+            go.on_click(lambda event: self.step(event.target.value))
             go.hint = "start, frame before, frame after, largest deformation"
             self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
             self._speed.on_update(lambda _: self._changed())
@@ -52,13 +56,20 @@ class PlaybackPanel:
         # a coroutine runs at once where the message came in, before the clock moves the slider on
         if event.client_id is not None:  # a hand, not the clock
             moment = self._time.value
+            if not self._time.min <= moment <= self._time.max:
+                self._say(f"time: expected seconds from {self._time.min:g} to {self._time.max:g}, got {moment:g}")
+                self.show(self._clock.time())
+                return
             self._clock.pause()
             self._clock.seek(moment)
             self._refresh_button()
             self._wake()
 
     def _changed(self) -> None:
-        self._clock.set_speed(SPEEDS.get(self._speed.value, 0.2))
+        if self._speed.value in SPEEDS:
+            self._clock.set_speed(SPEEDS[self._speed.value])
+        else:
+            self._say(f"speed: expected one of {', '.join(SPEEDS)}, got {self._speed.value!r}")
         self._clock.loop = bool(self._loop.value)
         self._wake()
 
@@ -67,14 +78,17 @@ class PlaybackPanel:
         self._refresh_button()
         self._wake()
 
-    def _step(self, which: str) -> None:
-        if which == "peak":
-            self.jump(self._largest())
-            return
+    def step(self, which: str) -> None:
+        """To the `start`, the frame before (`◀`) or after (`▶`), or the `peak` of the deformation."""
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
-        target = {"start": 0, "◀": index - 1, "▶": index + 1}.get(which, index)
-        self.jump(self._window.start + max(target, 0) * frame)
+        if which == "peak":
+            try:
+                self.jump(self._largest())
+            except InputError as error:
+                self._say(str(error))
+        elif which in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
+            self.jump(self._window.start + max(steps[which], 0) * frame)
 
     def jump(self, moment: float) -> None:
         """Pause at a moment."""

@@ -83,7 +83,7 @@ def _at(curve: Floats | None, place: float) -> str:
     if curve is None:
         return ""
     value = curve[min(round(place), len(curve) - 1)]
-    return "–" if np.isnan(value) else f"{value:.3g}"
+    return "–" if np.isnan(value) else f"{value:.3g}" if abs(value) >= 0.01 or value == 0.0 else "<0.01"
 
 
 def cursor_svg(lines: Sequence[Line], window: Window, turns: bool, moment: float) -> str:

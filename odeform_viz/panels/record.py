@@ -59,6 +59,7 @@ class RecordPanel:
             self._said.content = f"⚠ **{problem}**"
 
     def finished(self, recording: str, frames: int) -> None:
+        self.show(None, 0)
         self._said.content = f"`{recording}`, {frames} frames: `odeform-viz --replay {recording}` checks it"
 
     def _guarded(self, action: Callable[[], None]) -> None:

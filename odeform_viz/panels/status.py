@@ -5,7 +5,7 @@ import viser
 from odeform_viz.heat import BANDS
 from odeform_viz.session import ColumnFrame, Frame
 
-__all__ = ["StatusPanel", "describe", "moment_in_words"]
+__all__ = ["MomentPanel", "StatusPanel", "describe", "moment_in_words"]
 
 
 def moment_in_words(frame: Frame) -> str:
@@ -25,7 +25,7 @@ def moment_in_words(frame: Frame) -> str:
         window = motion.schema.window
         phase = (time - window.start) * window.rate
         on = abs(phase - round(phase)) < 0.02
-        words = f"inside what was trained, {'on a' if on else 'between two'} trained frame{'s' * (not on)}"
+        words = "as trained, " + ("on a trained frame" if on else "between two frames")
     if sunk:
         deepest = max(shown.depth for shown in frame.columns)
         words += f"  \n⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor"
@@ -63,42 +63,46 @@ def describe(shown: ColumnFrame, settled: bool = True) -> str:
 
 def scale_html(top: float) -> str:
     """The colour bar of errors, in mm."""
-    cells = "".join(f'<div style="flex:1;height:10px;background:rgb{color}"></div>' for color in BANDS)
+    bands = "".join(f'<div style="flex:1;height:10px;background:rgb{color}"></div>' for color in BANDS)
+    cells = f'<div style="flex:1;display:flex">{bands}</div>'
     return (
-        f'<div style="padding:0 1em;font-size:0.8em"><div style="display:flex">{cells}</div>'
-        f'<div style="display:flex;justify-content:space-between"><span>0</span><span>distance to the truth</span>'
-        f"<span>≥ {top:g} mm</span></div></div>"
+        f'<div style="padding:0 1em 0.6em;font-size:0.8em;display:flex;align-items:center;gap:0.4em">'
+        f"<span>0</span>{cells}<span>≥ {top:g} mm from the truth</span></div>"
     )
 
 
-class StatusPanel:
-    """Texts, sent only when they change."""
+class MomentPanel:
+    """Always in sight: where the moment lies, why a wish cannot be met, the colours' scale. Sent only on change."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        with server.gui.add_folder("Status"):
-            self._moment = server.gui.add_markdown("")
-            self._message = server.gui.add_markdown("", visible=False)
-            self._scale = server.gui.add_html("", visible=False)
-            self._details = server.gui.add_markdown("")
+        self._moment = server.gui.add_markdown("")
+        self._scale = server.gui.add_html("", visible=False)
 
-    def show(self, frame: Frame, settled: bool, heat: float | None, away: bool) -> None:
+    def show(self, frame: Frame, heat: float | None, away: bool) -> None:
         """`heat` is the top of the colour scale, where errors are painted; `away`, that the sliders left the truth."""
-        _say(self._moment, moment_in_words(frame))
-        note = "The truth is of other parameters than the sliders: no errors shown." if away else ""
-        _say(self._message, note)
+        note = "  \nThe truth is of other parameters than the sliders: no errors shown." if away else ""
+        _say(self._moment, moment_in_words(frame) + note)
         painted = heat is not None and any(shown.error for shown in frame.columns)
-        self._scale.visible = painted
         if painted and heat is not None:
             _say(self._scale, scale_html(heat))
-        _say(self._details, "\n\n".join(describe(shown, settled) for shown in frame.columns))
+        self._scale.visible = painted
 
     def show_error(self, message: str) -> None:
         """The last good frame stays on screen."""
         _say(self._moment, f"⚠ **{message}**")
 
 
+class StatusPanel:
+    """A paragraph a column."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        with server.gui.add_folder("Status"):
+            self._details = server.gui.add_markdown("")
+
+    def show(self, frame: Frame, settled: bool) -> None:
+        _say(self._details, "\n\n".join(describe(shown, settled) for shown in frame.columns))
+
+
 def _say(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:
     if text.content != content:
         text.content = content
-    if isinstance(text, viser.GuiMarkdownHandle):
-        text.visible = bool(content)

@@ -1,5 +1,7 @@
 """The truth of a setting: a sequence of a data set, or one simulated on the spot."""
 
+import asyncio
+import threading
 from collections.abc import Callable, Mapping
 
 import viser
@@ -8,20 +10,38 @@ from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.model.recorded import RecordedMotion
 from odeform.schema import Schema
+from odeform.simulation.scene import get_scene
 from odeform.types import Sequence
 from odeform_viz.columns import Column, Columns
 from odeform_viz.jobs import Job, simulate_here, simulator_installed
 
-__all__ = ["TruthPanel", "entry_label"]
+__all__ = ["TruthPanel", "entry_label", "other_physics"]
 
 NONE = "none"
+OTHER = "another"  # simulated here, or of another data set
+NEEDS = "*Simulate this* needs the simulator: `pip install 'odeform[simulate]'`."
 FINER = 4  # times the frames of training: one looks between them
+
+PHYSICS = (
+    "⚠ **The simulator's physics are not those the model was taught**: errors against what is simulated here are not "
+    "the model's alone. {}."
+)
 
 
 def entry_label(entry: Entry, schema: Schema) -> str:
     """A sequence by its number and what was varied."""
     values = ", ".join(f"{p.name} {entry.parameters[p.name]:.3g}" for p in schema.learned)
     return f"{entry.name.rsplit('_', 1)[-1].lstrip('0') or '0'}: {values}"
+
+
+def other_physics(taught: Mapping[str, float], simulated: Mapping[str, float]) -> str:
+    """What of the physics that a scene leaves fixed differs from what a model was taught, in words; empty if none."""
+    names = [name for name in {**taught, **simulated} if taught.get(name) != simulated.get(name)]
+
+    def value(physics: Mapping[str, float], name: str) -> str:
+        return f"{physics[name]:.4g}" if name in physics else "none"
+
+    return ", ".join(f"{name} {value(simulated, name)} (taught {value(taught, name)})" for name in names)
 
 
 class TruthPanel:
@@ -33,27 +53,30 @@ class TruthPanel:
         schema: Schema,
         columns: Columns,
         dataset: Dataset | None,
+        taught: Mapping[str, float],
         parameters: Callable[[], dict[str, float]],
         set_parameters: Callable[[Mapping[str, float]], None],
         changed: Callable[[], None],
         say: Callable[[str], None],
     ) -> None:
-        """`set_parameters` moves the sliders; `changed` is called after the columns have; `say` shows a message."""
+        """`taught` is the fixed physics that the model learned; `set_parameters` moves the sliders; `changed` is
+        called after the columns have; `say` shows a message.
+        """
         self._schema, self._columns, self._dataset = schema, columns, dataset
         self._parameters, self._set, self._changed, self._say = parameters, set_parameters, changed, say
         self._job: Job | None = None
+        self._starting = threading.Lock()
+        installed = simulator_installed()
         gui = server.gui
         with gui.add_folder("Truth"):
             if dataset is not None:
                 self._entries = {entry_label(e, schema): e for e in dataset.select("test")}
-                self._browser = gui.add_dropdown("test sequence", (NONE, *self._entries))
-                self._browser.on_update(lambda event: self._opened(event.client_id is not None))
+                self._browser = gui.add_dropdown("test sequence", (NONE, OTHER, *self._entries))
+                self._browser.on_update(self._opened)
             self._start = gui.add_button(
                 "Simulate this",
-                disabled=not simulator_installed(),
-                hint="runs the simulator at the sliders' values"
-                if simulator_installed()
-                else "needs the simulator: pip install 'odeform[simulate]'",
+                disabled=not installed,
+                hint="runs the simulator at the sliders' values",
             )
             self._start.on_click(lambda _: self._simulate())
             self._bar = gui.add_progress_bar(0.0, visible=False)
@@ -61,6 +84,11 @@ class TruthPanel:
             self._cancel.on_click(lambda _: self.cancel())
             self._back = gui.add_button("Sliders to the truth's parameters", color="gray", visible=False)
             self._back.on_click(lambda _: self._return())
+            differs = other_physics(taught, get_scene(schema.scene).fixed)
+            self._physics = PHYSICS.format(differs) if differs else ""
+            note = self._physics if installed else NEEDS
+            self._note = gui.add_markdown(note, visible=bool(note))
+        self.refresh()
 
     def open(self, sequence: Sequence, origin: str = "") -> None:
         """Show a sequence as truth, and move the sliders to its parameters."""
@@ -69,20 +97,26 @@ class TruthPanel:
         self._set(sequence.parameters)
         self._changed()
 
-    def _opened(self, by_hand: bool) -> None:
-        if not by_hand:
-            return
-        chosen = self._browser.value
+    def _origin(self, entry: Entry) -> str:
+        return f"{self._schema.scene}/{entry.name}"
+
+    async def _opened(self, event: viser.GuiEvent) -> None:
+        # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
+        if event.client_id is not None:
+            await asyncio.to_thread(self._choose, self._browser.value)
+
+    def _choose(self, chosen: str) -> None:
         try:
             if chosen == NONE:
                 self._drop()
             elif chosen in self._entries and self._dataset is not None:
                 entry = self._entries[chosen]
-                self.open(self._dataset.read(entry), f"{self._schema.scene}/{entry.name}")
-            else:
+                self.open(self._dataset.read(entry), self._origin(entry))
+            elif chosen != OTHER:
                 raise InputError(f"test sequence: expected one of the list, got {chosen!r}")
         except InputError as error:
             self._say(str(error))
+        self.refresh()
 
     def _drop(self) -> None:
         for column in self._columns.all:
@@ -96,43 +130,60 @@ class TruthPanel:
             self._set(truth.parameters)
             self._changed()
 
+    def refresh(self) -> None:
+        """Let the browser name the truth that is shown, wherever it came from."""
+        if self._dataset is None:
+            return
+        truth = next((c for c in self._columns.all if c.truth), None)
+        labels = {self._origin(entry): label for label, entry in self._entries.items()}
+        shown = NONE if truth is None else labels.get(truth.origin, OTHER)
+        if self._browser.value != shown:
+            self._browser.value = shown
+
     def show(self, away: bool) -> None:
         """`away`: there is a truth, but the sliders have left its parameters."""
         self._back.visible = away
 
     def _simulate(self) -> None:
-        if self._job is not None and self._job.running:
-            return
         try:
             parameters = self._schema.complete(self._parameters())
         except InputError as error:
             self._say(str(error))
             return
-        rate = FINER * self._schema.window.rate
+        arguments = (self._schema.scene, parameters, FINER * self._schema.window.rate)
+        with self._starting:
+            if self._job is not None and self._job.running:
+                return
+            self._working(True)
+            self._job = Job(simulate_here, arguments, self._simulated, self._failed, self._progress)
+            self._job.start()
 
-        def done(sequence: Sequence) -> None:
-            self._working(False)
+    def _simulated(self, sequence: Sequence) -> None:
+        self._working(False)
+        try:
             self.open(sequence)
+        except InputError as error:
+            self._failed(str(error))
 
-        def failed(message: str) -> None:
-            self._working(False)
-            self._say(f"the simulation failed: {message}")
+    def _failed(self, message: str) -> None:
+        self._working(False)
+        self._tell(f"⚠ **The simulation failed**: {message}")
 
-        def progress(share: float) -> None:
-            self._bar.value = 100.0 * min(share, 1.0)
+    def _progress(self, share: float) -> None:
+        self._bar.value = 100.0 * min(share, 1.0)
 
-        self._working(True)
-        arguments = (self._schema.scene, parameters, rate)
-        self._job = Job(simulate_here, arguments, done=done, failed=failed, progress=progress)
-        self._job.start()
+    def _tell(self, note: str) -> None:
+        self._note.content, self._note.visible = note, bool(note)
 
     def _working(self, working: bool) -> None:
+        self._tell(self._physics)
         self._bar.value = 0.0
         self._bar.visible = self._cancel.visible = working
         self._start.visible = not working
 
     def cancel(self) -> None:
         """End the simulation under way, if any."""
-        if self._job is not None and self._job.running:
-            self._job.cancel()
-            self._working(False)
+        with self._starting:
+            if self._job is not None and self._job.running:
+                self._job.cancel()
+                self._working(False)

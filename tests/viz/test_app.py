@@ -1,6 +1,5 @@
 """The running viewer, seen through its protocol."""
 
-import socket
 import time
 from collections.abc import Iterator
 
@@ -10,18 +9,11 @@ import pytest
 from odeform import InputError
 from odeform.predictor import Predictor
 from odeform_viz.app import App
+from odeform_viz.checker import checker_parts
 from odeform_viz.columns import Column
 from odeform_viz.loopback import LoopbackClient
-from odeform_viz.shapes import checker_parts
 
 BODY = "/world/column_0/body/part_0"
-
-
-@pytest.fixture
-def port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture
@@ -56,7 +48,7 @@ def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: st
         client.set(label, value)
         shown = client.wait_vertices(BODY)
     expected = kick.solve(kick.rest, {label.split()[0]: value}).deformed(0.05)
-    np.testing.assert_array_equal(shown, expected[checker_parts(kick.rest)[0][0]])
+    np.testing.assert_array_equal(shown, checker_parts(kick.rest)[0].of(expected))
 
 
 def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predictor, port: int) -> None:
@@ -70,7 +62,7 @@ def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predic
         while (vertices := client.wait_vertices(BODY, 1.0)) is not None:
             last = vertices
     expected = kick.solve(kick.rest, {"mass": float(values[-1])}).deformed(0.03)
-    np.testing.assert_array_equal(last, expected[checker_parts(kick.rest)[0][0]])
+    np.testing.assert_array_equal(last, checker_parts(kick.rest)[0].of(expected))
 
 
 def test_values_that_no_slider_sends_leave_the_last_frame_and_a_message(app: App, port: int) -> None:
@@ -104,3 +96,32 @@ def test_beyond_the_trained_range_the_page_says_so(app: App, port: int) -> None:
 def test_a_port_in_use_is_refused(app: App, kick: Predictor, port: int) -> None:
     with pytest.raises(InputError, match=str(port)):
         App([Column("odeform", kick, kick.rest)], port=port)
+
+
+def test_two_people_at_one_slider_see_the_newest(app: App, kick: Predictor, port: int) -> None:
+    with LoopbackClient(port) as one, LoopbackClient(port) as two:
+        one.set("time (s)", 0.03)
+        one.collect(0.3)
+        for value in np.linspace(0.4, 0.8, 20):
+            one.set("mass (kg)", float(value))
+            two.set("mass (kg)", float(value) + 0.1)
+        two.until(lambda: False, 1.0)
+        two.set("mass (kg)", 0.55)
+        last = [None, None]
+        for index, client in enumerate((one, two)):
+            while (vertices := client.wait_vertices(BODY, 0.7)) is not None:
+                last[index] = vertices
+        assert one.controls["mass (kg)"].value == two.controls["mass (kg)"].value == 0.55
+    expected = checker_parts(kick.rest)[0].of(kick.solve(kick.rest, {"mass": 0.55}).deformed(0.03))
+    for vertices in last:
+        np.testing.assert_array_equal(vertices, expected)
+
+
+def test_something_moves_from_the_start(app: App, port: int) -> None:
+    begin = time.monotonic()
+    with LoopbackClient(port) as client:
+        shown = [client.wait_vertices(BODY) for _ in range(2)]
+        assert time.monotonic() - begin < 2.0
+    assert shown[0] is not None
+    assert shown[1] is not None
+    assert np.abs(shown[0] - shown[1]).max() > 0.0

@@ -44,12 +44,24 @@ def test_what_is_restored_is_what_was_saved(wish: Wish) -> None:
         (lambda s: json.dumps({**s, "surplus": 1}).encode(), "surplus"),
         (lambda s: json.dumps({**s, "columns": [{"origin": "x"}]}).encode(), "expected origin"),
         (lambda s: json.dumps({k: v for k, v in s.items() if k != "time"}).encode(), "time"),
+        (lambda s: json.dumps({**s, "time": "soon"}).encode(), "not a file"),
+        (lambda s: json.dumps({**s, "time": float("nan")}).encode(), "time in seconds"),
+        (lambda s: json.dumps({**s, "columns": [7]}).encode(), "not a file"),
+        (lambda s: json.dumps({**s, "columns": []}).encode(), "no model under the sliders"),
+        (lambda s: json.dumps([s]).encode(), "format 1"),
     ],
 )
 def test_other_files_are_refused(wish: Wish, broken: Callable[[dict], bytes], said: str) -> None:
     whole = json.loads(state_to_json(capture(SCENE, wish, Looks())))
     with pytest.raises(InputError, match=said):
         state_from_json(broken(whole), SCENE)
+
+
+@pytest.mark.parametrize("wrong", [{"parameters": {"mass": "x"}}, {"parameters": [1]}, {"truth": "nowhere/x"}])
+def test_wrong_values_are_refused_when_columns_are_made(wish: Wish, wrong: dict) -> None:
+    raw = {**json.loads(state_to_json(capture(SCENE, wish, Looks()))), **wrong}
+    with pytest.raises(InputError):
+        columns_of(state_from_json(json.dumps(raw).encode(), SCENE), wish.columns[0].source.schema, wish.columns[0])
 
 
 def test_a_missing_checkpoint_is_named(wish: Wish) -> None:

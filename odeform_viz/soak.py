@@ -1,0 +1,154 @@
+"""Thousands of wishes at random over all panels, through the protocol, fit and unfit: what breaks, what grows?"""
+
+import contextlib
+import gc
+import io
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from odeform_viz.app import App
+from odeform_viz.checker import checker_parts
+from odeform_viz.loopback import Control, LoopbackClient
+
+__all__ = ["Soak", "soak"]
+
+UNFIT = (float("nan"), float("inf"), -1e9, 1e9)
+NONSENSE = "nonsense"
+TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+WEIGHTS = {
+    "Slider": 4.0,
+    "Button": 1.0,
+    "ButtonGroup": 1.0,
+    "Dropdown": 1.0,
+    "Checkbox": 1.0,
+    "Text": 0.3,
+    "Upload": 0.3,
+}
+# what takes a while or fills a disk comes seldom, and its end often
+RARE = {"Simulate this": 0.02, "Start recording": 0.1, "Cancel": 3.0, "Stop recording": 3.0, "Download": 0.2}
+
+
+@dataclass(frozen=True)
+class Soak:
+    """`resident_mb` is the memory of the process after each part of the wishes, the page being in the same state."""
+
+    wishes: int
+    refused: int
+    errors: tuple[str, ...]
+    newest_last: tuple[bool, ...]
+    resident_mb: tuple[float, ...]
+    wall_s: float
+
+    @property
+    def growth(self) -> float:
+        """Of the memory from the first part, the warm-up, to the end."""
+        return self.resident_mb[-1] / self.resident_mb[0] - 1.0
+
+
+def soak(app: App, port: int, wishes: int, folder: Path, rate: float = 40.0, parts: int = 10, seed: int = 0) -> Soak:
+    """Send `wishes` messages at `rate` in Hz to an app at that port; recordings go to the folder.
+
+    After each of the `parts` the page is calmed and looked at.
+    """
+    rng, begin = np.random.default_rng(seed), time.monotonic()
+    fresh, resident = [], []
+    with _errors() as errors, LoopbackClient(port) as client:
+        for _ in range(parts):
+            for _ in range(wishes // parts):
+                _wish(client, rng, folder)
+                client.collect(1.0 / rate)
+            _calm(client, app)
+            fresh.append(_newest_is_last(client, app))
+            gc.collect()
+            resident.append(_resident_mb())
+        refused = len(client.said)
+    return Soak(wishes, refused, tuple(errors), tuple(fresh), tuple(resident), time.monotonic() - begin)
+
+
+def _wish(client: LoopbackClient, rng: np.random.Generator, folder: Path) -> None:
+    if rng.random() < 0.05:
+        client.press(str(rng.choice(client.commands)))
+        return
+    controls = {label: c for label, c in client.controls.items() if c.visible and not c.props.get("disabled")}
+    weights = np.array([WEIGHTS.get(c.kind, 0.3) * RARE.get(label, 1.0) for label, c in controls.items()])
+    label = str(rng.choice(list(controls), p=weights / weights.sum()))
+    control = controls[label]
+    if control.kind == "UploadButton":
+        state = next((f for n, f in client.downloads.items() if n.endswith(".json")), b"{}")
+        contents = {"x.obj": TETRAHEDRON, "x.ply": b"ply\n", "x.json": state, "y.json": b'{"odeform_state": 1}'}
+        name = str(rng.choice(list(contents)))
+        client.upload(label, name, contents[name])
+    else:
+        client.set(label, _value(control, rng, folder))
+
+
+def _value(control: Control, rng: np.random.Generator, folder: Path) -> Any:
+    unfit = rng.random() < 0.1
+    if control.kind == "Slider":
+        return float(rng.choice(UNFIT) if unfit else rng.uniform(control.props["min"], control.props["max"]))
+    if control.kind in ("Dropdown", "ButtonGroup"):
+        return NONSENSE if unfit else str(rng.choice(control.props["options"]))
+    if control.kind == "Text":
+        return "" if unfit else str(folder / "soak.rrd")
+    return bool(rng.random() < 0.5) if control.kind == "Checkbox" else True
+
+
+def _calm(client: LoopbackClient, app: App) -> None:
+    """Back to how the page opened: one model at its defaults, of its own shape, paused."""
+    client.collect(1.0)
+    for label in ("Cancel", "Stop recording", "Back to the trained body"):
+        if client.controls[label].visible:
+            client.click(label)
+    client.set("reset", "all")
+    client.set("test sequence", "none")
+    client.collect(1.0)
+    first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
+    boxes = {c.label: c is first for c in app.columns.all}
+    for label, shown in boxes.items():
+        client.set(label, shown)
+    client.collect(0.5)
+    client.click("Remove hidden columns")
+    client.set("quality", "balanced")
+    client.set("time (s)", 0.3)
+    client.collect(2.0)
+
+
+def _newest_is_last(client: LoopbackClient, app: App) -> bool:
+    """Whether a drag ends with the vertices of its last wish."""
+    column, schema = app.columns.all[0], app.session.schema
+    assert column.predictor is not None
+    slider = schema.parameters[0]
+    values = np.linspace(slider.low, slider.high, 40)[np.random.default_rng(1).permutation(40)]
+    node = f"/world/column_{column.key}/body/part_0"
+    last = None
+    for value in values:
+        client.set(f"{slider.name} ({slider.unit})", float(value))
+    while (vertices := client.wait_vertices(node, 1.0)) is not None:
+        last = vertices
+    expected = column.predictor.solve(column.geometry, {slider.name: float(values[-1])}).deformed(0.3)
+    return last is not None and np.array_equal(last, checker_parts(column.predictor.rest)[0].of(expected))
+
+
+@contextlib.contextmanager
+def _errors() -> Iterator[list[str]]:
+    """Collects the tracebacks that are printed meanwhile."""
+    printed, found = io.StringIO(), []
+    before, sys.stderr = sys.stderr, printed
+    try:
+        yield found
+    finally:
+        sys.stderr = before
+        blocks = printed.getvalue().split("Traceback")[1:]
+        found.extend(block.strip() for block in blocks)
+
+
+def _resident_mb() -> float:
+    """Of this process; Linux tells."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 1e6

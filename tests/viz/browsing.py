@@ -1,0 +1,117 @@
+"""A page in headless Chromium with software WebGL, driven as its users drive it."""
+
+import io
+import os
+import re
+import shutil
+import socket
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Locator, Page, sync_playwright
+
+from odeform_viz.app import App
+from odeform_viz.columns import Column
+
+__all__ = ["Tab", "needs_chromium", "open_tab", "until"]
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+VIEW = {"width": 800, "height": 480}
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium on the PATH (Debian: chromium)")
+
+
+@dataclass
+class Tab:
+    """A page in the browser and what its console complained about."""
+
+    page: Page
+    app: App
+    errors: list[str] = field(default_factory=list)
+
+    def button(self, name: str) -> Locator:
+        return self.page.get_by_role("button", name=name, exact=True)
+
+    def turn_to(self, tab: str) -> None:
+        self.page.get_by_role("tab", name=tab, exact=True).click()
+
+    def row(self, label: str, role: str) -> Locator:
+        """The control in the row of that label: rows have one each."""
+        row = self.page.get_by_text(label, exact=True).locator(f"xpath=ancestor::*[.//{role}][1]")
+        return row.locator(f"xpath=.//{role}").first
+
+    def slider(self, label: str) -> Locator:
+        return self.row(label, "*[@role='slider']")
+
+    def box(self, label: str) -> Locator:
+        return self.row(label, "input[@type='checkbox']")
+
+    def choose(self, label: str, option: str) -> None:
+        self.row(label, "input").click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def says(self, text: str, seconds: float = 15.0) -> bool:
+        return until(lambda: self.page.get_by_text(re.compile(text)).count() > 0, seconds)
+
+    def picture(self) -> np.ndarray:
+        """(H, W, 3) pixels of the viewport left of the panel and above the plots."""
+        shot = self.page.screenshot(clip={"x": 0, "y": 0, "width": 460, "height": 300}, timeout=60_000)
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
+
+    def settled(self) -> np.ndarray:
+        """A picture that two screenshots in a row agree on."""
+        last = self.picture()
+        for _ in range(20):
+            time.sleep(0.2)
+            now = self.picture()
+            if np.abs(now - last).max() < 8:
+                return now
+            last = now
+        return last
+
+    def changes(self, before: np.ndarray, seconds: float = 10.0) -> bool:
+        """Whether the picture becomes another than before."""
+        return until(lambda: (np.abs(self.picture() - before).max(axis=2) > 24).mean() > 1e-3, seconds)
+
+
+def until(holds: Callable[[], bool], seconds: float = 10.0) -> bool:
+    """Wait for what a click brings about, however busy the machine is."""
+    end = time.monotonic() + seconds
+    while not holds() and time.monotonic() < end:
+        time.sleep(0.1)
+    return holds()
+
+
+def open_tab(*columns: Column) -> Iterator[Tab]:
+    """A tab with these columns, for a fixture to yield from."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    app = App(columns, port=port)
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            tab = Tab(browser.new_page(viewport=VIEW), app)
+            tab.page.on("console", lambda message: tab.errors.append(message.text) if message.type == "error" else None)
+            tab.page.on("pageerror", lambda error: tab.errors.append(str(error)))
+            tab.page.goto(app.url)
+            tab.page.wait_for_selector("canvas", timeout=60_000)
+            tab.page.get_by_text("mass (kg)").wait_for(timeout=30_000)
+            yield tab
+            browser.close()
+    finally:
+        app.close()

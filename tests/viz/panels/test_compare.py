@@ -1,0 +1,123 @@
+"""Columns added, pinned, swept, hidden, removed; how they are arranged."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from odeform.predictor import Predictor, load
+from odeform_viz.app import App
+from odeform_viz.columns import MOST, Column
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.scene import COLORS, color_of
+
+Kicked = tuple[App, LoopbackClient]
+Serve = Callable[..., Kicked]
+
+
+def _labels(app: App) -> list[str]:
+    return [c.label for c in app.columns.all]
+
+
+def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
+    app, client = kicked
+    client.set("model", "kick/pod-rbf")
+    client.click("Add model")
+    assert client.until(lambda: "/world/column_1/body/part_0" in client.nodes)
+    assert _labels(app) == ["odeform", "pod-rbf"]
+    assert client.controls["pod-rbf"].value is True
+    client.set("model", "nonsense")
+    client.click("Add model")
+    assert client.until(lambda: any("model: expected one of" in said for said in client.said))
+    assert _labels(app) == ["odeform", "pod-rbf"]
+
+
+def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Predictor) -> None:
+    app, client = kicked
+    client.set("mass (kg)", 0.4)
+    client.click("Pin these parameters")
+    assert client.until(lambda: len(app.columns.all) == 2)
+    assert _labels(app)[1].startswith("odeform at mass 0.4, bending")
+    client.collect(0.5)
+    client.set("mass (kg)", 0.9)
+    moved = client.wait_vertices("/world/column_0/body/part_0")
+    assert moved is not None
+    # what did not move is not sent again, or sent as it was
+    still = kick.solve(kick.rest, {"mass": 0.4}).deformed(0.03)
+    assert client.until(lambda: app._shown is not None and app._shown.wish.parameters["mass"] == 0.9)
+    assert app._shown is not None
+    np.testing.assert_array_equal(app._shown.columns[1].points, still)
+
+
+def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
+    app, client = kicked
+    client.set("parameter", "bending")
+    client.click("Sweep it in 5 columns")
+    assert client.until(lambda: f"/world/column_{5}/body/part_0" in client.nodes)
+    assert [c.shown for c in app.columns.all] == [False] + 5 * [True]
+    assert _labels(app)[1] == "bending 0.3 N m"
+    for label in _labels(app)[1:]:
+        client.set(label, False)
+    client.set("odeform", True)
+    assert client.until(lambda: [c.shown for c in app.columns.all] == [True] + 5 * [False])
+    client.click("Remove hidden columns")
+    assert client.until(lambda: _labels(app) == ["odeform"])
+    assert client.until(lambda: not any(n.startswith("/world/column_5") for n in client.nodes))
+    assert client.until(lambda: "bending 0.3 N m" not in client.controls)
+    client.set("parameter", "nonsense")
+    client.click("Sweep it in 5 columns")
+    assert client.until(lambda: any("parameter: expected" in said for said in client.said))
+    assert [c.shown for c in app.columns.all] == [True]
+
+
+def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
+    rival, asked = load("kick/pod-rbf"), []
+    solve = rival.solve
+    rival.solve = lambda *given, **named: (asked.append(1), solve(*given, **named))[1]  # pyright: ignore
+    app, client = serve(Column("odeform", kick, kick.rest), Column("rival", rival, rival.rest))
+    client.set("rival", False)
+    assert client.until(lambda: not app.columns.all[1].shown)
+    client.collect(0.5)
+    asked.clear()
+    client.set("mass (kg)", 0.9)
+    assert client.wait_vertices("/world/column_0/body/part_0") is not None
+    client.collect(0.5)
+    assert asked == []
+    client.set("rival", True)
+    assert client.until(lambda: bool(asked))
+
+
+def test_overlaid_columns_stand_in_one_place_by_box_and_by_key(serve: Serve, kick: Predictor) -> None:
+    app, client = serve(Column("one", kick, kick.rest), Column("two", kick, kick.rest))
+    places = [view._place for _, view in app._scene._views.values()]
+    assert places[0].position[1] != places[1].position[1]
+    client.set("overlay", True)
+    assert client.until(lambda: places[0].position[1] == places[1].position[1])
+    client.press("Columns overlaid or in a row")
+    assert client.until(lambda: places[0].position[1] != places[1].position[1])
+    assert client.until(lambda: client.controls["overlay"].value is False)
+
+
+def test_too_many_columns_are_refused(kicked: Kicked) -> None:
+    app, client = kicked
+    for _ in range(3):
+        client.click("Sweep it in 5 columns")
+        client.collect(0.7)
+    assert client.until(lambda: any(f"at most {MOST}" in said for said in client.said))
+    assert len(app.columns.all) == 11
+    assert any(c.shown for c in app.columns.all)
+
+
+def test_a_column_keeps_its_colour_and_shares_it_with_no_other(kicked: Kicked) -> None:
+    app, client = kicked
+    for _ in range(2):
+        client.click("Pin these parameters")
+        client.collect(0.3)
+    _, second, third = app.columns.all
+    client.set(second.label, False)
+    client.collect(0.3)
+    client.click("Remove hidden columns")
+    assert client.until(lambda: len(app.columns.all) == 2)
+    assert color_of(app.columns.all[1]) == color_of(third) == COLORS[2]
+    client.click("Pin these parameters")
+    assert client.until(lambda: len(app.columns.all) == 3)
+    assert {color_of(c) for c in app.columns.all} == set(COLORS[:3])

@@ -1,0 +1,29 @@
+"""Help: for each client alone, and it names every key."""
+
+from odeform_viz.app import App
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.panels.help import TABS
+
+
+def test_help_names_tabs_and_keys(kicked: tuple[App, LoopbackClient]) -> None:
+    _, client = kicked
+    text = client.text()
+    assert all(f"**{tab}**" in text for tab in TABS)
+    assert all(f"**{key}**" in text for key in "KJL0POCH")
+
+
+def test_help_opens_for_who_asks_and_closes_again(kicked: tuple[App, LoopbackClient], port: int) -> None:
+    _, client = kicked
+    with LoopbackClient(port) as other:
+        client.press("Help")
+        assert client.until(lambda: "Close" in client.controls)
+        other.collect(0.3)
+        assert "Close" not in other.controls
+        client.click("Close")
+        assert client.until(lambda: "Close" not in client.controls)
+        other.press("Help")
+        assert other.until(lambda: "Close" in other.controls)
+    client.press("Help")
+    assert client.until(lambda: "Close" in client.controls)
+    client.press("Help")
+    assert client.until(lambda: "Close" not in client.controls)

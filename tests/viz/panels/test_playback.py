@@ -1,0 +1,61 @@
+"""Time: steps on frames, the peak, the start, speed, hot keys."""
+
+import pytest
+
+from odeform_viz.app import App
+from odeform_viz.loopback import LoopbackClient
+
+Kicked = tuple[App, LoopbackClient]
+FRAME = 1.0 / 120.0
+
+
+def test_steps_lie_on_frames_by_button_and_by_key(kicked: Kicked) -> None:
+    app, client = kicked  # at 0.03 s, between frames 3 and 4
+    for way, frame in (("▶", 5), ("▶", 6), ("◀", 5)):
+        client.set("go to", way)
+        assert client.until(lambda frame=frame: app.clock.time() == pytest.approx(frame * FRAME))
+    for key, frame in (("A frame on", 6), ("A frame back", 5), ("To the start", 0), ("A frame back", 0)):
+        client.press(key)
+        assert client.until(lambda frame=frame: app.clock.time() == pytest.approx(frame * FRAME))
+
+
+def test_peak_is_at_the_kick_and_start_at_rest(kicked: Kicked) -> None:
+    app, client = kicked
+    client.set("go to", "peak")
+    assert client.until(lambda: 0.005 < app.clock.time() < 0.029)
+    client.set("go to", "start")
+    assert client.until(lambda: app.clock.time() == 0.0)
+    client.press("To the peak of the deformation")
+    assert client.until(lambda: 0.005 < app.clock.time() < 0.029)
+
+
+def test_play_is_a_button_and_a_key_and_says_what_it_would_do(kicked: Kicked) -> None:
+    app, client = kicked
+    client.click("Play")
+    assert client.until(lambda: app.clock.playing and "Pause" in client.controls)
+    client.press("Play or pause")
+    assert client.until(lambda: not app.clock.playing and "Play" in client.controls)
+
+
+def test_speed_is_that_of_the_list_or_refused(kicked: Kicked) -> None:
+    app, client = kicked
+    client.set("speed", "nonsense")
+    assert client.until(lambda: any("speed" in said for said in client.said))
+    client.set("speed", "1/50")
+    client.set("loop", False)
+    client.click("Play")
+    before = app.clock.time()
+    client.collect(1.0)
+    assert 0.01 < app.clock.time() - before < 0.03
+
+
+@pytest.mark.parametrize("moment", [float("nan"), float("inf"), -1.0, 1e9])
+def test_moments_off_the_slider_are_refused(kicked: Kicked, moment: float) -> None:
+    app, client = kicked
+    client.set("time (s)", moment)
+    assert client.until(lambda: any("time: expected" in said for said in client.said))
+    assert app.clock.time() == 0.03
+    assert client.until(lambda: client.controls["time (s)"].value == 0.03)
+    client.set("go to", "nonsense")
+    client.collect(0.3)
+    assert app.clock.time() == 0.03

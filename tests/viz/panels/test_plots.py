@@ -1,0 +1,58 @@
+"""Curves over time."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.predictor import Predictor
+from odeform_viz.app import App
+from odeform_viz.columns import Column, Columns
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.panels.plots import Line, cursor_svg, plots_svg
+from odeform_viz.session import Session, Wish
+
+
+@pytest.fixture(scope="module")
+def line(drop: Predictor) -> Line:
+    session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest)]).all
+    wish = Wish(session.schema.complete({}), 0.3, "balanced", columns)
+    return ("odeform", (206, 78, 26), session.curves(session.frame(wish).columns[0], wish))
+
+
+def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
+    svg = plots_svg([line, line], drop.schema.window, turns=False)
+    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error to truth", svg) == [
+        "height of the centre",
+        "deformation RMS",
+    ]
+    assert svg.count('stroke="rgb(206, 78, 26)"') == 4
+    assert "turn, degrees" in plots_svg([line], drop.schema.window, turns=True)
+
+
+def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, drop: Predictor) -> None:
+    error = np.linspace(0.0, 2.0, len(line[2].times))
+    error[50:] = np.nan
+    svg = plots_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, turns=False)
+    assert "error to truth RMS, mm" in svg
+    assert "nan" not in svg
+    cursor = cursor_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, False, 1.0)
+    assert "–" in cursor
+
+
+def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:
+    assert "<path d=" in plots_svg([], drop.schema.window, turns=False)
+    assert "<text" not in cursor_svg([], drop.schema.window, False, 0.3)
+
+
+def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App, LoopbackClient]) -> None:
+    app, client = dropped
+    curves, cursor = app._plots._curves.content, app._plots._cursor.content
+    client.set("time (s)", 0.5)
+    assert client.until(lambda: app._plots._cursor.content != cursor)
+    assert app._plots._curves.content == curves
+    client.set("mass (kg)", 0.9)
+    assert client.until(lambda: app._plots._curves.content != curves)
+    client.set("odeform", False)
+    assert client.until(lambda: "nothing shown" in client.text())

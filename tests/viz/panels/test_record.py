@@ -1,0 +1,111 @@
+"""What is taken away: the state of the page, the motion as a file, a recording."""
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from odeform.dataset.store import open_dataset
+from odeform.predictor import Predictor, load
+from odeform_viz.app import App
+from odeform_viz.columns import Column, truth_column
+from odeform_viz.loopback import LoopbackClient
+
+View = tuple[App, LoopbackClient]
+STATE = "odeform-mass-elastic.json"
+
+
+def test_the_state_of_the_page_goes_round(serve: Callable[..., View], drop: Predictor) -> None:
+    rival = load("mass-elastic/pod-rbf")
+    record = truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}")
+    app, client = serve(
+        Column("odeform", drop, drop.rest, origin="mass-elastic"),
+        Column("pod-rbf", rival, rival.rest, origin="mass-elastic/pod-rbf"),
+        record,
+        moment=0.3,
+    )
+    client.click("Pin these parameters")
+    client.set("pod-rbf", False)
+    client.set("overlay", True)
+    client.set("quality", "draft")
+    assert client.until(lambda: len(app.columns.all) == 4 and not app.columns.all[1].shown)
+    client.collect(0.5)
+    client.click("Save state")
+    assert client.until(lambda: STATE in client.downloads)
+    client.collect(0.3)
+    saved = client.downloads[STATE]
+    labels = [(c.label, c.shown, c.pinned) for c in app.columns.all]
+
+    client.set("reset", "all")
+    client.set("overlay", False)
+    client.set("quality", "balanced")
+    client.set("test sequence", "none")
+    client.set("time (s)", 0.9)
+    assert client.until(lambda: app.clock.time() == 0.9 and len(app.columns.all) == 3)
+    client.upload("Restore state", "state.json", saved)
+    assert client.until(lambda: app.clock.time() == 0.3)
+    assert client.until(lambda: client.controls["overlay"].value and client.controls["quality"].value == "draft")
+    # the state keeps the truth behind the models
+    assert sorted((c.label, c.shown, c.pinned) for c in app.columns.all) == sorted(labels)
+    assert app._parameters.parameters() == pytest.approx(json.loads(saved)["parameters"])
+    assert client.until(lambda: "now off the truth by" in client.text())
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00\xff", b"[]", b'{"odeform_state": 1}', b'{"odeform_state": 9}'])
+def test_a_broken_state_changes_nothing(dropped: View, content: bytes) -> None:
+    app, client = dropped
+    before = app.columns.all
+    client.upload("Restore state", "state.json", content)
+    assert client.until(lambda: any(said.startswith("state:") for said in client.said))
+    assert app.columns.all == before
+    assert app.clock.time() == 0.3
+
+
+def test_this_moment_and_the_whole_motion_as_files(dropped: View, drop: Predictor) -> None:
+    _, client = dropped
+    motion = drop.solve(drop.rest)
+    client.click("Download")
+    assert client.until(lambda: "motion_00000.ply" in client.downloads)
+    client.collect(0.5)
+    mesh = trimesh.load(io.BytesIO(client.downloads["motion_00000.ply"]), file_type="ply", process=False)
+    np.testing.assert_allclose(mesh.vertices, motion.vertices(0.3), atol=1e-6)  # pyright: ignore
+    client.set("what", "the whole motion (.npz)")
+    client.click("Download")
+    assert client.until(lambda: "motion.npz" in client.downloads)
+    client.collect(1.0)
+    arrays = np.load(io.BytesIO(client.downloads["motion.npz"]))
+    assert arrays["vertices"].shape == (len(drop.schema.window.times), len(drop.rest.points), 3)
+
+
+def test_without_a_model_or_a_known_format_there_is_nothing_to_download(dropped: View) -> None:
+    _, client = dropped
+    client.set("odeform", False)
+    client.collect(0.3)
+    client.click("Download")
+    assert client.until(lambda: "export: no model is shown" in client.said)
+    client.set("what", "nonsense")
+    client.click("Download")
+    assert client.until(lambda: any("export: expected one of" in said for said in client.said))
+    assert client.downloads == {}
+
+
+def test_a_recording_starts_and_ends(dropped: View, tmp_path: Path) -> None:
+    app, client = dropped
+    path = tmp_path / "page.rrd"
+    client.set("file", str(path))
+    client.click("Start recording")
+    assert client.until(lambda: client.controls["Stop recording"].visible)
+    client.set("mass (kg)", 0.9)
+    client.collect(0.7)
+    client.click("Stop recording")
+    assert client.until(lambda: client.controls["Start recording"].visible)
+    assert path.stat().st_size > 0
+    client.set("file", str(tmp_path / "page.rrd" / "below.rrd"))
+    client.click("Start recording")
+    assert client.until(lambda: "cannot be written" in client.text())
+    assert client.controls["Start recording"].visible
+    assert app._recorder is None

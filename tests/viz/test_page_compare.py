@@ -1,0 +1,98 @@
+"""The real page: a model, a rival and the truth."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from browsing import Tab, needs_chromium, open_tab, until
+
+from odeform.dataset.store import open_dataset
+from odeform.predictor import Predictor, load
+from odeform_viz.columns import Column, truth_column
+
+pytestmark = needs_chromium
+
+
+@pytest.fixture(scope="module")
+def compared(drop: Predictor) -> Iterator[Tab]:
+    rival = load("mass-elastic/pod-rbf")
+    yield from open_tab(
+        Column("odeform", drop, drop.rest, origin="mass-elastic"),
+        Column("pod-rbf", rival, rival.rest, origin="mass-elastic/pod-rbf"),
+        truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}"),
+    )
+
+
+def test_columns_are_compared_with_the_truth(compared: Tab) -> None:
+    app = compared.app
+    compared.button("peak").click()
+    compared.turn_to("Compare")
+    assert compared.says("from the truth")
+    assert compared.says("error to truth RMS, mm")
+    before = compared.settled()
+    compared.box("error colours").click()
+    assert compared.changes(before)
+    assert until(lambda: compared.page.get_by_text("from the truth").count() == 0)
+    before = compared.settled()
+    compared.box("overlay").click()
+    assert compared.changes(before)
+    compared.box("overlay").click()
+    compared.box("error colours").click()
+    compared.choose("model", "mass-elastic/nearest")
+    compared.button("Add model").click()
+    assert compared.says("^nearest$")
+    compared.button("Pin these parameters").click()
+    assert compared.says("odeform at mass")
+    compared.button("Sweep it in 5 columns").click()
+    assert until(lambda: sum(c.shown for c in app.columns.all) == 5)
+    compared.button("Remove hidden columns").click()
+    assert until(lambda: len(app.columns.all) == 6)
+    assert compared.errors == []
+
+
+def test_a_sequence_is_opened_left_and_found_again(compared: Tab) -> None:
+    app = compared.app
+    compared.turn_to("Compare")
+    option = next(iter(app._truth._entries))
+    compared.choose("test sequence", option)
+    assert until(lambda: any(c.truth for c in app.columns.all))
+    compared.box("odeform").click()
+    assert compared.says("now off the truth by")
+    compared.turn_to("Explore")
+    thumb = compared.slider("mass (kg)")
+    thumb.focus()
+    thumb.press("Home")
+    assert compared.says("The truth is of other parameters")
+    compared.turn_to("Compare")
+    compared.button("Sliders to the truth's parameters").click()
+    assert compared.says("now off the truth by")
+    assert compared.errors == []
+
+
+def test_a_state_a_file_and_a_recording_are_taken_away(compared: Tab, tmp_path: Path) -> None:
+    page, app = compared.page, compared.app
+    compared.turn_to("Record")
+    with page.expect_download() as saved:
+        compared.button("Save state").click()
+    state = tmp_path / "state.json"
+    saved.value.save_as(state)
+    moment = app.clock.time()
+    compared.button("start").click()
+    assert until(lambda: app.clock.time() != moment)
+    with page.expect_file_chooser() as chooser:
+        compared.button("Restore state").click()
+    chooser.value.set_files(state)
+    assert until(lambda: app.clock.time() == moment)
+    with page.expect_download() as mesh:
+        compared.button("Download").click()
+    assert mesh.value.suggested_filename == "motion_00000.ply"
+    field = compared.row("file", "input")
+    field.fill(str(tmp_path / "page.rrd"))
+    field.press("Enter")
+    assert until(lambda: app._take._path.value.endswith("page.rrd") and str(tmp_path) in app._take._path.value)
+    compared.button("Start recording").click()
+    assert compared.says("frames")
+    compared.button("Stop recording").click()
+    compared.button("Start recording").wait_for(timeout=10_000)
+    assert (tmp_path / "page.rrd").stat().st_size > 0
+    assert compared.errors == []
