@@ -81,6 +81,8 @@ def read_recording(path: str | Path) -> Recording:
     try:
         for chunk in _chunks(recording.path):
             _take(recording, chunk)
+    except InputError:
+        raise
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise _refused(path, f"damaged: {error}") from None
     if not recording.header:
@@ -101,10 +103,9 @@ def _chunks(path: Path, components: list[str] | None = None) -> Iterator[Chunk]:
             stream = RrdReader(path).stream()
         yield from stream if components is None else stream.filter(components=components)
     except (RuntimeError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         cut = "exceeds file size" in str(error)
-        raise _refused(path, "truncated in the middle of a message" if cut else f"not one: {error}") from None
+        why = "truncated in the middle of a message" if cut else f"not a Rerun recording, or damaged: {error}"
+        raise _refused(path, why) from None
 
 
 def _take(recording: Recording, chunk: Chunk) -> None:

@@ -70,9 +70,9 @@ def check_recording(recording: Recording) -> list[Checked]:
     """Each column of the recording, computed again. `InputError` for a recording that contradicts itself."""
     try:
         return _check(recording)
+    except InputError:
+        raise
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(f"recording {recording.path}: damaged: {error!r}") from None
 
 
