@@ -142,9 +142,9 @@ class App:
         """Stop serving; a recording is completed."""
         self._truth.cancel()
         self._worker.stop()
+        self.server.stop()
         if self._recorder:
             self._recorder.close()
-        self.server.stop()
 
     def _wish(self) -> Wish:
         parameters = self.session.schema.complete(self._parameters.parameters())
@@ -167,22 +167,27 @@ class App:
         self._worker.wake()
 
     def _keep_recording(self) -> None:
-        """Start or end the recording as wished."""
-        wished = self._record_to
-        if self._recorder is not None and wished is None:
-            self._recorder.close()
-            self._take.finished(str(self._recorder.path), self._recorder.frames)
-            self._recorder = None
-        if self._recorder is None and wished is not None:
-            try:
+        """Start or end the recording as wished. One that fails ends; the page goes on."""
+        wished, recorder = self._record_to, self._recorder
+        try:
+            if recorder is not None and wished is None:
+                self._recorder = None
+                recorder.close()
+                self._take.show(None, 0)
+                self._take.finished(str(recorder.path), recorder.frames)
+            elif recorder is None and wished is not None:
                 self._recorder = Recorder(wished)
-            except InputError as error:
-                self._record_to = None
-                self._take.show(None, 0, str(error))
-                return
-            self._shown = None  # the frame at hand belongs in it
+                self._shown = None  # the frame at hand belongs in it
+        except InputError as error:
+            self._stop_recording(error)
         if self._recorder is not None:
             self._take.show(wished, self._recorder.frames)
+
+    def _stop_recording(self, error: InputError) -> None:
+        """It cannot go on; who asked for it on the command line may not have that tab open."""
+        self._recorder = self._record_to = None
+        self._take.show(None, 0, str(error))
+        print(f"error: {error}", file=sys.stderr)
 
     def _save(self) -> bytes:
         return state_to_json(capture(self.session.schema.scene, self._wish(), self._read_looks()))
@@ -241,7 +246,10 @@ class App:
         self._shown, self._looks = frame, looks
         self._describe(frame)
         if self._recorder:
-            self._recorder.log(frame)
+            try:
+                self._recorder.log(frame)
+            except InputError as error:
+                self._stop_recording(error)
 
     def _scale(self, frame: Frame) -> float | None:
         """The end of the colour scale in mm, one for all columns; None where nothing can be compared."""

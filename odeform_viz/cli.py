@@ -9,6 +9,7 @@ import odeform
 from odeform.cli import run_guarded
 from odeform.errors import InputError
 from odeform_viz.columns import Column, truth_column
+from odeform_viz.replay import TOLERANCE, replay
 from odeform_viz.shaping import describe_fit, shape_from
 
 __all__ = ["main", "make_columns"]
@@ -55,16 +56,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--host", default="127.0.0.1", metavar="H")
     parser.add_argument("--port", type=int, default=8080, metavar="N")
     parser.add_argument("--record", metavar="FILE.rrd", help="log the session to a Rerun recording")
+    parser.add_argument("--replay", metavar="FILE.rrd", help="compute a recording again, compare, and end")
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        default=TOLERANCE,
+        metavar="M",
+        help="metres that a replay may differ (default: 1e-5)",
+    )
     parser.add_argument("--device", default="cpu", choices=("cpu", "cuda"))
     args = parser.parse_args(argv)
 
+    agrees = True
+
     def work() -> None:
+        nonlocal agrees
+        if args.replay:
+            agrees = replay(args.replay, args.tolerance)
+            return
         try:
             _serve(args)
         except KeyboardInterrupt:
             print("closed")
 
-    return run_guarded(work)
+    return run_guarded(work) or int(not agrees)
 
 
 if __name__ == "__main__":

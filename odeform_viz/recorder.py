@@ -1,128 +1,241 @@
-"""Frames -> Rerun. One recording a session; static topology, moving positions."""
+"""Frames -> Rerun. One recording a session, from which every frame can be computed again."""
 
 import json
-from collections.abc import Sequence
+import os
+import shutil
+import time
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
+from odeform.model.motion import Motion
 from odeform.model.recorded import RecordedMotion
-from odeform.types import Mesh
+from odeform.types import GaussianSplats, Mesh, Points
 from odeform_viz.columns import Column
+from odeform_viz.provenance import provenance_of, versions
+from odeform_viz.recording import END, FORMAT, HEADER, MOTION, PROVENANCE, REST, SHOWN, WISH, WORLD
+from odeform_viz.scene import color_of
 from odeform_viz.session import ColumnFrame, Frame
+from odeform_viz.shapes import Color
 
 __all__ = ["Recorder"]
 
-SHOWN = "shown"  # timeline: index of the frame on screen
-MOTION = "motion_time"  # timeline: seconds of the motion
+STILL = 1e-6  # m; points that moved less than this before the pose are not sent again
+FLUSH = 1.0  # s of what was shown that a killed process loses at most
+PATIENCE = 10.0  # s that a disk may take
+PLOTS = {  # views of curves, and the quantities in each: a scale of its own for each quantity
+    "curves": ("height_m", "deformation_mm"),
+    "errors": ("rmse_mm", "mae_mm", "worst_mm"),
+    "statistics": ("evaluations", "wall_ms", "solver_error_mm"),
+}
+
+
+@dataclass(eq=False)
+class _Form:
+    """A column of one shape: its name in the recording, and what was last sent of it."""
+
+    name: str
+    column: Column
+    motion: Motion | RecordedMotion | None = None
+    points: Points | None = None
+    frame: int = -1
+    """The frame that the points were sent in."""
+    status: str = ""
 
 
 class Recorder:
     """Logs every published frame to a file. Use from one thread: Rerun's clock is thread-local."""
 
     def __init__(self, path: str | Path) -> None:
-        path = Path(path)
+        """`InputError` for a place where nothing can be written."""
+        self.path = Path(path)
+        self.frames = 0
+        self._forms: dict[int, list[_Form]] = {}
+        self._present: dict[str, _Form] = {}
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("ab"):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            with self.path.open("ab"):
                 pass
         except OSError as error:
             raise InputError(f"recording {path}: cannot be written: {error.strerror}") from None
-        self._stream = rr.RecordingStream("odeform")
-        self._stream.save(str(path))
+        # fewer, longer chunks than by default: each costs a kilobyte of file and, until its end, some of memory
+        batches = rr.ChunkBatcherConfig(flush_tick=FLUSH)
+        self._stream = rr.RecordingStream("odeform", recording_id=uuid.uuid4(), batcher_config=batches)
+        self._sound, self._flushed = 0, 0.0
+        try:
+            self._stream.save(str(path))
+        except RuntimeError as error:
+            raise InputError(f"recording {path}: cannot be written: {error}") from None
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self.path = path
-        self.frames = 0
-        self._known: dict[int, Column] = {}
-        self._present: set[int] = set()
+        self._log_json(HEADER, {"odeform_recording": FORMAT, "versions": versions()}, static=True)
+        self._flush()
 
     def log(self, frame: Frame) -> None:
+        """`InputError` where no more can be written; the recording is then over, and whole up to its last second."""
         self._stream.set_time(SHOWN, sequence=self.frames)
         self._stream.set_time(MOTION, duration=frame.wish.time)
-        self.frames += 1
-        for name, value in frame.wish.parameters.items():
-            self._stream.log(f"parameters/{name}", rr.Scalars(value))
-        fresh = [shown.column for shown in frame.columns if shown.column.key not in self._known]
-        for column in fresh:
-            self._known[column.key] = column
-            self._log_static(column)
-        if fresh:
-            self._stream.send_blueprint(_blueprint(list(self._known.values())), make_default=True)
-        present = {shown.column.key for shown in frame.columns}
-        for key in self._present - present:
-            self._stream.log(f"world/{self._known[key].label}", rr.Clear(recursive=True))
+        shown = [(self._form(frame, column), column) for column in frame.columns]
+        present = {form.name: form for form, _ in shown}
+        for name in self._present.keys() - present.keys():
+            self._stream.log(f"{WORLD}/{name}", rr.Clear(recursive=True))
+            self._present[name].points = None
         self._present = present
-        for shown in frame.columns:
-            self._log_column(shown.column, shown, frame.wish.time)
-
-    def _log_static(self, column: Column) -> None:
-        provenance = _provenance(column)
-        text = rr.TextDocument(f"```json\n{json.dumps(provenance, indent=1)}\n```", media_type=rr.MediaType.MARKDOWN)
-        self._stream.log(f"provenance/{column.label}", text, static=True)
-        geometry = column.geometry
-        if isinstance(geometry, Mesh):
-            self._stream.log(
-                f"world/{column.label}/body",
-                rr.Mesh3D.from_fields(triangle_indices=geometry.faces, albedo_factor=[236, 112, 60, 255]),
-                static=True,
-            )
-
-    def _log_column(self, column: Column, shown: ColumnFrame, time: float) -> None:
-        path = f"world/{column.label}/body"
-        points = shown.motion.deformed(time) if shown.points is None else shown.points
-        if isinstance(column.geometry, Mesh):
-            normals = vertex_normals(points, column.geometry.faces)
-            self._stream.log(path, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
-        else:
-            self._stream.log(path, rr.Points3D(points))
-        pose = shown.pose
-        self._stream.log(path, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        stats = shown.stats
-        numbers = {
-            "evaluations": stats.evaluations,
-            "solve_ms": stats.wall_ms,
-            "solver_error_mm": stats.solver_error_mm,
-            "height_m": float((pose[:3, :3] @ points.mean(axis=0) + pose[:3, 3])[2]),
+        for name, value in frame.wish.parameters.items():
+            self._stream.log(["parameters", name], rr.Scalars(value))
+        for form, column in shown:
+            self._log_column(form, column, frame.wish.time)
+        wish = {
+            "time": float(frame.wish.time),
+            "quality": frame.wish.quality,
+            "parameters": {name: float(value) for name, value in frame.wish.parameters.items()},
+            "columns": {name: form.frame for name, form in present.items()},
         }
-        for name, value in numbers.items():
-            if value is not None:
-                self._stream.log(f"statistics/{column.label}/{name}", rr.Scalars(value))
+        self._log_json(WISH, wish)
+        self.frames += 1
+        if time.monotonic() - self._flushed > FLUSH:
+            self._flush()
 
     def close(self) -> None:
-        self._stream.flush()
+        """`InputError` where the end could not be written any more."""
+        self._log_json(END, {"frames": self.frames}, static=True)
+        self._flush()
         self._stream.disconnect()
 
+    def _flush(self) -> None:
+        try:
+            self._stream.flush(timeout_sec=PATIENCE)
+            self._sound, self._flushed = self.path.stat().st_size, time.monotonic()
+        except (RuntimeError, ValueError, OSError):
+            self._stream.disconnect()
+            raise InputError(f"recording {self.path}: {self._give_up()}") from None
 
-def _provenance(column: Column) -> dict[str, object]:
-    if isinstance(column.source, RecordedMotion):
-        return {"label": column.label, "model": "recorded", "parameters": dict(column.source.parameters)}
-    checkpoint = column.source.checkpoint
-    return {
-        "label": column.label,
-        "model": checkpoint.model,
-        "sha256": checkpoint.sha256,
-        "pinned": None if column.pinned is None else dict(column.pinned),
-        "schema": checkpoint.schema.to_json(),
-        "provenance": checkpoint.provenance,
-        "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
-    }
+    def _give_up(self) -> str:
+        """Cut off what was written in part, so that the rest can be read; what to tell."""
+        try:
+            os.truncate(self.path, self._sound)
+            free = shutil.disk_usage(self.path.parent).free >> 20
+        except OSError as error:
+            return f"can no longer be written: {error.strerror}"
+        return f"can no longer be written, with {free:,} MiB free on its disk; it ends before frame {self.frames}"
+
+    def _log_json(self, path: str, value: Any, static: bool = False) -> None:
+        """Floats are written so that they read back to the last bit."""
+        self._stream.log(path, rr.TextDocument(json.dumps(value, indent=1)), static=static)
+
+    def _form(self, frame: Frame, shown: ColumnFrame) -> _Form:
+        """The column with its present shape; what stays is logged when it first appears."""
+        column = shown.column
+        forms = self._forms.setdefault(column.key, [])
+        if not forms or forms[-1].column.geometry is not column.geometry:
+            # named by key: labels have spaces and signs that mean something in paths
+            forms.append(_Form(f"column_{column.key}/form_{len(forms)}", column))
+            self._log_static(forms[-1], color_of(frame.wish.columns, column))
+            blueprint = _blueprint(forms[-1] for forms in self._forms.values())
+            self._stream.send_blueprint(blueprint, make_default=True)
+        return forms[-1]
+
+    def _log_static(self, form: _Form, color: Color) -> None:
+        column, name = form.column, form.name
+        self._log_json(f"{PROVENANCE}/{name}", provenance_of(column), static=True)
+        points = np.asarray(column.geometry.points, dtype=np.float32)
+        self._stream.log(f"{REST}/{name}", rr.Points3D(points), static=True)
+        body = f"{WORLD}/{name}/body"
+        if isinstance(column.geometry, Mesh):
+            mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=_octants(points, color))
+            self._stream.log(body, mesh, static=True)
+        elif isinstance(column.geometry, GaussianSplats):
+            radii = np.sqrt(np.trace(column.geometry.covariances, axis1=1, axis2=2) / 3.0)
+            look = rr.Points3D.from_fields(colors=column.geometry.colors, radii=radii)
+            self._stream.log(body, look, static=True)
+        else:
+            self._stream.log(body, rr.Points3D.from_fields(colors=_octants(points, color)), static=True)
+        for view, quantities in PLOTS.items():
+            for quantity in quantities:
+                lines = rr.SeriesLines(names=column.label, colors=color)
+                self._stream.log(f"{view}/{quantity}/{name}", lines, static=True)
+
+    def _log_column(self, form: _Form, shown: ColumnFrame, time: float) -> None:
+        body, motion, pose = f"{WORLD}/{form.name}/body", shown.motion, shown.pose
+        # what is too small to be seen is recorded all the same: a replay measures finer
+        points = motion.deformed(time) if shown.points is None else shown.points
+        if form.points is None or np.abs(points - form.points).max() > STILL:
+            form.points, form.frame = points, self.frames
+            if isinstance(form.column.geometry, Mesh):
+                normals = vertex_normals(points, form.column.geometry.faces)
+                self._stream.log(body, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
+            else:
+                self._stream.log(body, rr.Points3D.from_fields(positions=points))
+        self._stream.log(body, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        self._log_numbers(form, shown, time)
+
+    def _log_numbers(self, form: _Form, shown: ColumnFrame, time: float) -> None:
+        motion, stats, pose = shown.motion, shown.stats, shown.pose
+        centre = np.asarray(form.column.geometry.points, dtype=float).mean(axis=0)
+        numbers: dict[str, float | None] = {
+            "curves/height_m": float(pose[2, :3] @ centre + pose[2, 3]),
+            "curves/deformation_mm": 1e3 * float(motion.deformation_rms(np.array([time]))[0]),
+        }
+        if shown.error is not None:
+            error = shown.error
+            numbers |= {
+                "errors/rmse_mm": error.rmse_mm,
+                "errors/mae_mm": error.mae_mm,
+                "errors/worst_mm": error.worst_mm,
+            }
+        if isinstance(motion, Motion):
+            numbers |= {"statistics/evaluations": float(stats.evaluations), "statistics/wall_ms": stats.wall_ms}
+            # it costs as much as the motion: for those that are looked at for longer than a frame
+            numbers["statistics/solver_error_mm"] = stats.solver_error_mm if motion is form.motion else None
+        for quantity, value in numbers.items():
+            if value is not None:
+                self._stream.log(f"{quantity}/{form.name}", rr.Scalars(value))
+        status = f"{form.column.label}: {stats.solver}, {stats.status}"
+        if status != form.status:
+            level = rr.TextLogLevel.INFO if stats.status == "ok" else rr.TextLogLevel.WARN
+            self._stream.log(f"status/{form.name}", rr.TextLog(status, level=level))
+        form.motion, form.status = motion, status
 
 
-def _blueprint(columns: Sequence[Column]) -> rrb.Blueprint:
-    views = [
-        rrb.Spatial3DView(origin="world", contents=[f"world/{column.label}/**"], name=column.label)
-        for column in columns
+def _octants(points: Points, color: Color) -> np.ndarray:
+    """(N, 3) the colour and a paler one in turn about the centre: a body of one colour hides how it turns."""
+    odd = np.prod(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), axis=1) > 0.0
+    own = np.array(color, dtype=float)
+    return np.where(odd[:, None], own, 0.45 * own + 0.55 * 235.0).astype(np.uint8)
+
+
+def _blueprint(forms: Iterable[_Form]) -> rrb.Blueprint:
+    """A view in space for each column, curves below."""
+    forms = list(forms)
+    spaces = [
+        rrb.Spatial3DView(origin=WORLD, contents=[f"{WORLD}/column_{f.column.key}/**"], name=f.column.label)
+        for f in forms
     ]
+    plots = {
+        view: [rrb.TimeSeriesView(origin=f"{view}/{quantity}", name=quantity) for quantity in quantities]
+        for view, quantities in PLOTS.items()
+    }
+    said = [rrb.TextDocumentView(origin=f"{PROVENANCE}/{f.name}", name=f"of {f.column.label}") for f in forms]
     return rrb.Blueprint(
         rrb.Vertical(
-            rrb.Horizontal(*views),
+            rrb.Horizontal(*spaces),
             rrb.Horizontal(
                 rrb.TimeSeriesView(origin="parameters", name="parameters"),
-                rrb.TimeSeriesView(origin="statistics", name="statistics"),
-                rrb.TextDocumentView(origin=f"provenance/{columns[0].label}", name="provenance"),
+                *plots["curves"],
+                rrb.Tabs(*plots["errors"]),
+                rrb.Tabs(
+                    *plots["statistics"],
+                    rrb.TextLogView(origin="status", name="status"),
+                    rrb.TextDocumentView(origin=WISH, name="wish"),
+                    *said,
+                ),
             ),
             row_shares=[3, 2],
         ),

@@ -1,17 +1,21 @@
-"""A viewer that is served, and a client of it: what tests of panels need."""
+"""A viewer that is served, and a client of it: what tests of panels need. Recordings made without either."""
 
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
 from odeform.predictor import Predictor, load
 from odeform_viz.app import App
-from odeform_viz.columns import Column
+from odeform_viz.columns import Column, Columns
 from odeform_viz.loopback import LoopbackClient
+from odeform_viz.recorder import Recorder
+from odeform_viz.session import Frame, Session, Wish
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
+Record = Callable[..., list[Frame]]
 
 
 @pytest.fixture
@@ -55,3 +59,27 @@ def kicked(serve: Serve, kick: Predictor) -> tuple[App, LoopbackClient]:
 def dropped(serve: Serve, drop: Predictor) -> tuple[App, LoopbackClient]:
     """The bundled drop alone, at its impact."""
     return serve(Column("odeform", drop, drop.rest, origin="mass-elastic"), moment=0.3)
+
+
+@pytest.fixture
+def record() -> Record:
+    """Show columns at some times under the same sliders, and record it."""
+
+    def make(
+        path: Path,
+        columns: Sequence[Column],
+        times: Sequence[float] = (0.0, 0.02, 0.5),
+        parameters: dict[str, float] | None = None,
+        change: Callable[[Frame], Frame] = lambda frame: frame,
+    ) -> list[Frame]:
+        schema = columns[0].source.schema
+        session, shown = Session(schema), Columns.of(columns).all
+        recorder = Recorder(path)
+        wishes = [Wish(schema.complete(parameters or {"mass": 0.4}), time, "balanced", shown) for time in times]
+        frames = [change(session.frame(wish)) for wish in wishes]
+        for frame in frames:
+            recorder.log(frame)
+        recorder.close()
+        return frames
+
+    return make

@@ -1,0 +1,66 @@
+"""Where a column comes from, in plain values: enough to make it again elsewhere, and to notice that it is another."""
+
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from odeform.checkpoint import bundled_checkpoints, resolve_checkpoint
+from odeform.dataset.folder import INDEX
+from odeform.types import GaussianSplats, Geometry, Mesh
+from odeform_viz.columns import Column
+
+__all__ = ["provenance_of", "versions"]
+
+
+def versions() -> dict[str, str]:
+    """What computes and what draws, by package. None is imported for it."""
+    found = {}
+    for package in ("odeform", "numpy", "scipy", "torch", "rerun-sdk", "viser"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # a clone on the path
+            found[package] = "unknown"
+    return found
+
+
+def provenance_of(column: Column) -> dict[str, Any]:
+    """Model or truth, origin, shape and fit. Files are named by their whole path, what is bundled by its name."""
+    truth = column.truth
+    common = {
+        "label": column.label,
+        "pinned": None if column.pinned is None else dict(column.pinned),
+        "geometry": _kind(column.geometry),
+        "fit": column.fit and {"factor": float(column.fit.factor), "shift": [float(x) for x in column.fit.shift]},
+    }
+    if truth is not None:
+        origin = _sequence_origin(column.origin)
+        return {**common, "truth": True, "origin": origin, "parameters": dict(truth.parameters)}
+    assert column.predictor is not None
+    checkpoint = column.predictor.checkpoint
+    return {
+        **common,
+        "truth": False,
+        "origin": _checkpoint_origin(column.origin),
+        "model": checkpoint.model,
+        "sha256": checkpoint.sha256,
+        "schema": checkpoint.schema.to_json(),
+        "provenance": checkpoint.provenance,
+        "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
+    }
+
+
+def _kind(geometry: Geometry) -> str:
+    return "mesh" if isinstance(geometry, Mesh) else "splats" if isinstance(geometry, GaussianSplats) else "points"
+
+
+def _checkpoint_origin(origin: str) -> str:
+    if not origin or resolve_checkpoint(origin) in bundled_checkpoints().values():
+        return origin
+    return str(Path(origin).resolve())
+
+
+def _sequence_origin(origin: str) -> str:
+    root, _, name = origin.rpartition("/")
+    place = Path(root)
+    here = place.is_file() or (place / INDEX).exists()
+    return f"{place.resolve()}/{name}" if origin and here else origin
