@@ -34,6 +34,7 @@ from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
 from odeform_viz.scene import SceneView, color_of
 from odeform_viz.session import Frame, Looks, Session, Wish, same_motions
+from odeform_viz.shaping import fit_from_json
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 from odeform_viz.worker import Worker
 
@@ -75,6 +76,8 @@ class App:
         )
         self.server.gui.set_panel_label(f"ODeform · {self.session.schema.scene}")
         self._worker = Worker(self._serve)
+        assert columns[0].predictor is not None
+        self._body = columns[0].predictor.rest
         self._build(columns)
         self._shown: Frame | None = None
         self._looks = Looks()
@@ -97,9 +100,8 @@ class App:
             qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
             samples = _training_samples(columns[0])
             self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
-            body = columns[0].source.rest  # pyright: ignore[reportAttributeAccessIssue]
             hold = partial(self._playback.jump, schema.window.start)
-            self._shape = ShapePanel(self.server, self.columns, body, hold, self._changed, say)
+            self._shape = ShapePanel(self.server, self.columns, self._body, hold, self._changed, say)
             with gui.add_folder("View"):
                 self._follow = gui.add_checkbox("follow the body", initial_value=True)
                 self._follow.on_update(lambda _: wake())
@@ -196,7 +198,11 @@ class App:
         """`InputError` if the state is none, or a checkpoint of it is not at hand; the page then stays as it was."""
         schema = self.session.schema
         state = state_from_json(data, schema.scene)
-        self.columns.restart(columns_of(state, schema, next(c for c in self.columns.all if c.predictor)))
+        fit = fit_from_json(state.shape, self._body) if state.shape else None
+        self.columns.restart(columns_of(state, schema))
+        self._shape.set(fit)
+        for note in state.notes:
+            self._say(note)
         self._parameters.set(state.parameters)
         self._parameters.set_quality(state.quality)
         self._compare.set(state.overlay, state.heat)

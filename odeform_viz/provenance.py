@@ -8,6 +8,7 @@ from odeform.checkpoint import bundled_checkpoints, resolve_checkpoint
 from odeform.dataset.folder import INDEX
 from odeform.types import GaussianSplats, Geometry, Mesh
 from odeform_viz.columns import Column
+from odeform_viz.shaping import fit_to_json
 
 __all__ = ["provenance_of", "versions"]
 
@@ -30,7 +31,7 @@ def provenance_of(column: Column) -> dict[str, Any]:
         "label": column.label,
         "pinned": None if column.pinned is None else dict(column.pinned),
         "geometry": _kind(column.geometry),
-        "fit": column.fit and {"factor": float(column.fit.factor), "shift": [float(x) for x in column.fit.shift]},
+        "shape": column.fit and fit_to_json(column.fit),
     }
     if truth is not None:
         origin = _sequence_origin(column.origin)

@@ -18,7 +18,7 @@ from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
 from odeform.model.motion import Motion
 from odeform.model.recorded import RecordedMotion
-from odeform.types import GaussianSplats, Mesh, Points
+from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Points
 from odeform_viz.columns import Column
 from odeform_viz.provenance import provenance_of, versions
 from odeform_viz.recording import END, FORMAT, HEADER, MOTION, PROVENANCE, REST, SHOWN, WISH, WORLD
@@ -28,7 +28,8 @@ from odeform_viz.shapes import Color
 
 __all__ = ["Recorder"]
 
-STILL = 1e-6  # m; points that moved less than this before the pose are not sent again
+STILL = f"{WORLD}/still"
+TINY = 1e-6  # m; points that moved less than this before the pose are not sent again
 FLUSH = 1.0  # s of what was shown that a killed process loses at most
 PATIENCE = 10.0  # s that a disk may take
 PLOTS = {  # views of curves, and the quantities in each: a scale of its own for each quantity
@@ -60,6 +61,7 @@ class Recorder:
         self.frames = 0
         self._forms: dict[int, list[_Form]] = {}
         self._present: dict[str, _Form] = {}
+        self._still: Geometry | None = None
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("ab"):
@@ -82,12 +84,17 @@ class Recorder:
         """`InputError` where no more can be written; the recording is then over, and whole up to its last second."""
         self._stream.set_time(SHOWN, sequence=self.frames)
         self._stream.set_time(MOTION, duration=frame.wish.time)
-        shown = [(self._form(frame, column), column) for column in frame.columns]
+        known = sum(map(len, self._forms.values()))
+        shown = [(self._form(column), column) for column in frame.columns]
+        if sum(map(len, self._forms.values())) > known:
+            blueprint = _blueprint(forms[-1] for forms in self._forms.values())
+            self._stream.send_blueprint(blueprint, make_default=True)
         present = {form.name: form for form, _ in shown}
         for name in self._present.keys() - present.keys():
             self._stream.log(f"{WORLD}/{name}", rr.Clear(recursive=True))
             self._present[name].points = None
         self._present = present
+        self._log_still(frame)
         for name, value in frame.wish.parameters.items():
             self._stream.log(["parameters", name], rr.Scalars(value))
         for form, column in shown:
@@ -130,16 +137,14 @@ class Recorder:
         """Floats are written so that they read back to the last bit."""
         self._stream.log(path, rr.TextDocument(json.dumps(value, indent=1)), static=static)
 
-    def _form(self, frame: Frame, shown: ColumnFrame) -> _Form:
+    def _form(self, shown: ColumnFrame) -> _Form:
         """The column with its present shape; what stays is logged when it first appears."""
         column = shown.column
         forms = self._forms.setdefault(column.key, [])
         if not forms or forms[-1].column.geometry is not column.geometry:
             # named by key: labels have spaces and signs that mean something in paths
             forms.append(_Form(f"column_{column.key}/form_{len(forms)}", column))
-            self._log_static(forms[-1], color_of(frame.wish.columns, column))
-            blueprint = _blueprint(forms[-1] for forms in self._forms.values())
-            self._stream.send_blueprint(blueprint, make_default=True)
+            self._log_static(forms[-1], color_of(column))
         return forms[-1]
 
     def _log_static(self, form: _Form, color: Color) -> None:
@@ -152,9 +157,8 @@ class Recorder:
             mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=_octants(points, color))
             self._stream.log(body, mesh, static=True)
         elif isinstance(column.geometry, GaussianSplats):
-            radii = np.sqrt(np.trace(column.geometry.covariances, axis1=1, axis2=2) / 3.0)
-            look = rr.Points3D.from_fields(colors=column.geometry.colors, radii=radii)
-            self._stream.log(body, look, static=True)
+            colors, radii = _look(column.geometry)
+            self._stream.log(body, rr.Points3D.from_fields(colors=colors, radii=radii), static=True)
         else:
             self._stream.log(body, rr.Points3D.from_fields(colors=_octants(points, color)), static=True)
         for view, quantities in PLOTS.items():
@@ -162,11 +166,24 @@ class Recorder:
                 lines = rr.SeriesLines(names=column.label, colors=color)
                 self._stream.log(f"{view}/{quantity}/{name}", lines, static=True)
 
+    def _log_still(self, frame: Frame) -> None:
+        """What stands still about the columns, when it appears, and that it is gone."""
+        still = frame.still
+        if still is self._still:
+            return
+        self._still = still
+        self._stream.log(STILL, rr.Clear(recursive=True))
+        if isinstance(still, Mesh):
+            self._stream.log(f"{STILL}/mesh", rr.Mesh3D(vertex_positions=still.points, triangle_indices=still.faces))
+        elif still is not None:
+            colors, radii = _look(still) if isinstance(still, GaussianSplats) else (None, None)
+            self._stream.log(f"{STILL}/points", rr.Points3D(still.points, colors=colors, radii=radii))
+
     def _log_column(self, form: _Form, shown: ColumnFrame, time: float) -> None:
         body, motion, pose = f"{WORLD}/{form.name}/body", shown.motion, shown.pose
         # what is too small to be seen is recorded all the same: a replay measures finer
         points = motion.deformed(time) if shown.points is None else shown.points
-        if form.points is None or np.abs(points - form.points).max() > STILL:
+        if form.points is None or not np.abs(points - form.points).max() <= TINY:  # also what is not a number
             form.points, form.frame = points, self.frames
             if isinstance(form.column.geometry, Mesh):
                 normals = vertex_normals(points, form.column.geometry.faces)
@@ -204,6 +221,11 @@ class Recorder:
         form.motion, form.status = motion, status
 
 
+def _look(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
+    """Colours, and radii in metres of spheres as large: Rerun draws no Gaussians."""
+    return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)
+
+
 def _octants(points: Points, color: Color) -> np.ndarray:
     """(N, 3) the colour and a paler one in turn about the centre: a body of one colour hides how it turns."""
     odd = np.prod(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), axis=1) > 0.0
@@ -215,7 +237,9 @@ def _blueprint(forms: Iterable[_Form]) -> rrb.Blueprint:
     """A view in space for each column, curves below."""
     forms = list(forms)
     spaces = [
-        rrb.Spatial3DView(origin=WORLD, contents=[f"{WORLD}/column_{f.column.key}/**"], name=f.column.label)
+        rrb.Spatial3DView(
+            origin=WORLD, contents=[f"{WORLD}/column_{f.column.key}/**", f"{STILL}/**"], name=f.column.label
+        )
         for f in forms
     ]
     plots = {

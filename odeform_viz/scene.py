@@ -220,8 +220,7 @@ class SceneView:
         # splats on the floor would sink into it by half
         splats = any(isinstance(shown.column.geometry, GaussianSplats) for shown in frame.columns)
         self._floor.position = (0.0, 0.0, -0.01 * self._size if splats else 0.0)
-        fits = (column.fit for column in frame.wish.columns if column.shown and column.fit)
-        wished = next((fit.still for fit in fits if fit.still), None)
+        wished = frame.still
         if wished is (self._still and self._still[0]):
             return
         if self._still is not None:

@@ -96,6 +96,12 @@ class Frame:
     def truth(self) -> ColumnFrame | None:
         return next((shown for shown in self.columns if shown.column.truth), None)
 
+    @cached_property
+    def still(self) -> Geometry | None:
+        """What stands still about the columns."""
+        fits = (shown.column.fit for shown in self.columns if shown.column.fit)
+        return next((fit.still for fit in fits if fit.still), None)
+
 
 @dataclass(frozen=True, eq=False)
 class Curves:

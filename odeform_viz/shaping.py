@@ -1,16 +1,21 @@
 """Another shape than the body that was trained: read, limited, fitted, and what the user is told of it."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from odeform.errors import InputError
 from odeform.geometry.bundled import read_shape
 from odeform.geometry.parts import most_visible
+from odeform.geometry.region import region_from_json, region_to_json
 from odeform.geometry.shape import Fit, difference, fit_to
+from odeform.geometry.similarity import Similarity
 from odeform.types import GaussianSplats, Mesh
 
-__all__ = ["MOST_POINTS", "describe_fit", "shape_from"]
+__all__ = ["MOST_POINTS", "describe_fit", "fit_from_json", "fit_to_json", "shape_from"]
 
 MOST_POINTS = 200_000  # what is moved and sent at interactive rates
 ALIKE = 0.05  # of the body's size; shapes that lie closer are the body in another discretisation
@@ -29,7 +34,20 @@ def shape_from(name: str | Path, body: Mesh) -> Fit:
             f"geometry {Path(name).name}: {len(geometry.points):,} points; expected at most {MOST_POINTS:,}, which can "
             "be shown moving: decimate it first"
         )
-    return fit_to(geometry, body, region)
+    return replace(fit_to(geometry, body, region), origin=str(name))
+
+
+def fit_to_json(fit: Fit) -> dict[str, Any]:
+    """Where a shape comes from, what moves of it and how it lies, in plain values."""
+    region = None if fit.region is None else region_to_json(fit.region)
+    return {"origin": fit.origin, "region": region, "place": fit.place.to_json()}
+
+
+def fit_from_json(raw: Mapping[str, Any], body: Mesh) -> Fit:
+    """The shape read again, in the same part and place. `InputError` where that cannot be."""
+    fit = shape_from(str(raw["origin"]), body)
+    region = None if raw["region"] is None else region_from_json(raw["region"])
+    return replace(fit_to(fit.source, body, region, place=Similarity.from_json(raw["place"])), origin=fit.origin)
 
 
 def describe_fit(fit: Fit, name: str, body: Mesh) -> str:

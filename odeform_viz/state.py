@@ -11,6 +11,7 @@ from odeform.errors import InputError
 from odeform.schema import Schema
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.session import Looks, Wish
+from odeform_viz.shaping import fit_to_json
 
 __all__ = ["PageState", "capture", "columns_of", "state_from_json", "state_to_json"]
 
@@ -21,7 +22,8 @@ FORMAT = 1
 class PageState:
     """Plain values: what the sliders say, and the columns by where they come from.
 
-    A column is `{"origin", "label", "pinned", "shown"}`; `truth` is the DATASET/NAME of a sequence, or empty.
+    A column is `{"origin", "label", "pinned", "shown"}`; `truth` is the DATASET/NAME of a sequence, or empty;
+    `shape` is `{"origin", "region", "place"}` of a foreign shape.
     """
 
     scene: str
@@ -30,6 +32,7 @@ class PageState:
     quality: str
     columns: tuple[Mapping[str, Any], ...] = ()
     truth: str = ""
+    shape: Mapping[str, Any] | None = None
     overlay: bool = False
     heat: bool = True
     follow: bool = True
@@ -38,8 +41,13 @@ class PageState:
 
 
 def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
-    """What a wish says, in plain values. A truth simulated on the spot cannot be kept, and the notes say so."""
+    """What a wish says, in plain values. What is in no file here cannot be kept, and the notes say so."""
     truth = next((c for c in wish.columns if c.truth), None)
+    fit = next((c.fit for c in wish.columns if c.fit), None)
+    lost = {
+        "the truth was simulated on the spot and is not kept": truth and not truth.origin,
+        "the shape was uploaded and is not kept": fit and not fit.origin,
+    }
     return PageState(
         scene,
         wish.parameters,
@@ -51,25 +59,25 @@ def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
             if c.predictor
         ),
         truth.origin if truth else "",
+        fit_to_json(fit) if fit and fit.origin else None,
         looks.overlay,
         looks.heat,
         looks.follow,
-        ("the truth was simulated on the spot and is not kept",) if truth and not truth.origin else (),
+        tuple(note for note, so in lost.items() if so),
     )
 
 
-def columns_of(state: PageState, schema: Schema, like: Column) -> list[Column]:
-    """The columns of a state, of the shape that a column at hand has. `InputError` where a checkpoint is missing."""
+def columns_of(state: PageState, schema: Schema) -> list[Column]:
+    """The columns of a state, of the bodies they were trained on. `InputError` where a checkpoint is missing."""
     schema.complete(state.parameters)
     models = {name: odeform.load(str(name)) for name in {column["origin"] for column in state.columns}}
     columns = [
         Column(
             str(c["label"]),
             models[c["origin"]],
-            like.geometry if like.fit else models[c["origin"]].rest,
+            models[c["origin"]].rest,
             pinned=None if c["pinned"] is None else schema.complete(c["pinned"]),
             origin=str(c["origin"]),
-            fit=like.fit,
             shown=bool(c["shown"]),
         )
         for c in state.columns
@@ -100,6 +108,8 @@ def state_from_json(data: bytes, scene: str) -> PageState:
                 raise InputError(f"state: a column with {', '.join(column)}; expected origin, label, pinned, shown")
             if not isinstance(column["pinned"], dict | None) or not isinstance(column["origin"], str):
                 raise InputError(f"state: column {column['label']}: expected a name and parameters by name")
+        if state.shape is not None and set(state.shape) != {"origin", "region", "place"}:
+            raise InputError("state: a shape; expected its origin, region and place")
         if all(column["pinned"] is not None for column in state.columns):
             raise InputError("state: no model under the sliders")
         return state

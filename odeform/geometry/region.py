@@ -12,7 +12,7 @@ from odeform.errors import InputError
 from odeform.geometry.similarity import Similarity
 from odeform.types import Points, Rotations, Vector
 
-__all__ = ["Box", "Mask", "Region", "Sphere", "read_region", "region_to_json"]
+__all__ = ["Box", "Mask", "Region", "Sphere", "read_region", "region_from_json", "region_to_json"]
 
 Mask = Bool[np.ndarray, " points"]
 
@@ -53,17 +53,17 @@ Region = Sphere | Box
 
 
 def region_to_json(region: Region) -> dict[str, Any]:
-    """Plain values, which `read_region` takes."""
+    """Plain values, which `region_from_json` takes."""
     if isinstance(region, Sphere):
         return {"sphere": {"centre": np.asarray(region.centre).tolist(), "radius": float(region.radius)}}
     parts = {"centre": region.centre, "size": region.size, "rotation": region.rotation}
     return {"box": {name: np.asarray(value).tolist() for name, value in parts.items()}}
 
 
-def read_region(path: Path) -> Region:
-    """The region that a JSON file holds. `InputError` if it holds none."""
+def region_from_json(raw: Any) -> Region:
+    """`InputError` for what is no region."""
     try:
-        ((kind, values),) = json.loads(path.read_text()).items()
+        ((kind, values),) = raw.items()
         numbers = {name: np.asarray(value, dtype=float) for name, value in values.items()}
         if not all(np.isfinite(value).all() for value in numbers.values()):
             raise ValueError("not finite")
@@ -75,5 +75,13 @@ def read_region(path: Path) -> Region:
             raise ValueError(f"got {kind!r}")
         region.inside(np.zeros((1, 3)))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"region {path}: expected a sphere or a box in JSON: {error}") from None
+        raise InputError(f"region: expected a sphere or a box in JSON: {error}") from None
     return region
+
+
+def read_region(path: Path) -> Region:
+    """The region that a JSON file holds. `InputError` if it holds none."""
+    try:
+        return region_from_json(json.loads(path.read_text()))
+    except (InputError, ValueError) as error:
+        raise InputError(f"{path}: {error}") from None

@@ -44,6 +44,8 @@ class Fit:
     """What stands still, as in the file; None if all moves."""
     lift: float
     """Metres by which a body that is dropped starts above what stands still."""
+    origin: str = ""
+    """The file, or the bundled shape, that the source was read from; empty where it can be read from neither."""
 
     @cached_property
     def still(self) -> Geometry | None:

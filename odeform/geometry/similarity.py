@@ -1,10 +1,11 @@
 """Similarities: a turn, a factor and a shift, of anything that lies in space."""
 
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.types import Floats, GaussianSplats, Geometry, Rotations, Vector, Vectors
@@ -38,6 +39,27 @@ class Similarity:
     factor: float = 1.0
     rotation: Rotations = field(default_factory=_eye)
     shift: Vector = field(default_factory=lambda: np.zeros(3))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain values, which `Similarity.from_json` takes."""
+        return {"factor": float(self.factor), "rotation": self.rotation.tolist(), "shift": self.shift.tolist()}
+
+    @classmethod
+    def from_json(cls, raw: Any) -> "Similarity":
+        """`InputError` for what is no similarity."""
+        try:
+            factor, rotation, shift = (
+                float(raw["factor"]),
+                np.array(raw["rotation"], float),
+                np.array(raw["shift"], float),
+            )
+            turns = rotation.shape == (3, 3) and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
+            sound = turns and shift.shape == (3,) and np.isfinite(shift).all() and np.isfinite(factor) and factor > 0.0
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"similarity: expected factor, rotation and shift: {error!r}") from None
+        if not sound:
+            raise InputError("similarity: expected a factor above 0, a rotation matrix (3, 3) and a shift (3,)")
+        return cls(factor, rotation, shift)
 
     @property
     def inverse(self) -> "Similarity":

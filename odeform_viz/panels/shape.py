@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,7 @@ class ShapePanel:
             upload.on_upload(lambda event: self._guarded(lambda: self._uploaded(event.target.value)))
             for name in bundled_shapes():
                 button = gui.add_button(f"Move the bundled {name}", color="gray", hint="Gaussian splats")
-                button.on_click(lambda _, name=name: self._guarded(lambda: self._read(name, name)))
+                button.on_click(lambda _, name=name: self._guarded(lambda: self._read(name, name, kept=True)))
             self._part = PartPanel(server, self._lay_out, self._use)
             self._alignment = AlignmentPanel(server, hold, self._turn, self._put)
             self._back = gui.add_button("Back to the trained body", color="gray", visible=False)
@@ -77,9 +78,15 @@ class ShapePanel:
             except InputError as error:
                 raise InputError(str(error).replace(str(path), file.name).replace(path.name, file.name)) from None
 
-    def _read(self, path: str | Path, name: str) -> None:
+    def _read(self, path: str | Path, name: str, kept: bool = False) -> None:
         fit = shape_from(path, self._body)
         self._name, self._turned = name, None
+        self._adopt(fit if kept else replace(fit, origin=""))
+
+    def set(self, fit: Fit | None) -> None:
+        """Another shape, or the same in another part or place; None for the body that was trained."""
+        if fit is not None:
+            self._name, self._turned = fit.origin, fit.place.rotation
         self._adopt(fit)
 
     def _adopt(self, fit: Fit | None, guessed: bool = True) -> None:
@@ -100,7 +107,11 @@ class ShapePanel:
         """The same shape, otherwise; it stays as it is where that cannot be."""
         fit = self._fit
         if fit is not None:
-            self._guarded(lambda: self._adopt(fit_to(fit.source, self._body, region, rotation, place), place is None))
+            self._guarded(lambda: self._move(fit, region, rotation, place))
+
+    def _move(self, fit: Fit, region: Region | None, rotation: Rotations | None, place: Similarity | None) -> None:
+        moved = fit_to(fit.source, self._body, region, rotation, place)
+        self._adopt(replace(moved, origin=fit.origin), guessed=place is None)
 
     def _lay_out(self) -> Fit | None:
         """The whole shape at rest, upright as it was; a part taken from it then stays so."""

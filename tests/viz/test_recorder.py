@@ -19,6 +19,7 @@ from odeform_viz.provenance import provenance_of
 from odeform_viz.recorder import Recorder
 from odeform_viz.recording import read_recording
 from odeform_viz.session import Frame, Session, Wish
+from odeform_viz.shaping import shape_from
 
 Record = Callable[..., list[Frame]]
 
@@ -113,16 +114,16 @@ def test_any_label_makes_a_sound_path(
     record(path, [Column(label, kick, kick.rest) for label in labels])
     said = capfd.readouterr()
     assert "WARN" not in said.err
-    assert [column["label"] for column in read_recording(path).columns.values()] == labels
+    assert [column["label"] for _, column in sorted(read_recording(path).columns.items())] == labels
 
 
 def test_the_layout_has_a_view_in_space_for_each_column(kick: Predictor, path: Path, record: Record) -> None:
     record(path, [Column("one", kick, kick.rest), Column("two", kick, kick.rest)])
     reader = rr.chunk.RrdReader(path)
+    chunks = [chunk for store in reader.blueprints() for chunk in reader.stream(store=store).to_chunks()]
     texts = [
-        str(chunk.to_record_batch().to_pydict())
-        for store in reader.blueprints()
-        for chunk in reader.stream(store=store).to_chunks()
+        str({name: batch.column(name).to_pylist() for name in batch.schema.names if ":" in name})
+        for batch in (chunk.to_record_batch() for chunk in chunks)
     ]
     assert len(reader.blueprints()) == 1
     for key, label in enumerate(("one", "two")):
@@ -148,7 +149,7 @@ def test_another_shape_is_another_form_and_hidden_columns_are_cleared(kick: Pred
     assert shown[1] == {"column_0/form_0"}
     assert shown[2] == {"column_0/form_1", "column_1/form_1"}
     assert recording.columns["column_0/form_1"]["geometry"] == "points"
-    assert recording.columns["column_0/form_1"]["fit"]["factor"] > 0.0
+    assert recording.columns["column_0/form_1"]["shape"]["place"]["factor"] > 0.0
     assert "/world/column_1/form_0:Clear:is_recursive" in _rows(path)
 
 
@@ -201,3 +202,14 @@ def test_a_full_disk_is_told_and_what_was_written_reads_back(
     recording = read_recording(path)
     assert 0 < len(recording.wishes) == recorder.frames - 1
     assert recording.frames is None
+
+
+def test_what_stands_still_is_recorded_once(kick: Predictor, path: Path, record: Record) -> None:
+    fit = shape_from("volleyball", kick.rest)
+    record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
+    rows = _rows(path)
+    (points,) = rows["/world/still/points:Points3D:positions"]
+    assert fit.still is not None
+    assert len(points) == len(fit.still.points)
+    (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
+    assert "volleyball" in shape

@@ -2,13 +2,19 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from odeform import InputError
+from odeform.geometry.region import Sphere
+from odeform.geometry.shape import fit_to
+from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.predictor import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.session import Looks, Wish
+from odeform_viz.shaping import fit_from_json, fit_to_json, shape_from
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 
 SCENE = "mass-elastic"
@@ -28,7 +34,7 @@ def wish() -> Wish:
 def test_what_is_restored_is_what_was_saved(wish: Wish) -> None:
     looks = Looks(overlay=True, heat=False)
     state = state_from_json(state_to_json(capture(SCENE, wish, looks)), SCENE)
-    columns = columns_of(state, wish.columns[0].source.schema, wish.columns[0])
+    columns = columns_of(state, wish.columns[0].source.schema)
     again = capture(SCENE, Wish(state.parameters, state.time, state.quality, tuple(columns)), looks)
     assert again == state
     assert [c.label for c in columns] == ["odeform", "heavy", "truth"]
@@ -61,7 +67,7 @@ def test_other_files_are_refused(wish: Wish, broken: Callable[[dict], bytes], sa
 def test_wrong_values_are_refused_when_columns_are_made(wish: Wish, wrong: dict) -> None:
     raw = {**json.loads(state_to_json(capture(SCENE, wish, Looks()))), **wrong}
     with pytest.raises(InputError):
-        columns_of(state_from_json(json.dumps(raw).encode(), SCENE), wish.columns[0].source.schema, wish.columns[0])
+        columns_of(state_from_json(json.dumps(raw).encode(), SCENE), wish.columns[0].source.schema)
 
 
 def test_a_missing_checkpoint_is_named(wish: Wish) -> None:
@@ -69,4 +75,42 @@ def test_a_missing_checkpoint_is_named(wish: Wish) -> None:
     lost = json.loads(state_to_json(state))
     lost["columns"][0]["origin"] = "nowhere.safetensors"
     with pytest.raises(InputError, match="nowhere"):
-        columns_of(state_from_json(json.dumps(lost).encode(), SCENE), wish.columns[0].source.schema, wish.columns[0])
+        columns_of(state_from_json(json.dumps(lost).encode(), SCENE), wish.columns[0].source.schema)
+
+
+def test_a_shape_its_part_and_its_place_are_kept(wish: Wish) -> None:
+    (model,) = {c.predictor for c in wish.columns if c.predictor and c.pinned is None}
+    guessed = shape_from("volleyball", model.rest)
+    turned = Similarity(1.1 * guessed.place.factor, UPRIGHT["+x"] @ guessed.place.rotation, guessed.place.shift)
+    region = Sphere(guessed.region.centre + 0.5 * guessed.region.radius, guessed.region.radius)
+    fit = replace(fit_to(guessed.source, model.rest, region, place=turned), origin="volleyball")
+    columns = Columns.of([replace(wish.columns[0], geometry=fit.geometry, fit=fit)])
+    state = state_from_json(state_to_json(capture(SCENE, replace(wish, columns=columns.all), Looks())), SCENE)
+    assert state.shape is not None
+    again = fit_from_json(state.shape, model.rest)
+    np.testing.assert_array_equal(again.geometry.points, fit.geometry.points)
+    np.testing.assert_array_equal(again.still.points, fit.still.points)
+    assert again.origin == "volleyball"
+    # what was uploaded is in no file here
+    nowhere = replace(columns.all[0], fit=replace(fit, origin=""))
+    lost = capture(SCENE, replace(wish, columns=(nowhere,)), Looks())
+    assert lost.shape is None
+    assert "uploaded" in lost.notes[0]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"origin": "nowhere.ply"},
+        {"region": {"cone": {}}},
+        {"region": 7},
+        {"place": {"factor": 0.0, "rotation": np.eye(3).tolist(), "shift": [0, 0, 0]}},
+        {"place": {"factor": 1.0, "rotation": np.ones((3, 3)).tolist(), "shift": [0, 0, 0]}},
+        {"place": {}},
+    ],
+)
+def test_a_wrong_shape_is_refused(wish: Wish, wrong: dict) -> None:
+    body = next(c.predictor.rest for c in wish.columns if c.predictor)
+    whole = fit_to_json(shape_from("volleyball", body))
+    with pytest.raises(InputError):
+        fit_from_json({**whole, **wrong}, body)
