@@ -65,8 +65,9 @@ def _simulate(args: argparse.Namespace) -> None:
     except ModuleNotFoundError as error:
         raise InputError(f"simulation needs {error.name}: pip install 'odeform[simulate]'") from None
     count = get_scene(args.scene).count if args.count is None else args.count
-    if count < 1 or args.workers < 1 or (args.rate is not None and not args.rate > 0):
-        raise InputError("simulate: expected --count and --workers of at least 1 and a positive --rate")
+    rate = 1.0 if args.rate is None else args.rate
+    if count < 1 or args.workers < 1 or args.seed < 0 or not 0.0 < rate < float("inf"):
+        raise InputError("simulate: expected --count and --workers of at least 1, --seed from 0 on, a positive --rate")
     dataset = simulate_dataset(args.scene, args.out, count, args.seed, args.workers, args.rate)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")

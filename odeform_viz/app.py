@@ -5,6 +5,7 @@ import io
 import socket
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -164,7 +165,13 @@ class App:
         self._worker.wake()
 
     def _record(self, path: str | None) -> None:
-        """Wish for a recording, or for its end; the worker sees to it, on whose thread everything is logged."""
+        """Wish for a recording, or for its end; the worker sees to it, on whose thread everything is logged.
+
+        Who types a name in the page may have forgotten what bears it: nothing is overwritten.
+        """
+        if path is not None and (Path(path).suffix != ".rrd" or Path(path).exists()):
+            self._take.show(None, 0, f"recording {path}: expected a name that ends in .rrd and is not taken yet")
+            return
         self._record_to = path
         self._worker.wake()
 
@@ -216,13 +223,14 @@ class App:
         column = next((c for c in wish.columns if c.shown and c.predictor), None)
         if column is None:
             raise InputError("export: no model is shown")
-        motion = self.session.motion(column, wish)
-        assert isinstance(motion, Motion)
-        if path.suffix == ".ply":
-            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
-            return path.with_name(f"{path.stem}_{0:05d}.ply")
-        write_motion(motion, self.session.schema.window.times, path, column.fit)
-        return path
+        with self.session.held() as session:
+            motion = session.motion(column, wish)
+            assert isinstance(motion, Motion)
+            if path.suffix == ".ply":
+                write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
+                return path.with_name(f"{path.stem}_{0:05d}.ply")
+            write_motion(motion, session.schema.window.times, path, column.fit)
+            return path
 
     def _serve(self) -> float | None:
         """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
@@ -230,6 +238,9 @@ class App:
             self._keep_recording()
             wish = self._wish()
             looks = self._read_looks()
+            if self._shape.arranging:
+                # what one drags is where the first column is, which then is where all are
+                looks = replace(looks, overlay=True)
             if self._shown is None or wish != self._shown.wish or looks != self._looks:
                 self._show(self.session.frame(wish), looks)
             elif not self._settled:

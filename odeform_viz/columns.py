@@ -71,7 +71,8 @@ class Columns:
                 lacks = self._lacks(column)
                 if column.truth is not None:
                     kept = [c for c in kept if c.truth is None]
-                label = f"{column.label} (no {', '.join(lacks)})" if lacks else column.label
+                note = f" (no {', '.join(lacks)})" if lacks else ""
+                label = column.label if note in column.label else column.label + note
                 taken = {c.place for c in kept if c.predictor}
                 place = next(n for n in itertools.count() if n not in taken)
                 label = _unused(label, {c.label for c in kept})

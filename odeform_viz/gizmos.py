@@ -74,8 +74,8 @@ class RegionGizmo:
                 scene.add_icosphere(at, region.radius, COLOR, subdivisions=2, wireframe=True, cast_shadow=False)
             else:
                 scene.add_box(at, COLOR, region.size, wireframe=True, cast_shadow=False)
+            self._shown = region, controls
         controls.on_update(lambda _: self._moved())
-        self._shown = region, controls
 
     def hide(self) -> None:
         if self._shown is not None:
@@ -104,6 +104,10 @@ class PlaceGizmo:
         self._server, self._moved = server, moved
         self._controls: viser.TransformControlsHandle | None = None
 
+    @property
+    def shown(self) -> bool:
+        return self._controls is not None
+
     def show(self, fit: Fit) -> None:
         points = np.asarray(fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -115,7 +119,7 @@ class PlaceGizmo:
             self._server.scene.add_point_cloud(
                 f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.004 * size, point_shape="circle", precision="float32"
             )
-        self._controls = controls
+            self._controls = controls
         foot = start - [0.0, 0.0, fit.lift]  # what is lifted is moved where it stands
 
         def dragged(event: viser.TransformControlsEvent) -> None:

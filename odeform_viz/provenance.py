@@ -10,7 +10,7 @@ from odeform.types import GaussianSplats, Geometry, Mesh
 from odeform_viz.columns import Column
 from odeform_viz.shaping import fit_to_json
 
-__all__ = ["provenance_of", "versions"]
+__all__ = ["origin_of", "provenance_of", "versions"]
 
 
 def versions() -> dict[str, str]:
@@ -29,19 +29,18 @@ def provenance_of(column: Column) -> dict[str, Any]:
     truth = column.truth
     common = {
         "label": column.label,
+        "origin": origin_of(column),
         "pinned": None if column.pinned is None else dict(column.pinned),
         "geometry": _kind(column.geometry),
         "shape": column.fit and fit_to_json(column.fit),
     }
     if truth is not None:
-        origin = _sequence_origin(column.origin)
-        return {**common, "truth": True, "origin": origin, "parameters": dict(truth.parameters)}
+        return {**common, "truth": True, "parameters": dict(truth.parameters)}
     assert column.predictor is not None
     checkpoint = column.predictor.checkpoint
     return {
         **common,
         "truth": False,
-        "origin": _checkpoint_origin(column.origin),
         "model": checkpoint.model,
         "sha256": checkpoint.sha256,
         "schema": checkpoint.schema.to_json(),
@@ -54,14 +53,14 @@ def _kind(geometry: Geometry) -> str:
     return "mesh" if isinstance(geometry, Mesh) else "splats" if isinstance(geometry, GaussianSplats) else "points"
 
 
-def _checkpoint_origin(origin: str) -> str:
-    if not origin or resolve_checkpoint(origin) in bundled_checkpoints().values():
-        return origin
-    return str(Path(origin).resolve())
-
-
-def _sequence_origin(origin: str) -> str:
-    root, _, name = origin.rpartition("/")
+def origin_of(column: Column) -> str:
+    """The checkpoint or the DATASET/NAME of a column: bundled ones by name, others by their whole path."""
+    if not column.origin:
+        return ""
+    if column.truth is None:
+        bundled = resolve_checkpoint(column.origin) in bundled_checkpoints().values()
+        return column.origin if bundled else str(Path(column.origin).resolve())
+    root, _, name = column.origin.rpartition("/")
     place = Path(root)
     here = place.is_file() or (place / INDEX).exists()
-    return f"{place.resolve()}/{name}" if origin and here else origin
+    return f"{place.resolve()}/{name}" if here else column.origin

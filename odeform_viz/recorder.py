@@ -45,6 +45,7 @@ class _Form:
 
     name: str
     column: Column
+    number: int
     motion: Motion | RecordedMotion | None = None
     points: Points | None = None
     frame: int = -1
@@ -59,7 +60,7 @@ class Recorder:
         """`InputError` for a place where nothing can be written."""
         self.path = Path(path)
         self.frames = 0
-        self._forms: dict[int, list[_Form]] = {}
+        self._forms: dict[int, _Form] = {}
         self._present: dict[str, _Form] = {}
         self._still: Geometry | None = None
         try:
@@ -84,15 +85,14 @@ class Recorder:
         """`InputError` where no more can be written; the recording is then over, and whole up to its last second."""
         self._stream.set_time(SHOWN, sequence=self.frames)
         self._stream.set_time(MOTION, duration=frame.wish.time)
-        known = sum(map(len, self._forms.values()))
+        known = list(self._forms.values())
         shown = [(self._form(column), column) for column in frame.columns]
-        if sum(map(len, self._forms.values())) > known:
-            blueprint = _blueprint(forms[-1] for forms in self._forms.values())
-            self._stream.send_blueprint(blueprint, make_default=True)
+        if list(self._forms.values()) != known:
+            self._stream.send_blueprint(_blueprint(self._forms.values()), make_default=True)
         present = {form.name: form for form, _ in shown}
         for name in self._present.keys() - present.keys():
             self._stream.log(f"{WORLD}/{name}", rr.Clear(recursive=True))
-            self._present[name].points = None
+            self._present[name].points = self._present[name].motion = None
         self._present = present
         self._log_still(frame)
         for name, value in frame.wish.parameters.items():
@@ -138,14 +138,15 @@ class Recorder:
         self._stream.log(path, rr.TextDocument(json.dumps(value, indent=1)), static=static)
 
     def _form(self, shown: ColumnFrame) -> _Form:
-        """The column with its present shape; what stays is logged when it first appears."""
+        """The column with its present shape; what stays is logged when it first appears. Earlier shapes are let go."""
         column = shown.column
-        forms = self._forms.setdefault(column.key, [])
-        if not forms or forms[-1].column.geometry is not column.geometry:
+        form = self._forms.get(column.key)
+        if form is None or form.column.geometry is not column.geometry:
             # named by key: labels have spaces and signs that mean something in paths
-            forms.append(_Form(f"column_{column.key}/form_{len(forms)}", column))
-            self._log_static(forms[-1], color_of(column))
-        return forms[-1]
+            number = 0 if form is None else form.number + 1
+            form = self._forms[column.key] = _Form(f"column_{column.key}/form_{number}", column, number)
+            self._log_static(form, color_of(column))
+        return form
 
     def _log_static(self, form: _Form, color: Color) -> None:
         column, name = form.column, form.name

@@ -53,7 +53,8 @@ class Checked:
 
     def agrees(self, tolerance: float, ended: bool) -> bool:
         """A recording that was not ended may lack something of its last frames."""
-        return not self.problem and self.off <= tolerance and not (self.missing and ended)
+        lacks = self.missing and (ended or not self.frames)
+        return not self.problem and self.off <= tolerance and not lacks
 
     def describe(self) -> str:
         if self.skipped or (self.problem and not self.frames):
@@ -79,6 +80,8 @@ def check_recording(recording: Recording) -> list[Checked]:
 def _check(recording: Recording) -> list[Checked]:
     columns, checked = _columns(recording)
     wanted = _wanted(recording)
+    if lost := {name for name, _ in wanted} - checked.keys():
+        raise InputError(f"recording {recording.path}: nothing says what {', '.join(sorted(lost))} is")
     session = Session(next(iter(columns.values())).source.schema) if columns else None
     for name, sent, points in recording.points():
         for frame in wanted.pop((name, sent), ()):
@@ -93,8 +96,7 @@ def _check(recording: Recording) -> list[Checked]:
             shown = points @ pose[:3, :3].T + pose[:3, 3]
             checked[name].compare(frame, wish.time, shown, again)
     for (name, _), frames in wanted.items():
-        if name in checked:
-            checked[name].missing += len(frames)
+        checked[name].missing += len(frames)
     return list(checked.values())
 
 
@@ -115,7 +117,9 @@ def _columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Checked
     """The columns that can be computed again, by name, and an account of all."""
     models: dict[str, Predictor] = {}
     columns, checked = {}, {}
-    for key, (name, facts) in enumerate(sorted(recording.columns.items())):
+    for name, facts in sorted(recording.columns.items()):
+        # shapes that one column had in turn share a key, so that no more than one motion of it is kept
+        key = int(name.partition("/")[0].removeprefix("column_"))
         checked[name] = account = Checked(str(facts["label"]))
         origin = str(facts["origin"])
         if not origin:

@@ -195,6 +195,8 @@ class SceneView:
                 # columns stand in a row across the default heading, from left to right
                 place = 0.0 if looks.overlay else 1.6 * self._size * (0.5 * (len(frame.columns) - 1) - index)
                 view.show(shown, place, GHOST if looks.overlay and index else None, frame.truth, heat)
+                if self._still is not None and shown.column.fit and shown.column.fit.still is self._still[0]:
+                    self._still[1].position = (0.0, place, 0.0)
                 view.title(title_of(shown) if several and not looks.overlay else None)
             self._world.position = self._offset(frame, looks)
         self._server.flush()

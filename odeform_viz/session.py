@@ -1,7 +1,8 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -197,6 +198,12 @@ class Session:
         rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
         return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
 
+    @contextmanager
+    def held(self) -> Iterator["Session"]:
+        """To ask motions for more than a frame: they are extended and answer one at a time."""
+        with self._lock:
+            yield self
+
     @property
     def times(self) -> Times:
         """The moments of curves: the frames of the window, and on to where one can look."""
@@ -206,11 +213,12 @@ class Session:
     def curves(self, shown: ColumnFrame, wish: Wish) -> Curves:
         """Of the whole motion that a column shows; made once for each."""
         truth = self.truth_of(shown.column, wish)
-        known = self._curves.get(shown.column.key)
-        if known is None or known[0] is not shown.motion or known[1] is not truth:
-            made = self._make_curves(shown, truth, wish)
-            known = self._curves[shown.column.key] = (shown.motion, truth, made)
-        return known[2]
+        with self._lock:
+            known = self._curves.get(shown.column.key)
+            if known is None or known[0] is not shown.motion or known[1] is not truth:
+                made = self._make_curves(shown, truth, wish)
+                known = self._curves[shown.column.key] = (shown.motion, truth, made)
+            return known[2]
 
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, wish: Wish) -> Curves:
         motion, times = shown.motion, self.times
@@ -233,4 +241,5 @@ class Session:
             return wish.time
         window = self.schema.window
         times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
-        return float(times[np.argmax(self.motion(column, wish).deformation_rms(times))])
+        with self._lock:
+            return float(times[np.argmax(self.motion(column, wish).deformation_rms(times))])

@@ -40,7 +40,9 @@ def shape_from(name: str | Path, body: Mesh) -> Fit:
 def fit_to_json(fit: Fit) -> dict[str, Any]:
     """Where a shape comes from, what moves of it and how it lies, in plain values."""
     region = None if fit.region is None else region_to_json(fit.region)
-    return {"origin": fit.origin, "region": region, "place": fit.place.to_json()}
+    file = Path(fit.origin)
+    origin = str(file.resolve()) if file.is_file() else fit.origin
+    return {"origin": origin, "region": region, "place": fit.place.to_json()}
 
 
 def fit_from_json(raw: Mapping[str, Any], body: Mesh) -> Fit:

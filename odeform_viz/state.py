@@ -3,13 +3,15 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import odeform
 from odeform.errors import InputError
+from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform_viz.columns import Column, truth_column
+from odeform_viz.provenance import origin_of
 from odeform_viz.session import Looks, Wish
 from odeform_viz.shaping import fit_to_json
 
@@ -22,7 +24,7 @@ FORMAT = 1
 class PageState:
     """Plain values: what the sliders say, and the columns by where they come from.
 
-    A column is `{"origin", "label", "pinned", "shown"}`; `truth` is the DATASET/NAME of a sequence, or empty;
+    A column is `{"origin", "label", "pinned", "shown", "truth"}`, of a checkpoint or of a sequence DATASET/NAME;
     `shape` is `{"origin", "region", "place"}` of a foreign shape.
     """
 
@@ -31,7 +33,6 @@ class PageState:
     time: float
     quality: str
     columns: tuple[Mapping[str, Any], ...] = ()
-    truth: str = ""
     shape: Mapping[str, Any] | None = None
     overlay: bool = False
     heat: bool = True
@@ -54,11 +55,16 @@ def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
         wish.time,
         wish.quality,
         tuple(
-            {"origin": c.origin, "label": c.label, "pinned": c.pinned and dict(c.pinned), "shown": c.shown}
+            {
+                "origin": origin_of(c),
+                "label": c.label,
+                "pinned": c.pinned and dict(c.pinned),
+                "shown": c.shown,
+                "truth": c.truth is not None,
+            }
             for c in wish.columns
-            if c.predictor
+            if c.predictor or c.origin
         ),
-        truth.origin if truth else "",
         fit_to_json(fit) if fit and fit.origin else None,
         looks.overlay,
         looks.heat,
@@ -70,19 +76,17 @@ def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
 def columns_of(state: PageState, schema: Schema) -> list[Column]:
     """The columns of a state, of the bodies they were trained on. `InputError` where a checkpoint is missing."""
     schema.complete(state.parameters)
-    models = {name: odeform.load(str(name)) for name in {column["origin"] for column in state.columns}}
-    columns = [
-        Column(
-            str(c["label"]),
-            models[c["origin"]],
-            models[c["origin"]].rest,
-            pinned=None if c["pinned"] is None else schema.complete(c["pinned"]),
-            origin=str(c["origin"]),
-            shown=bool(c["shown"]),
-        )
-        for c in state.columns
-    ]
-    return [*columns, truth_column(state.truth)] if state.truth else columns
+    models = {c["origin"]: odeform.load(c["origin"]) for c in state.columns if not c["truth"]}
+    return [_column(raw, models, schema) for raw in state.columns]
+
+
+def _column(raw: Mapping[str, Any], models: Mapping[str, Predictor], schema: Schema) -> Column:
+    if raw["truth"]:
+        return replace(truth_column(raw["origin"]), shown=bool(raw["shown"]))
+    model = models[raw["origin"]]
+    pinned = None if raw["pinned"] is None else schema.complete(raw["pinned"])
+    shown = bool(raw["shown"])
+    return Column(str(raw["label"]), model, model.rest, pinned=pinned, origin=raw["origin"], shown=shown)
 
 
 def state_to_json(state: PageState) -> bytes:
@@ -104,13 +108,16 @@ def state_from_json(data: bytes, scene: str) -> PageState:
         if state.scene != scene:
             raise InputError(f"state: it is of scene {state.scene}, not {scene}")
         for column in state.columns:
-            if set(column) != {"origin", "label", "pinned", "shown"}:
-                raise InputError(f"state: a column with {', '.join(column)}; expected origin, label, pinned, shown")
+            if set(column) != {"origin", "label", "pinned", "shown", "truth"}:
+                wanted = "expected origin, label, pinned, shown, truth"
+                raise InputError(f"state: a column with {', '.join(column)}; {wanted}")
             if not isinstance(column["pinned"], dict | None) or not isinstance(column["origin"], str):
                 raise InputError(f"state: column {column['label']}: expected a name and parameters by name")
         if state.shape is not None and set(state.shape) != {"origin", "region", "place"}:
             raise InputError("state: a shape; expected its origin, region and place")
-        if all(column["pinned"] is not None for column in state.columns):
+        if not isinstance(state.quality, str):
+            raise InputError(f"state: expected the name of a quality, got {state.quality}")
+        if all(column["truth"] or column["pinned"] is not None for column in state.columns):
             raise InputError("state: no model under the sliders")
         return state
     except InputError:

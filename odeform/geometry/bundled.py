@@ -23,7 +23,8 @@ def region_beside(path: Path) -> Path:
 def read_shape(name: str | Path) -> tuple[Geometry, Region | None]:
     """The shape of a file, or the bundled one of that name, and the region kept beside it, in its units and axes."""
     path = Path(name)
-    if not path.exists():
+    if not path.is_file():
         path = bundled_shapes().get(str(name), path)
+    geometry = read_geometry(path)
     beside = region_beside(path)
-    return read_geometry(path), read_region(beside) if beside.is_file() else None
+    return geometry, read_region(beside) if beside.is_file() else None

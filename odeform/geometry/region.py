@@ -9,10 +9,13 @@ import numpy as np
 from jaxtyping import Bool
 
 from odeform.errors import InputError
+from odeform.geometry.rigid import is_rotation
 from odeform.geometry.similarity import Similarity
 from odeform.types import Points, Rotations, Vector
 
 __all__ = ["Box", "Mask", "Region", "Sphere", "read_region", "region_from_json", "region_to_json"]
+
+SHAPES = {"centre": (3,), "radius": (), "size": (3,), "rotation": (3, 3)}
 
 Mask = Bool[np.ndarray, " points"]
 
@@ -65,15 +68,17 @@ def region_from_json(raw: Any) -> Region:
     try:
         ((kind, values),) = raw.items()
         numbers = {name: np.asarray(value, dtype=float) for name, value in values.items()}
-        if not all(np.isfinite(value).all() for value in numbers.values()):
-            raise ValueError("not finite")
+        for name, value in numbers.items():
+            if value.shape != SHAPES[name] or not np.isfinite(value).all():
+                raise ValueError(f"{name}: expected finite numbers {SHAPES[name]}")
+        if "rotation" in numbers and not is_rotation(numbers["rotation"]):
+            raise ValueError("rotation: expected one")
         if kind == "sphere":
             region: Region = Sphere(numbers["centre"], float(numbers["radius"]))
         elif kind == "box":
             region = Box(numbers["centre"], numbers["size"], numbers["rotation"])
         else:
             raise ValueError(f"got {kind!r}")
-        region.inside(np.zeros((1, 3)))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"region: expected a sphere or a box in JSON: {error}") from None
     return region

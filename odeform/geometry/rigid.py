@@ -3,15 +3,28 @@
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Perpoint, Points, Rotations, Vectors
+from odeform.types import Floats, Perpoint, Points, Rotations, Vectors
 
-__all__ = ["best_rigid", "rotation_from_vector", "rotation_z", "unwrapped_vectors", "vector_from_rotation"]
+__all__ = [
+    "best_rigid",
+    "is_rotation",
+    "rotation_from_vector",
+    "rotation_z",
+    "unwrapped_vectors",
+    "vector_from_rotation",
+]
 
 
 def rotation_z(angle: float) -> Rotations:
     """(3, 3) rotation by `angle` radians about the vertical axis."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def is_rotation(matrix: Floats) -> bool:
+    """Whether a matrix is (3, 3), orthonormal within 1e-6 and no reflection."""
+    square = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+    return bool(square and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0.0)
 
 
 def rotation_from_vector(vector: Vectors) -> Rotations:

@@ -9,9 +9,9 @@ from scipy.spatial import KDTree
 from odeform.geometry.parts import joined, split
 from odeform.geometry.region import Region
 from odeform.geometry.similarity import UPRIGHT, Similarity
-from odeform.types import Floats, Geometry, Mesh, Perpoint, Points, Rotations
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Perpoint, Points, Rotations
 
-__all__ = ["Fit", "difference", "fit_to", "surface_shares"]
+__all__ = ["Fit", "difference", "fit_to", "surface_shares", "together"]
 
 SURROUNDED = 0.2  # of a unit vector: what surrounds a part evenly tells no direction
 
@@ -82,8 +82,9 @@ def fit_to(
     lift = 0.0 if left is None else float(np.asarray(reference.points)[:, 2].min())
     if place is None:
         points = np.asarray(part.points, dtype=float)
+        if left is not None or isinstance(geometry, GaussianSplats):
+            points = together(points)
         if left is not None:
-            points = _together(points)
             rotation = UPRIGHT[_up(points, np.asarray(left.points, dtype=float))] if rotation is None else rotation
         place = _standing(points, rotation, np.asarray(reference.points, dtype=float), lift)
     fitted = place.shape(part)
@@ -104,7 +105,7 @@ def _standing(points: Points, rotation: Rotations | None, target: Floats, lift: 
     return Similarity(factor, rotation, goal - factor * foot)
 
 
-def _together(points: Floats) -> Floats:
+def together(points: Floats) -> Floats:
     """Without those far off, as captures have them: beyond half as far again as 19 of 20 are from the middle."""
     away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     return points[away <= 1.5 * np.quantile(away, 0.95)]

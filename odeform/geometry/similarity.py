@@ -7,7 +7,7 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.geometry.harmonics import rotated_harmonics
-from odeform.geometry.rigid import rotation_from_vector
+from odeform.geometry.rigid import is_rotation, rotation_from_vector
 from odeform.types import Floats, GaussianSplats, Geometry, Rotations, Vector, Vectors
 
 __all__ = ["UPRIGHT", "Similarity"]
@@ -48,15 +48,11 @@ class Similarity:
     def from_json(cls, raw: Any) -> "Similarity":
         """`InputError` for what is no similarity."""
         try:
-            factor, rotation, shift = (
-                float(raw["factor"]),
-                np.array(raw["rotation"], float),
-                np.array(raw["shift"], float),
-            )
-            turns = rotation.shape == (3, 3) and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
-            sound = turns and shift.shape == (3,) and np.isfinite(shift).all() and np.isfinite(factor) and factor > 0.0
+            factor = float(raw["factor"])
+            rotation, shift = np.array(raw["rotation"], dtype=float), np.array(raw["shift"], dtype=float)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"similarity: expected factor, rotation and shift: {error!r}") from None
+        sound = is_rotation(rotation) and 0.0 < factor < np.inf and shift.shape == (3,) and np.isfinite(shift).all()
         if not sound:
             raise InputError("similarity: expected a factor above 0, a rotation matrix (3, 3) and a shift (3,)")
         return cls(factor, rotation, shift)

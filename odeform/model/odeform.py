@@ -31,10 +31,12 @@ class ODeform(ReducedModel):
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
 
     def _pool(self, placed: PlacedBasis) -> list[Floats]:
-        if self._pooled[0] is not placed:
+        known, pooled = self._pooled
+        if known is not placed:
             points = placed.rest.astype(float) / self.space.arm
-            self._pooled = (placed, pool_shape(self.weights, self.config, points, placed.shares))
-        return self._pooled[1]
+            pooled = pool_shape(self.weights, self.config, points, placed.shares)
+            self._pooled = (placed, pooled)
+        return pooled
 
     def _trajectory(
         self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float

@@ -7,8 +7,13 @@ import torch
 
 __all__ = ["NormalEquations", "random_layer"]
 
-SPREAD = 0.15
-"""Of the random directions, per unit of standard deviation of what they see: features bend over several of them."""
+STATE_GAINS = (0.3, 3.0)
+PARAMETER_GAINS = (1.0, 5.0)
+"""How sharply features bend, per standard deviation of the principal components together and per unit of parameters.
+
+Each draws its own between these, alike on a logarithmic scale. Where a bounce sends a body depends on the parameters
+more finely than the motion until then does.
+"""
 
 
 class NormalEquations:
@@ -51,7 +56,12 @@ def random_layer(
     squeeze[:components, :split] = gains[:, None] * vectors.T
     squeeze[components:, split:] = torch.eye(parameters, dtype=torch.float64)
     offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(parameters, dtype=torch.float64)])
-    directions = SPREAD * torch.randn(count, components + parameters, generator=generator, dtype=torch.float64)
-    biases = 2.0 * torch.rand(count, generator=generator, dtype=torch.float64) - 1.0
-    layers = {"0.weight": squeeze, "0.bias": offset, "2.weight": directions, "2.bias": biases}
+    draw = {"generator": generator, "dtype": torch.float64, "device": generator.device}
+    directions, reach = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
+    for width, (low, high) in ((components, STATE_GAINS), (parameters, PARAMETER_GAINS)):
+        gains = low * (high / low) ** torch.rand(count, **draw)
+        directions.append(gains[:, None] / width**0.5 * torch.randn(count, width, **draw))
+        reach += gains**2
+    biases = reach.sqrt() * (2.0 * torch.rand(count, **draw) - 1.0)
+    layers = {"0.weight": squeeze, "0.bias": offset, "2.weight": torch.cat(directions, dim=1), "2.bias": biases}
     return {name: value.float() for name, value in layers.items()}

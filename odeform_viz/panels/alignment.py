@@ -9,7 +9,7 @@ from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.gizmos import PlaceGizmo, Vantage
-from odeform_viz.panels.by_hand import on_hand
+from odeform_viz.panels.by_hand import HANDS, in_turn, on_hand
 
 __all__ = ["AlignmentPanel"]
 
@@ -25,9 +25,11 @@ class AlignmentPanel:
         hold: Callable[[], None],
         turn: Callable[[Rotations | None], None],
         put: Callable[[Similarity], None],
+        changed: Callable[[], None],
     ) -> None:
-        """`hold` stops at rest; `turn` fits the shape anew under a rotation, or as guessed; `put` takes a place."""
-        self._hold, self._turn, self._put = hold, turn, put
+        """`hold` stops at rest; `turn` fits the shape anew under a rotation, or as guessed; `put` takes a place;
+        `changed` is called when arrows and rings come or go."""
+        self._hold, self._turn, self._put, self._changed = hold, turn, put, changed
         self._fit: Fit | None = None
         self._guess = 1.0
         self._gizmo, self._vantage = PlaceGizmo(server, self._dragged), Vantage(server)
@@ -42,8 +44,8 @@ class AlignmentPanel:
             back = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
         on_hand(self._up, self._upright)
         on_hand(self._size, self._scale)
-        on_hand(self._drag, self._show_gizmo)
-        back.on_click(lambda _: self._turn(None))
+        on_hand(self._drag, self._toggled)
+        back.on_click(in_turn(lambda: self._turn(None)))
 
     def show(self, fit: Fit | None, guess: float) -> None:
         """How a shape lies, None for the body that was trained; and the factor that was guessed."""
@@ -57,10 +59,22 @@ class AlignmentPanel:
             self._size.value = round(100.0 * fit.place.factor / guess, 2)
         self._show_gizmo()
 
+    @property
+    def dragging(self) -> bool:
+        """Whether arrows and rings are on show."""
+        return self._gizmo.shown
+
+    def _toggled(self) -> None:
+        self._show_gizmo()
+        self._changed()
+
     def _show_gizmo(self) -> None:
         if self._fit is not None and self._drag.value:
             self._hold()
+            appears = not self._gizmo.shown
             self._gizmo.show(self._fit)
+            if not appears:
+                return  # the view may have been turned to reach another ring
             points = np.asarray(self._fit.geometry.points, dtype=float)
             low, high = points.min(axis=0), points.max(axis=0)
             self._vantage.look(0.5 * (low + high), 1.2 * float((high - low).max()))
@@ -84,5 +98,6 @@ class AlignmentPanel:
         self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.place)
 
     def _dragged(self, motion: Similarity) -> None:
-        if self._fit is not None:
-            self._put(motion @ self._fit.place)
+        with HANDS:
+            if self._fit is not None:
+                self._put(motion @ self._fit.place)

@@ -1,20 +1,34 @@
-"""Controls that the viewer itself sets too: telling its hand from the user's."""
+"""Controls that the viewer itself sets too: telling its hand from the user's, and one hand from the next."""
 
+import threading
 from collections.abc import Callable
 
 import viser
 
-__all__ = ["on_hand"]
+__all__ = ["HANDS", "in_turn", "on_hand"]
 
 Control = viser.GuiDropdownHandle | viser.GuiCheckboxHandle | viser.GuiSliderHandle | viser.GuiNumberHandle
 Controls = Control | viser.GuiVector3Handle
 
+HANDS = threading.RLock()
+"""Callbacks run side by side; those that build on what is there take turns, and then read the newest values."""
+
+
+def in_turn(action: Callable[[], None]) -> Callable[[object], None]:
+    """A callback, of a button or the like, that waits for its turn."""
+
+    def called(_: object) -> None:
+        with HANDS:
+            action()
+
+    return called
+
 
 def on_hand(control: Controls, action: Callable[[], None]) -> None:
-    """Call `action` when a user changes a control, not when the viewer does."""
+    """Call `action` in turn when a user changes a control, not when the viewer does."""
 
     def changed(event: viser.GuiEvent) -> None:
         if event.client_id is not None:
-            action()
+            in_turn(action)(event)
 
     control.on_update(changed)

@@ -107,8 +107,8 @@ class ComparePanel:
     def _add(self) -> None:
         if self._model.value not in self._models:
             raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
-        like = self._first()
         predictor = odeform.load(self._models[self._model.value])
+        like = self._first()
         shape = like.geometry if like.fit else predictor.rest
         self._columns.add(Column(predictor.model, predictor, shape, origin=self._model.value, fit=like.fit))
 

@@ -1,15 +1,14 @@
 """Which part of a shape moves: all of it, or what lies in a sphere or a box that one drags."""
 
-import threading
 from collections.abc import Callable
 
 import numpy as np
 import viser
 
 from odeform.geometry.region import Box, Region, Sphere
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import Fit, together
 from odeform_viz.gizmos import RegionGizmo, Vantage, reach_of
-from odeform_viz.panels.by_hand import on_hand
+from odeform_viz.panels.by_hand import HANDS, in_turn, on_hand
 
 __all__ = ["PartPanel", "region_like"]
 
@@ -21,13 +20,17 @@ class PartPanel:
     """Shows a region over the whole shape at rest; says how much it holds; hands it on when told to."""
 
     def __init__(
-        self, server: viser.ViserServer, whole: Callable[[], Fit | None], use: Callable[[Region | None], None]
+        self,
+        server: viser.ViserServer,
+        whole: Callable[[], Fit | None],
+        use: Callable[[Region | None], None],
+        changed: Callable[[], None],
     ) -> None:
-        """`whole` lays the whole shape out at rest and returns its fit; `use` makes a region's part move, or all."""
-        self._whole, self._use = whole, use
+        """`whole` lays the whole shape out at rest and returns its fit; `use` makes a region's part move, or all;
+        `changed` is called when a region comes up."""
+        self._whole, self._use, self._changed = whole, use, changed
         self._fit: Fit | None = None
         self._gizmo, self._vantage = RegionGizmo(server, self._count), Vantage(server)
-        self._lock = threading.Lock()
         gui = server.gui
         self._folder = gui.add_folder("Part that moves", expand_by_default=False, visible=False)
         with self._folder:
@@ -40,9 +43,14 @@ class PartPanel:
         on_hand(self._kind, lambda: self._choose(self._kind.value))
         on_hand(self._radius, self._resize)
         on_hand(self._edges, self._resize)
-        self._go.on_click(lambda _: self._take())
-        self._change.on_click(lambda _: self._choose(self._kind.value))
+        self._go.on_click(in_turn(self._take))
+        self._change.on_click(in_turn(lambda: self._choose(self._kind.value)))
         self._choosing(False)
+
+    @property
+    def choosing(self) -> bool:
+        """Whether a region is on show."""
+        return self._gizmo.region is not None
 
     def show(self, fit: Fit | None) -> None:
         """What moves now; None for the body that was trained."""
@@ -80,6 +88,7 @@ class PartPanel:
         self._gizmo.show(shown)
         self._choosing(True)
         self._count()
+        self._changed()
 
     def _resize(self) -> None:
         region = self._gizmo.region
@@ -98,7 +107,7 @@ class PartPanel:
         return None if region is None or self._fit is None else region.moved(self._fit.place.inverse)
 
     def _count(self) -> None:
-        with self._lock:  # the last to get in reads the newest place
+        with HANDS:  # the last to get in reads the newest place
             region = self._chosen()
             if region is not None and self._fit is not None:
                 inside = int(region.inside(self._fit.source.points).sum())
@@ -127,5 +136,5 @@ def _kind_of(region: Region | None) -> str:
 
 
 def _extent(fit: Fit) -> float:
-    """The largest of the whole shape, in the units of the file."""
-    return float(np.ptp(np.asarray(fit.source.points, dtype=float), axis=0).max())
+    """The largest of the whole shape but for what lies far off, in the units of the file."""
+    return float(np.ptp(together(np.asarray(fit.source.points, dtype=float)), axis=0).max())

@@ -1,5 +1,6 @@
 """What one takes away: a recording, the state of the page, the motion as a file."""
 
+import itertools
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -32,7 +33,8 @@ class RecordPanel:
         self._record, self._say = record, say
         gui = server.gui
         with gui.add_folder("Recording"):
-            self._path = gui.add_text("file", f"odeform-{scene}.rrd", hint="where the viewer runs")
+            self._stem = f"odeform-{scene}"
+            self._path = gui.add_text("file", f"{self._stem}.rrd", hint="where the viewer runs")
             self._start = gui.add_button("Start recording", icon=viser.Icon.PLAYER_RECORD)
             self._stop = gui.add_button("Stop recording", icon=viser.Icon.PLAYER_STOP, visible=False)
             self._start.on_click(lambda _: record(self._path.value))
@@ -61,6 +63,9 @@ class RecordPanel:
     def finished(self, recording: str, frames: int) -> None:
         self.show(None, 0)
         self._said.content = f"`{recording}`, {frames} frames: `odeform-viz --replay {recording}` checks it"
+        done = Path(recording)
+        free = (done.with_stem(f"{self._stem}-{n}") for n in itertools.count(2))
+        self._path.value = str(next(path for path in free if not path.exists()))
 
     def _guarded(self, action: Callable[[], None]) -> None:
         try:

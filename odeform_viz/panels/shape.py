@@ -16,6 +16,7 @@ from odeform.geometry.similarity import Similarity
 from odeform.types import Mesh, Rotations
 from odeform_viz.columns import Columns
 from odeform_viz.panels.alignment import AlignmentPanel
+from odeform_viz.panels.by_hand import HANDS, in_turn
 from odeform_viz.panels.part import PartPanel
 from odeform_viz.shaping import describe_fit, shape_from
 
@@ -53,15 +54,16 @@ class ShapePanel:
             for name in bundled_shapes():
                 button = gui.add_button(f"Move the bundled {name}", color="gray", hint="Gaussian splats")
                 button.on_click(lambda _, name=name: self._guarded(lambda: self._read(name, name, kept=True)))
-            self._part = PartPanel(server, self._lay_out, self._use)
-            self._alignment = AlignmentPanel(server, hold, self._turn, self._put)
+            self._part = PartPanel(server, self._lay_out, self._use, changed)
+            self._alignment = AlignmentPanel(server, hold, self._turn, self._put, changed)
             self._back = gui.add_button("Back to the trained body", color="gray", visible=False)
-            self._back.on_click(lambda _: self._return())
+            self._back.on_click(in_turn(self._return))
         self._show()
 
     def _guarded(self, action: Callable[[], None]) -> None:
         try:
-            action()
+            with HANDS:
+                action()
         except (InputError, OSError) as error:
             self._say(str(error))
             self._text.content = f"⚠ **{error}**"  # what is said elsewhere goes with the next frame
@@ -85,9 +87,16 @@ class ShapePanel:
 
     def set(self, fit: Fit | None) -> None:
         """Another shape, or the same in another part or place; None for the body that was trained."""
-        if fit is not None:
-            self._name, self._turned = fit.origin, fit.place.rotation
-        self._adopt(fit)
+        with HANDS:
+            if fit is not None:
+                self._name, self._turned = fit.origin, fit.place.rotation
+                self._guess = fit_to(fit.source, self._body, fit.region, fit.place.rotation).place.factor
+            self._adopt(fit, guessed=False)
+
+    @property
+    def arranging(self) -> bool:
+        """Whether a hand is choosing a part or putting the shape into place."""
+        return self._part.choosing or self._alignment.dragging
 
     def _adopt(self, fit: Fit | None, guessed: bool = True) -> None:
         self._fit = fit

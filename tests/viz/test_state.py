@@ -18,6 +18,8 @@ from odeform_viz.shaping import fit_from_json, fit_to_json, shape_from
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 
 SCENE = "mass-elastic"
+MODEL = {"origin": SCENE, "label": "m", "pinned": None, "shown": True, "truth": False}
+TRUTH = {**MODEL, "origin": "nowhere/x", "truth": True}
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +65,7 @@ def test_other_files_are_refused(wish: Wish, broken: Callable[[dict], bytes], sa
         state_from_json(broken(whole), SCENE)
 
 
-@pytest.mark.parametrize("wrong", [{"parameters": {"mass": "x"}}, {"parameters": [1]}, {"truth": "nowhere/x"}])
+@pytest.mark.parametrize("wrong", [{"parameters": {"mass": "x"}}, {"parameters": [1]}, {"columns": [MODEL, TRUTH]}])
 def test_wrong_values_are_refused_when_columns_are_made(wish: Wish, wrong: dict) -> None:
     raw = {**json.loads(state_to_json(capture(SCENE, wish, Looks()))), **wrong}
     with pytest.raises(InputError):
