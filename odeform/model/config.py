@@ -22,7 +22,7 @@ class ModelConfig:
     rigid_width: int = 64
     local_width: int = 128
     decoder_widths: tuple[int, ...] = (512,)
-    components: int = 40
+    components: int = 16
     """Principal components of what a decoder sees, of which its random features are made."""
     random_features: int = 0
     """Of each decoder; they are added when the rest is trained."""

@@ -10,6 +10,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
+from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ from odeform.types import Arrays
 __all__ = ["TrainConfig", "build_network", "network_weights", "train_network"]
 
 CHUNK = 64  # sequences rolled out at once where no gradients are wanted
-FREE = ("minutes", "steps", "report", "random_features", "components", "last_ridges", "refine")
+FREE = ("minutes", "steps", "report", "random_features", "sharpnesses", "components", "last_ridges", "refine")
 """Settings that may change when a training is resumed: of its length, and of what is solved for at its end."""
 
 
@@ -55,10 +56,12 @@ class TrainConfig:
     """Share of the motion that is rolled out at first, and share of the time in which it grows to the whole."""
     ridge: float = 1e-6
     """Of the readout's least squares, relative to the mean square of a feature."""
-    random_features: int = 1500
+    random_features: int = 3000
     """Of each decoder, added at the end."""
-    last_ridges: tuple[float, ...] = (1e-6, 1e-8, 1e-10)
-    """Of the last solve, in which validation chooses for each decoder."""
+    sharpnesses: tuple[float, ...] = (1.0, 2.0)
+    """Of random features: among these and `last_ridges`, validation chooses for each decoder."""
+    last_ridges: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+    """Of the last solve."""
     longest: float = 0.01
     """Seconds; longer frames are integrated in several steps while descending."""
     refine: int = 3
@@ -213,6 +216,23 @@ class _Trainer:
         self.truth, self.theta = ({k: v.double() for k, v in x.items()} for x in (self.truth, self.theta))
         self.shape = self.shape[0].double(), self.shape[1].double()
         net.widen(self.config.random_features)
+        best = [float("inf") for _ in net.decoders]
+        kept = [decoder.state_dict() for decoder in net.decoders]
+        for sharpness in self.config.sharpnesses:
+            self._draw_features(sharpness)
+            all_of = self.equations()
+            for ridge in self.config.last_ridges:
+                for equations, decoder in zip(all_of, net.decoders, strict=True):
+                    decoder.readout.weight.data = equations.solve(ridge)
+                errors = self.errors_mm("val")[-len(best) :]
+                for index, (decoder, error) in enumerate(zip(net.decoders, errors, strict=True)):
+                    if error < best[index]:
+                        best[index], kept[index] = error, deepcopy(decoder.state_dict())
+        for decoder, state in zip(net.decoders, kept, strict=True):
+            decoder.load_state_dict(state)
+
+    def _draw_features(self, sharpness: float) -> None:
+        net = self.net
         for decoder, place in zip(net.decoders, net.places, strict=True):
             assert decoder.random is not None
             seen = [
@@ -224,18 +244,10 @@ class _Trainer:
                 net.config.parameters,
                 net.config.components,
                 net.config.random_features,
+                sharpness,
                 torch.Generator(self.device).manual_seed(self.config.seed),
             )
             decoder.random.load_state_dict(layer)
-        all_of, errors = self.equations(), []
-        solved = [[equations.solve(ridge) for equations in all_of] for ridge in self.config.last_ridges]
-        for readouts in solved:
-            for decoder, readout in zip(net.decoders, readouts, strict=True):
-                decoder.readout.weight.data = readout
-            errors.append(self.errors_mm("val")[-len(all_of) :])
-        for index, decoder in enumerate(net.decoders):
-            best = min(range(len(solved)), key=lambda at: errors[at][index])
-            decoder.readout.weight.data = solved[best][index]
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:

@@ -7,12 +7,11 @@ import torch
 
 __all__ = ["NormalEquations", "random_layer"]
 
-STATE_GAINS = (0.3, 3.0)
-PARAMETER_GAINS = (1.0, 5.0)
-"""How sharply features bend, per standard deviation of the principal components together and per unit of parameters.
-
-Each draws its own between these, alike on a logarithmic scale. Where a bounce sends a body depends on the parameters
-more finely than the motion until then does.
+STATE_GAINS = (0.1, 1.0)
+PARAMETER_GAINS = (0.3, 3.0)
+"""How sharply features bend at sharpness 1, per standard deviation of the principal components together and per unit
+of parameters. Each draws its own between these, alike on a logarithmic scale: where a bounce sends a body depends on
+the parameters more finely than the motion until then does.
 """
 
 
@@ -37,7 +36,12 @@ class NormalEquations:
 
 
 def random_layer(
-    seen: list[torch.Tensor], parameters: int, components: int, count: int, generator: torch.Generator
+    seen: list[torch.Tensor],
+    parameters: int,
+    components: int,
+    count: int,
+    sharpness: float,
+    generator: torch.Generator,
 ) -> dict[str, torch.Tensor]:
     """Weights of two linear layers: whitened principal components of what is seen, and random directions in them.
 
@@ -59,7 +63,7 @@ def random_layer(
     draw = {"generator": generator, "dtype": torch.float64, "device": generator.device}
     directions, reach = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
     for width, (low, high) in ((components, STATE_GAINS), (parameters, PARAMETER_GAINS)):
-        gains = low * (high / low) ** torch.rand(count, **draw)
+        gains = sharpness * low * (high / low) ** torch.rand(count, **draw)
         directions.append(gains[:, None] / width**0.5 * torch.randn(count, width, **draw))
         reach += gains**2
     biases = reach.sqrt() * (2.0 * torch.rand(count, **draw) - 1.0)
