@@ -10,6 +10,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -297,29 +298,25 @@ class _Trainer:
             raise InputError(f"--resume: {path}: not the state of this training: {error}") from None
 
 
-def train_network(
-    net: ODeformNet,
-    data: TrainingData,
-    config: TrainConfig,
-    report: Callable[[str], None] = print,
-    part: Path | None = None,
-    resume: bool = False,
-) -> dict[str, float]:
-    """Train in place, on a GPU where there is one; returns validation errors in mm and the number of steps.
+@contextmanager
+def _small_batches() -> Iterator[None]:
+    """One thread of the processor: batches are small, and results do not depend on the number of cores.
 
-    The state goes to the file `part` at every report and when interrupted; `resume` continues from there.
+    Denormal numbers slow such a run thirty-fold on some processors; elsewhere they count (SciPy's k-d tree recurses
+    without end where they are taken for 0).
     """
-    # on the processor one thread: batches are small, and results do not depend on the number of cores. Denormal
-    # numbers slow such a run thirty-fold on some processors.
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
-    trainer = _Trainer(net, data, config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
-    if resume and part is not None:
-        trainer.restore(part)
-        report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
-    elif part is not None and part.exists():
-        report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+        torch.set_flush_denormal(False)
+
+
+def _descend(trainer: _Trainer, config: TrainConfig, report: Callable[[str], None], part: Path | None) -> None:
+    """Take steps until the budget of `config` is spent."""
     seconds = 60.0 * config.minutes
     begin, printed = time.monotonic() - trainer.elapsed, trainer.elapsed
 
@@ -345,8 +342,28 @@ def train_network(
             trainer.save(part)
             report(f"interrupted; --resume continues from {part}")
         raise
-    finally:
-        torch.set_num_threads(threads)
+
+
+def train_network(
+    net: ODeformNet,
+    data: TrainingData,
+    config: TrainConfig,
+    report: Callable[[str], None] = print,
+    part: Path | None = None,
+    resume: bool = False,
+) -> dict[str, float]:
+    """Train in place, on a GPU where there is one; returns validation errors in mm and the number of steps.
+
+    The state goes to the file `part` at every report and when interrupted; `resume` continues from there.
+    """
+    with _small_batches():
+        trainer = _Trainer(net, data, config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
+        if resume and part is not None:
+            trainer.restore(part)
+            report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
+        elif part is not None and part.exists():
+            report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
+        _descend(trainer, config, report, part)
     if part is not None:
         trainer.save(part)
     if config.random_features:

@@ -77,7 +77,8 @@ def test_random_features_leave_less(data: TrainingData) -> None:
     left = []
     for count in (0, 40, 400):
         net = build_network(data, 0)
-        train_network(net, data, TrainConfig(steps=2, random_features=count, last_ridges=(1e-10,)), silent)
+        config = TrainConfig(steps=2, random_features=count, sharpnesses=(1.0,), last_ridges=(1e-10,))
+        train_network(net, data, config, silent)
         weights = network_weights(net)
         assert all(w.dtype == np.float32 for name, w in weights.items() if not name.endswith("readout.weight"))
         pooled = pool_shape(weights, net.config, data.rest / data.space.arm, data.weights)
@@ -120,6 +121,11 @@ def test_steps_are_a_budget_that_repeats(data: TrainingData) -> None:
     assert [train_network(net, data, TrainConfig(steps=3, batch=8), silent)["steps"] for net in nets] == [3, 3]
     one, two = (network_weights(net) for net in nets)
     assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
+def test_the_processor_is_left_as_it_was(data: TrainingData) -> None:
+    train_network(build_network(data, 0), data, TrainConfig(steps=1, batch=8, random_features=0), silent)
+    assert np.nextafter(0.0, 1.0) * np.ones(1) > 0.0
 
 
 def test_an_interruption_leaves_what_resume_wants(data: TrainingData, tmp_path: Path) -> None:
