@@ -144,11 +144,11 @@ def _field(branches: list[tuple[int, list[tuple[Floats, Floats]]]]) -> Field:
     return field
 
 
-Decoder = Callable[[Floats], Floats]
+Decoder = Callable[[Floats, Floats], Floats]
 
 
 def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Decoder]:
-    """theta (P,) -> the decoder: (T, state) -> (T, 6 + K) in metres and radians, not yet relative to the start.
+    """theta (P,) -> the decoder: (T,) seconds, (T, state) -> (T, 6 + K) in m and rad, not yet relative to the start.
 
     In double precision: a readout solved for by least squares has large weights that cancel.
     """
@@ -163,13 +163,14 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
     def fold(theta: Floats) -> Decoder:
         folded = [(place, [_folded(net, theta) for net in nets if net], readout) for place, nets, readout in parts]
 
-        def decode(states: Floats) -> Floats:
-            out = []
+        def decode(times: Floats, states: Floats) -> Floats:
+            clock, out = (2.0 * times / (times + config.clock) - 1.0)[:, None], []
             for place, nets, readout in folded:
                 features = states[:, place]
                 for index, net in enumerate(nets):
                     # random features are linear in between
-                    seen = _silu(_mlp(net, features, _silu if index == 0 else _same))
+                    told = np.concatenate([features, clock], axis=1)
+                    seen = _silu(_mlp(net, told, _silu if index == 0 else _same))
                     features = np.concatenate([features, seen], axis=1)
                 out.append(features @ readout.T)
             if not config.rigid:
@@ -190,7 +191,7 @@ class LatentTrajectory:
     def __init__(
         self,
         field: Callable[[float, Floats], Floats],
-        decode: Callable[[Floats], Floats],
+        decode: Decoder,
         start: Floats,
         quality: Quality,
         until: float,
@@ -201,7 +202,7 @@ class LatentTrajectory:
         with np.errstate(all="ignore"):  # an overflow ends the integration with a status
             self._solution = integrate(field, start, quality, until)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
-        self._origin = decode(start[None])
+        self._origin = decode(np.zeros(1), start[None])
         self._span = until
         self._recent: tuple[tuple[bytes, Floats], ...] = ()
 
@@ -221,7 +222,7 @@ class LatentTrajectory:
         if known is None:
             solution = self._extend(float(asked.max()))
             # y(0) = 0 to the last bit: the product over many rows rounds otherwise than that over one
-            known = (self._decode(solution.sample(asked)) - self._origin) * (asked > 0.0)[:, None]
+            known = (self._decode(asked, solution.sample(asked)) - self._origin) * (asked > 0.0)[:, None]
             known.flags.writeable = False
             self._recent = ((key, known), *self._recent)[:RECENT]
         return known
@@ -245,7 +246,7 @@ class LatentTrajectory:
         if other.status is not Status.OK or self._solution.status is not Status.OK:
             return None
         times = np.linspace(0.0, self._span, 129)[1:]
-        difference = self._decode(self._solution.sample(times)) - self._decode(other.sample(times))
+        difference = self._decode(times, self._solution.sample(times)) - self._decode(times, other.sample(times))
         # a small turn |w| moves a round body of radius of gyration r by sqrt(2/3) r |w| in RMS
         difference[:, 3:POSE] *= self._arm * np.sqrt(2.0 / 3.0)
         return float(1e3 * np.linalg.norm(difference, axis=1).max() / share)

@@ -64,6 +64,8 @@ class ShapeEncoder(nn.Module):
 class Decoder(nn.Module):
     """Features of a state, and their linear readout, which training solves for rather than descends to.
 
+    It is told the time and the parameters besides. A smooth autonomous field leaves a contact of a few milliseconds and
+    the second of flight after it in states too alike for smooth features to tell apart; a clock does.
     Motion is what the features moved since the start, so that y(0) = 0 exactly and no bias is needed. Random features
     of all that, if there are any, are drawn once the rest is trained (Rahimi & Recht 2008).
     """
@@ -79,18 +81,17 @@ class Decoder(nn.Module):
         self.random = mlp(sizes["decoder.random"], nn.Identity) if sizes["decoder.random"][-1] else None
         self.readout = nn.Linear(*sizes["decoder.readout"], bias=False)
 
-    def features(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(T, B, latent), (B, P) -> (T, B, F), relative to the first of the T."""
-        features = self.trained(states, theta)
+    def features(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
+        """(T, B, latent), (T, B, 1 + P) -> (T, B, F), relative to the first of the T."""
+        features = self.trained(states, told)
         if self.random is not None:
-            seen = self.random(torch.cat([features, theta.expand(*states.shape[:-1], -1)], dim=-1))
+            seen = self.random(torch.cat([features, told], dim=-1))
             features = torch.cat([features, nn.functional.silu(seen)], dim=-1)
         return features - features[:1]
 
-    def trained(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(T, B, latent), (B, P) -> (T, B, latent + width): the state and what descent has made of it."""
-        seen = torch.cat([states, theta.expand(*states.shape[:-1], -1)], dim=-1)
-        return torch.cat([states, self.hidden(seen)], dim=-1)
+    def trained(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
+        """(T, B, latent), (T, B, 1 + P) -> (T, B, latent + width): the state and what descent has made of it."""
+        return torch.cat([states, self.hidden(torch.cat([states, told], dim=-1))], dim=-1)
 
 
 class ODeformNet(nn.Module):
@@ -163,10 +164,17 @@ class ODeformNet(nn.Module):
             )
         return roll_out(start, steps, branches)
 
-    def decode(self, states: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(T, B, state), (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""
+    def told(self, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(T,) seconds, (B, P) -> (T, B, 1 + P): the clock and the parameters, for the decoders."""
+        clock = 2.0 * times / (times + self.config.clock) - 1.0
+        shape = len(times), len(theta), -1
+        return torch.cat([clock[:, None, None].expand(*shape), theta.expand(*shape)], dim=-1)
+
+    def decode(self, states: torch.Tensor, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        """(T, B, state) at (T,) seconds, (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""
+        told = self.told(times, theta)
         out = [
-            decoder.readout(decoder.features(states[..., place], theta))
+            decoder.readout(decoder.features(states[..., place], told))
             for decoder, place in zip(self.decoders, self.places, strict=True)
         ]
         if not self.config.rigid:

@@ -125,6 +125,7 @@ class _Trainer:
             for k, v in data.reduced.items()
         }
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
+        self.times = torch.as_tensor(data.times).float().to(device)
         frame = float(data.times[1] - data.times[0])
         self.frame, self.substeps = frame, max(1, math.ceil(frame / config.longest - 1e-9))
         self.identity = data.identity
@@ -158,9 +159,10 @@ class _Trainer:
         """Of a batch, after its readout has been solved for."""
         theta, truth = self.theta["train"][rows], self.truth["train"][: frames + 1, rows]
         states = self.states(theta, self.draw_counts(frames))
+        told = self.net.told(self.times[: frames + 1], theta)
         predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
         for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
-            features = decoder.features(states[..., place], theta)
+            features = decoder.features(states[..., place], told)
             readout = NormalEquations()
             # every other frame tells as much, and a solve costs as much as the roll-out
             readout.add(features.detach()[::2], truth[::2][..., out])
@@ -195,10 +197,11 @@ class _Trainer:
         """Of the readout of each decoder, from all training sequences."""
         all_of = [NormalEquations() for _ in self.net.decoders]
         for rows, theta, states in self._chunks("train"):
+            told = self.net.told(self.times, theta)
             for equations, decoder, place, out in zip(
                 all_of, self.net.decoders, self.net.places, self.outputs, strict=True
             ):
-                equations.add(decoder.features(states[..., place], theta), self.truth["train"][:, rows][..., out])
+                equations.add(decoder.features(states[..., place], told), self.truth["train"][:, rows][..., out])
         return all_of
 
     def solve_readout(self, ridge: float) -> None:
@@ -216,6 +219,7 @@ class _Trainer:
         self.metric.double()
         self.truth, self.theta = ({k: v.double() for k, v in x.items()} for x in (self.truth, self.theta))
         self.shape = self.shape[0].double(), self.shape[1].double()
+        self.times = self.times.double()
         net.widen(self.config.random_features)
         best = [float("inf") for _ in net.decoders]
         kept = [decoder.state_dict() for decoder in net.decoders]
@@ -236,12 +240,12 @@ class _Trainer:
         net = self.net
         for decoder, place in zip(net.decoders, net.places, strict=True):
             assert decoder.random is not None
-            seen = [
-                torch.cat([decoder.trained(states[..., place], theta), theta.expand(len(states), -1, -1)], dim=-1)
-                for _, theta, states in self._chunks("train")
-            ]
+            seen = []
+            for _, theta, states in self._chunks("train"):
+                told = net.told(self.times, theta)
+                seen.append(torch.cat([decoder.trained(states[..., place], told), told], dim=-1).flatten(0, 1))
             layer = random_layer(
-                [x.flatten(0, 1) for x in seen],
+                seen,
                 net.config.parameters,
                 net.config.components,
                 net.config.random_features,
@@ -255,7 +259,7 @@ class _Trainer:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         total = torch.zeros(2, device=self.device)
         for rows, theta, states in self._chunks(split):
-            predicted = self.net.decode(states, theta)
+            predicted = self.net.decode(states, self.times, theta)
             total += len(rows) * torch.stack(self.metric(predicted[1:], self.truth[split][1:, rows]))
         rigid, local = (total / len(self.theta[split]) / 3.0).sqrt().tolist()
         return rigid, local

@@ -8,10 +8,11 @@ import torch
 __all__ = ["NormalEquations", "random_layer"]
 
 STATE_GAINS = (0.1, 1.0)
+CLOCK_GAINS = (3.0, 30.0)
 PARAMETER_GAINS = (0.3, 3.0)
-"""How sharply features bend at sharpness 1, per standard deviation of the principal components together and per unit
-of parameters. Each draws its own between these, alike on a logarithmic scale: where a bounce sends a body depends on
-the parameters more finely than the motion until then does.
+"""How sharply features bend at sharpness 1: per standard deviation of the principal components together, per unit of
+the clock, and of parameters. Each draws its own between these, alike on a logarithmic scale: contacts are short, and
+where a bounce sends a body depends on the parameters more finely than the motion until then does.
 """
 
 
@@ -45,10 +46,11 @@ def random_layer(
 ) -> dict[str, torch.Tensor]:
     """Weights of two linear layers: whitened principal components of what is seen, and random directions in them.
 
-    `seen` are (rows, inputs) of which the last `parameters` columns, in [-1, 1], are passed on as they are. Values are
-    rounded to single precision, as checkpoints keep them.
+    `seen` are (rows, inputs) of which the last columns, the clock and `parameters` in [-1, 1], are passed on as they
+    are. Values are rounded to single precision, as checkpoints keep them.
     """
-    split = seen[0].shape[1] - parameters
+    told = 1 + parameters
+    split = seen[0].shape[1] - told
     rows = sum(len(x) for x in seen)
     mean = torch.stack([x[:, :split].double().sum(dim=0) for x in seen]).sum(dim=0) / rows
     spread = torch.stack([(c := x[:, :split].double() - mean).T @ c for x in seen]).sum(dim=0) / rows
@@ -56,13 +58,13 @@ def random_layer(
     values, vectors = values.flip(0)[:components], vectors.flip(1)[:, :components]
     # directions without motion carry nothing but rounding
     gains = torch.where(values > 1e-10 * values[0], values.clamp_min(1e-300).rsqrt(), 0.0)
-    squeeze = torch.zeros(components + parameters, split + parameters, dtype=torch.float64)
+    squeeze = torch.zeros(components + told, split + told, dtype=torch.float64)
     squeeze[:components, :split] = gains[:, None] * vectors.T
-    squeeze[components:, split:] = torch.eye(parameters, dtype=torch.float64)
-    offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(parameters, dtype=torch.float64)])
+    squeeze[components:, split:] = torch.eye(told, dtype=torch.float64)
+    offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(told, dtype=torch.float64)])
     draw = {"generator": generator, "dtype": torch.float64, "device": generator.device}
     directions, reach = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
-    for width, (low, high) in ((components, STATE_GAINS), (parameters, PARAMETER_GAINS)):
+    for width, (low, high) in ((components, STATE_GAINS), (1, CLOCK_GAINS), (parameters, PARAMETER_GAINS)):
         gains = sharpness * low * (high / low) ** torch.rand(count, **draw)
         directions.append(gains[:, None] / width**0.5 * torch.randn(count, width, **draw))
         reach += gains**2

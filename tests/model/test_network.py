@@ -58,8 +58,8 @@ def test_inference_equals_the_network(rigid: bool, random_features: int, dtype: 
     assert np.allclose(np.stack(solution.states[:3]), rolled, rtol=1e-5, atol=1e-5)
     far = torch.stack([state, state + 0.7])
     with torch.no_grad():
-        moved = (net.decode(far, theta) * net.gains)[:, 0]
-    decoded = make_decoder(weights, config)(vector)(far[:, 0].numpy())
+        moved = (net.decode(far, torch.tensor([0.0, 0.3]), theta) * net.gains)[:, 0]
+    decoded = make_decoder(weights, config)(vector)(np.array([0.0, 0.3]), far[:, 0].numpy())
     assert np.allclose(decoded - decoded[0], moved, rtol=1e-4, atol=1e-5)
 
 

@@ -88,11 +88,11 @@ def test_random_features_leave_less(data: TrainingData) -> None:
             field = make_field(weights, net.config, np.float64)(theta)
             stop = float(data.times[-1])
             solution = integrate(field, start, Quality("rk4", step=float(data.times[1]) / 2.0), stop)
-            y = make_decoder(weights, net.config)(theta)(solution.sample(data.times))
+            y = make_decoder(weights, net.config)(theta)(data.times, solution.sample(data.times))
             squares.append((((y - y[0] - truth)[:, 6:]) ** 2).mean())
         left.append(np.sqrt(np.mean(squares)))
     assert left[1] < 0.95 * left[0]
-    assert left[2] < 0.8 * left[1]
+    assert left[2] < 0.9 * left[1]
 
 
 def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) -> None:
