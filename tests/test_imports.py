@@ -14,7 +14,7 @@ def test_predicting_loads_nothing_heavy(trained: dict[str, Path], model: str, tm
     script = f"""
 import sys
 import odeform
-motion = odeform.load({str(trained[model])!r}).solve(parameters={{"mass": 0.4}})
+motion = odeform.load({str(trained[model])!r}).solve(parameters={{"mass": 0.6}})
 assert motion.vertices(0.5).shape == motion.geometry.points.shape
 from odeform.cli import main
 assert main(["predict", {str(trained[model])!r}, "--out", {str(tmp_path / "a.npz")!r}, "--times", "0:0.1:0.05"]) == 0

@@ -44,10 +44,9 @@ class ODeform(ReducedModel):
         assert quality is not None
         return self.integrate(theta, placed, quality, until)
 
-    def integrate(
-        self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float, dtype: type = np.float32
-    ) -> LatentTrajectory:
-        """The solved latent motion for parameters in [-1, 1], in single or double precision."""
+    def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
+        """The solved latent motion for parameters in [-1, 1]."""
+        dtype = np.float32 if quality.dtype == "float32" else np.float64
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
         return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)

@@ -27,11 +27,12 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 
 @dataclass(frozen=True)
 class Quality:
-    """A way to integrate: a method with a fixed `step` in seconds, or with a relative `tolerance`."""
+    """A way to integrate: a method with a fixed `step` in seconds, or with a relative `tolerance`, in a precision."""
 
     method: str
     step: float | None = None
     tolerance: float | None = None
+    dtype: str = "float32"
 
     def __post_init__(self) -> None:
         method = get_method(self.method)
@@ -41,6 +42,8 @@ class Quality:
             raise InputError(f"quality: expected a positive step, got {self.step}")
         if self.tolerance is not None and (method.error is None or not self.tolerance > 0.0):
             raise InputError(f"quality: {self.method} cannot control its step with tolerance {self.tolerance}")
+        if self.dtype not in ("float32", "float64"):
+            raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
 
 
 def _step(method: Tableau, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, list[Any]]:
@@ -89,8 +92,8 @@ def _first_step(method: Tableau, field: Field, time: float, state: Any, slope: A
 def integrate(field: Field, start: Any, quality: Quality, until: float, begin: float | Solution = 0.0) -> Solution:
     """Integrate dz/dt = field(t, z) at least to `until` seconds.
 
-    `start` is the state at time `begin`; given a Solution as `begin`, that one is continued in place. States are
-    numpy arrays, or torch tensors with fixed steps (differentiable; all of a batch share the steps).
+    The precision is that of `start`, the state at time `begin`; given a Solution as `begin`, that one is continued in
+    place. States are numpy arrays, or torch tensors with fixed steps (differentiable; all of a batch share the steps).
     """
     if isinstance(begin, Solution):
         solution = begin

@@ -16,7 +16,7 @@ __all__ = ["choose_qualities"]
 SHARES = {"draft": 1.0, "balanced": 0.1}
 """Solver error that a quality may add, as a share of the model's own. A tenth adds half a per cent to the total."""
 REFERENCE = {"method": "dopri5", "tolerance": 1e-7}
-TRUTH = Quality("dopri5", tolerance=1e-10)
+TRUTH = Quality("dopri5", tolerance=1e-10, dtype="float64")
 
 
 def _candidates(step: float) -> list[dict[str, object]]:
@@ -35,21 +35,21 @@ def choose_qualities(model: ODeform, data: TrainingData, shares: Mapping[str, fl
     scale = np.full(data.reduced["val"].shape[-1], 1e3)
     scale[3:POSE] *= data.space.arm * np.sqrt(2.0 / 3.0)
 
-    def motions(quality: Quality, dtype: type) -> tuple[Floats, float]:
+    def motions(quality: Quality) -> tuple[Floats, float]:
         """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
         stop = float(data.times[-1])
-        solved = [model.integrate(theta, placed, quality, stop, dtype) for theta in data.theta["val"]]
+        solved = [model.integrate(theta, placed, quality, stop) for theta in data.theta["val"]]
         reduced = [s.reduced(data.times) + (0.0 if np.isinf(s.last_good) else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
     def rmse(a: Floats, b: Floats) -> float:
         return float(np.sqrt((((a - b) * scale)[:, 1:] ** 2).sum(axis=-1).mean() / 3.0))
 
-    truth, _ = motions(TRUTH, np.float64)
+    truth, _ = motions(TRUTH)
     allowed = rmse(truth, data.reduced["val"])
     costs = []
     for setting in _candidates(float(data.times[1] - data.times[0])):
-        reduced, evaluations = motions(Quality(**setting), np.float32)  # pyright: ignore[reportArgumentType]
+        reduced, evaluations = motions(Quality(**setting))  # pyright: ignore[reportArgumentType]
         costs.append((evaluations, rmse(reduced, truth), setting))
     costs.sort(key=lambda cost: cost[0])
     chosen = {

@@ -118,7 +118,8 @@ def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) ->
 def test_steps_are_a_budget_that_repeats(data: TrainingData) -> None:
     """Whatever the machine does meanwhile."""
     nets = [build_network(data, 0) for _ in range(2)]
-    assert [train_network(net, data, TrainConfig(steps=3, batch=8), silent)["steps"] for net in nets] == [3, 3]
+    config = TrainConfig(steps=3, batch=8, random_features=40)
+    assert [train_network(net, data, config, silent)["steps"] for net in nets] == [3, 3]
     one, two = (network_weights(net) for net in nets)
     assert all(np.array_equal(one[name], two[name]) for name in one)
 
@@ -138,7 +139,7 @@ def test_an_interruption_leaves_what_resume_wants(data: TrainingData, tmp_path: 
     with pytest.raises(KeyboardInterrupt):
         train_network(build_network(data, 0), data, TrainConfig(minutes=1.0, report=0.0), interrupt, part)
     lines: list[str] = []
-    config = TrainConfig(minutes=0.0)
+    config = TrainConfig(minutes=0.0, random_features=40)
     train_network(build_network(data, 0), data, config, lines.append, part, resume=True)
     assert "continues after" in lines[0]
     part.write_bytes(part.read_bytes()[:200])

@@ -75,7 +75,7 @@ def record() -> Record:
         schema = columns[0].source.schema
         session, shown = Session(schema), Columns.of(columns).all
         recorder = Recorder(path)
-        wishes = [Wish(schema.complete(parameters or {"mass": 0.4}), time, "balanced", shown) for time in times]
+        wishes = [Wish(schema.complete(parameters or {"mass": 0.6}), time, "balanced", shown) for time in times]
         frames = [change(session.frame(wish)) for wish in wishes]
         for frame in frames:
             recorder.log(frame)
