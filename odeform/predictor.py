@@ -7,9 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.model.motion import Motion
-from odeform.schema import Schema
+from odeform.schema import Parameters, Schema
 from odeform.solver.integrate import Quality
-from odeform.types import Geometry, Mesh
+from odeform.types import Floats, Geometry, Mesh, Times
 
 __all__ = ["Predictor", "load"]
 
@@ -27,6 +27,8 @@ class Predictor(Protocol):
 
     @property
     def qualities(self) -> Mapping[str, Quality]: ...
+
+    def expected_error(self, parameters: Parameters, times: Times) -> Floats | None: ...
 
     def solve(
         self,

@@ -106,14 +106,15 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation` and pooled
-    `error` in mm, the latter None without truth."""
+    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation`, pooled
+    `error` and the `expected` one that nine in ten motions keep to in mm, the last two None where nothing is known."""
 
     times: Times
     height: Times
     turn: Times
     deformation: Times
     error: Times | None
+    expected: Times | None
 
 
 def same_motions(one: Frame, other: Frame) -> bool:
@@ -226,13 +227,16 @@ class Session:
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
         turn = np.degrees(np.arccos(np.clip((np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
-        error = None
+        error = expected = None
+        if shown.column.predictor is not None:
+            band = shown.column.predictor.expected_error(motion.parameters, times)
+            expected = None if band is None else band[:, 1]
         if truth is not None and shown.column.predictor is not None:
             predicted = self._solve(shown.column, shown.column.predictor, 1, truth.geometry, wish)
             off = predicted.vertices(times) - truth.vertices(times)
             error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
-        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error)
+        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error, expected)
 
     def largest_deformation(self, wish: Wish) -> float:
         """The time within the trained window at which the first visible column is deformed most."""

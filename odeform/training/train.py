@@ -16,6 +16,7 @@ from odeform.checkpoint import Checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
+from odeform.evaluation.residuals import validation_residuals
 from odeform.model.data import TrainingData, prepare
 from odeform.model.odeform import PREFIX, ODeform
 from odeform.predictor import load
@@ -105,6 +106,9 @@ def train(
         # the solver may add to the model's error, not more
         qualities = choose_qualities(ODeform(checkpoint), data)
         checkpoint = replace(checkpoint, config={**checkpoint.config, "qualities": qualities})
+    write_checkpoint(out, checkpoint)
+    arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
+    checkpoint = replace(checkpoint, arrays=arrays)
     write_checkpoint(out, checkpoint)
     scores = evaluate(load(out), dataset, "test")
     scored = replace(checkpoint, scores=scores)

@@ -14,12 +14,13 @@ __all__ = ["PlotPanel", "plots_svg"]
 WIDTH, HEIGHT, LEFT, TOP, FOOT = 208, 112, 34, 18, 16  # px of one plot and its margins
 Line = tuple[str, tuple[int, int, int], Curves]
 QUANTITIES = (("height", "height of the centre, m"), ("turn", "turn, degrees"), ("deformation", "deformation RMS, mm"))
-ERROR = ("error", "error to truth RMS, mm")
+ERROR = ("error", "error RMS, mm (dashed: 9 in 10)")
 
 
 def _quantities(lines: Sequence[Line], turns: bool) -> list[tuple[str, str]]:
     wanted = [q for q in QUANTITIES if q[0] != "turn" or turns]
-    return [*wanted, ERROR] if any(curves.error is not None for _, _, curves in lines) else wanted
+    known = any(c.error is not None or c.expected is not None for _, _, c in lines)
+    return [*wanted, ERROR] if known else wanted
 
 
 def _top(values: list[Floats]) -> float:
@@ -43,14 +44,16 @@ def plots_svg(lines: Sequence[Line], window: Window, turns: bool) -> str:
 def _plot(index: int, name: str, title: str, lines: Sequence[Line], window: Window) -> str:
     wide, high = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT
     span = REACH * (window.stop - window.start)
-    values = [(color, np.asarray(getattr(c, name))) for _, color, c in lines if getattr(c, name) is not None]
-    top = _top([v for _, v in values])
+    values = [(color, getattr(c, name), "") for _, color, c in lines if getattr(c, name) is not None]
+    if name == "error":
+        values += [(color, c.expected, ' stroke-dasharray="3 2"') for _, color, c in lines if c.expected is not None]
+    top = _top([v for _, v, _ in values])
     trained = wide / REACH
     x = np.linspace(0.0, wide, len(lines[0][2].times)) if lines else np.zeros(0)
     drawn = "".join(
         f'<path d="{_path(x, high - np.clip(v / top, 0.0, 1.05) * high)}" fill="none" '
-        f'stroke="rgb{color}" stroke-width="1.4"/>'
-        for color, v in values
+        f'stroke="rgb{color}" stroke-width="1.4"{dashes}/>'
+        for color, v, dashes in values
     )
     return (
         f'<g transform="translate({WIDTH * index + LEFT},{TOP})">'

@@ -22,8 +22,9 @@ def line(drop: Predictor) -> Line:
 
 
 def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
+    line = (*line[:2], replace(line[2], expected=None))
     svg = plots_svg([line, line], drop.schema.window, turns=False)
-    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error to truth", svg) == [
+    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error RMS", svg) == [
         "height of the centre",
         "deformation RMS",
     ]
@@ -35,10 +36,16 @@ def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, dro
     error = np.linspace(0.0, 2.0, len(line[2].times))
     error[50:] = np.nan
     svg = plots_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, turns=False)
-    assert "error to truth RMS, mm" in svg
+    assert "error RMS, mm" in svg
     assert "nan" not in svg
     cursor = cursor_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, False, 1.0)
     assert "–" in cursor
+
+
+def test_the_expected_error_is_dashed(line: Line, drop: Predictor) -> None:
+    """The model's own truth apart: it is there without any."""
+    assert line[2].error is None
+    assert plots_svg([line], drop.schema.window, turns=False).count("stroke-dasharray") == 1
 
 
 def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:
