@@ -4,6 +4,7 @@ import contextlib
 import io
 import socket
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -43,6 +44,7 @@ __all__ = ["App"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
 SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
+READ = 0.1  # s between numbers that change as something moves: nobody reads faster
 SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
 
 
@@ -84,6 +86,8 @@ class App:
         self._looks = Looks()
         self._heat: float | None = None
         self._settled = False
+        self._told: Frame | None = None  # the frame that numbers and curves are of, and since when
+        self._told_at = 0.0
         for column in columns:
             if column.truth:
                 self._parameters.set(column.truth.parameters)
@@ -247,12 +251,14 @@ class App:
                 self._settled = True
                 self._describe(self._shown)
                 self._tidy()
+            elif self._told is not self._shown:
+                self._describe(self._shown)
         except InputError as error:
             self._moment.show_error(str(error))
-            self._shown, self._settled = None, True  # what comes next is shown, even if it was before
+            self._shown, self._told, self._settled = None, None, True  # what comes next is shown, even if it was before
         if self.clock.playing:
             return TICK
-        return None if self._settled else SETTLE
+        return None if self._settled and self._told is self._shown else SETTLE
 
     def _show(self, frame: Frame, looks: Looks) -> None:
         # colours keep their scale over the whole motion, so it has to be known first
@@ -261,7 +267,8 @@ class App:
         self._scene.publish(frame, looks, self._heat)
         self._playback.show(frame.wish.time)
         self._shown, self._looks = frame, looks
-        self._describe(frame)
+        if time.monotonic() - self._told_at > READ:
+            self._describe(frame)
         if self._recorder:
             try:
                 self._recorder.log(frame)
@@ -277,6 +284,7 @@ class App:
 
     def _describe(self, frame: Frame) -> None:
         """What accompanies a frame: numbers, curves, marks at the sliders."""
+        self._told, self._told_at = frame, time.monotonic()
         self._parameters.show()
         truth = frame.truth.column.truth if frame.truth else None
         away = truth is not None and not truth.of(frame.wish.parameters)
