@@ -265,7 +265,6 @@ class App:
         self._heat = self._scale(frame) if looks.heat else None
         self._settled = self._shown is not None and same_motions(frame, self._shown)
         self._scene.publish(frame, looks, self._heat)
-        self._playback.show(frame.wish.time)
         self._shown, self._looks = frame, looks
         if time.monotonic() - self._told_at > READ:
             self._describe(frame)
@@ -283,8 +282,9 @@ class App:
         return scale_for(np.concatenate(errors)) if errors else None
 
     def _describe(self, frame: Frame) -> None:
-        """What accompanies a frame: numbers, curves, marks at the sliders."""
+        """What accompanies a frame: the time, numbers, curves, marks at the sliders."""
         self._told, self._told_at = frame, time.monotonic()
+        self._playback.show(frame.wish.time)
         self._parameters.show()
         truth = frame.truth.column.truth if frame.truth else None
         away = truth is not None and not truth.of(frame.wish.parameters)
