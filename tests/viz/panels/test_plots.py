@@ -63,3 +63,14 @@ def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App,
     assert client.until(lambda: app._plots._curves.content != curves)
     client.set("odeform", False)
     assert client.until(lambda: "nothing shown" in client.text())
+
+
+def test_after_many_moments_the_numbers_are_of_the_last(dropped: tuple[App, LoopbackClient]) -> None:
+    """They are told ten times a second, however often the moment changes."""
+    app, client = dropped
+    for moment in np.linspace(0.3, 0.45, 31):
+        client.set("time (s)", round(float(moment), 3))
+    plots = app._plots
+    last = cursor_svg(plots._lines, app.session.schema.window, plots._turns, 0.45)
+    assert client.until(lambda: plots._cursor.content == last)
+    assert client.until(lambda: app._playback._time.value == 0.45)
