@@ -21,7 +21,7 @@ from odeform.solver.solution import Solution, Status
 from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
-__all__ = ["LatentTrajectory", "check_weights", "encode", "make_decoder", "make_field", "pool_shape"]
+__all__ = ["LatentTrajectory", "check_weights", "make_decoder", "make_encoder", "make_field", "pool_shape"]
 
 
 def _silu(x: Floats) -> Floats:
@@ -82,14 +82,22 @@ def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, shares: Flo
     ]
 
 
-def encode(weights: Arrays, config: ModelConfig, pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
-    """The state at time 0 from pooled shape features and parameters in [-1, 1]."""
-    parts = []
-    for branch, features in zip(config.branches, pooled, strict=True):
-        standard = (features - weights[f"{branch}_encoder.pooled_mean"]) * weights[f"{branch}_encoder.pooled_gain"]
-        head = _layers(weights, f"{branch}_encoder.head", np.float64)
-        parts.append(_mlp(head, np.concatenate([standard, theta]), _silu))
-    return np.concatenate(parts).astype(dtype)
+def make_encoder(weights: Arrays, config: ModelConfig) -> Callable[[list[Floats], Floats, type], Floats]:
+    """(pooled shape features, theta (P,) in [-1, 1], precision) -> the state at time 0."""
+    statistics = [
+        tuple(weights[f"{branch}_encoder.pooled_{name}"].astype(float) for name in ("mean", "gain"))
+        for branch in config.branches
+    ]
+    heads = [_layers(weights, f"{branch}_encoder.head", np.float64) for branch in config.branches]
+
+    def encode(pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
+        parts = [
+            _mlp(head, np.concatenate([(features - mean) * gain, theta]), _silu)
+            for head, features, (mean, gain) in zip(heads, pooled, statistics, strict=True)
+        ]
+        return np.concatenate(parts).astype(dtype)
+
+    return encode
 
 
 def _folded(layers: list[tuple[Floats, Floats]], theta: Floats) -> list[tuple[Floats, Floats]]:
