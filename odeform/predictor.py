@@ -8,6 +8,7 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.model.motion import Motion
 from odeform.schema import Schema
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Geometry, Mesh
 
@@ -27,6 +28,9 @@ class Predictor(Protocol):
 
     @property
     def qualities(self) -> Mapping[str, Quality]: ...
+
+    @property
+    def frontier(self) -> tuple[FrontierPoint, ...]: ...
 
     def solve(
         self,

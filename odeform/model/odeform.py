@@ -7,6 +7,7 @@ from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
 from odeform.model.inference import LatentTrajectory, check_weights, make_decoder, make_encoder, make_field, pool_shape
 from odeform.model.placed import PlacedBasis
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
@@ -26,6 +27,7 @@ class ODeform(ReducedModel):
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
+        self.frontier = tuple(FrontierPoint.from_json(row) for row in checkpoint.config.get("frontier", ()))
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}

@@ -7,7 +7,7 @@ what it says of a time is the same however one came to ask.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,10 @@ class Quality:
             raise InputError(f"quality: {self.method} cannot control its step with tolerance {self.tolerance}")
         if self.dtype not in ("float32", "float64"):
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
+
+    def to_json(self) -> dict[str, Any]:
+        """What differs from the defaults: `Quality(**q.to_json()) == q`."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
 
 def _finite(value: Any) -> bool:
