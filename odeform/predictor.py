@@ -8,6 +8,7 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.model.motion import Motion
 from odeform.schema import Parameters, Schema
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Floats, Geometry, Mesh, Times
 
@@ -29,6 +30,8 @@ class Predictor(Protocol):
     def qualities(self) -> Mapping[str, Quality]: ...
 
     def expected_error(self, parameters: Parameters, times: Times) -> Floats | None: ...
+    @property
+    def frontier(self) -> tuple[FrontierPoint, ...]: ...
 
     def solve(
         self,

@@ -14,6 +14,7 @@ from odeform.model.motion import Motion, Trajectory
 from odeform.model.placed import PlacedBasis, place
 from odeform.model.reduced import ReducedSpace
 from odeform.schema import Parameters
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Floats, Geometry, Mesh, Times
 
@@ -28,6 +29,8 @@ class ReducedModel(ABC):
     model: ClassVar[str]
     qualities: Mapping[str, Quality] = {}
     """Ways to integrate, by name; empty for models that do not integrate."""
+    frontier: tuple[FrontierPoint, ...] = ()
+    """The ways to choose from, cheap to fine; empty for models that do not integrate, and in older checkpoints."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         try:

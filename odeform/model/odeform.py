@@ -5,8 +5,9 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
-from odeform.model.inference import LatentTrajectory, check_weights, encode, make_decoder, make_field, pool_shape
+from odeform.model.inference import LatentTrajectory, check_weights, make_decoder, make_encoder, make_field, pool_shape
 from odeform.model.placed import PlacedBasis
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
@@ -26,6 +27,8 @@ class ODeform(ReducedModel):
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
+        self.frontier = tuple(FrontierPoint.from_json(row) for row in checkpoint.config.get("frontier", ()))
+        self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
@@ -47,6 +50,6 @@ class ODeform(ReducedModel):
     def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
         """The solved latent motion for parameters in [-1, 1]."""
         dtype = np.float32 if quality.dtype == "float32" else np.float64
-        start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
+        start = self._encode(self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
         return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)
