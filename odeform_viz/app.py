@@ -29,6 +29,7 @@ from odeform_viz.panels.help import HelpPanel
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.plots import PlotPanel
+from odeform_viz.panels.quality import QualityPanel
 from odeform_viz.panels.record import RecordPanel
 from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.status import MomentPanel, StatusPanel
@@ -102,9 +103,9 @@ class App:
         self._moment = MomentPanel(self.server)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Explore"):
-            qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
-            samples = _training_samples(columns[0])
-            self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
+            self._parameters = ParameterPanel(self.server, schema, _training_samples(columns[0]), wake)
+            integrated = next((c.predictor for c in columns if c.predictor and c.predictor.qualities), None)
+            self._quality = QualityPanel(self.server, integrated, wake) if integrated else None
             hold = partial(self._playback.jump, schema.window.start)
             self._shape = ShapePanel(self.server, self.columns, self._body, hold, self._changed, say)
             with gui.add_folder("View"):
@@ -155,7 +156,8 @@ class App:
 
     def _wish(self) -> Wish:
         parameters = self.session.schema.complete(self._parameters.parameters())
-        return Wish(parameters, self.clock.time(), self._parameters.quality(), self.columns.all)
+        quality = self._quality.wish() if self._quality else "balanced"
+        return Wish(parameters, self.clock.time(), quality, self.columns.all)
 
     def _read_looks(self) -> Looks:
         return Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
@@ -215,7 +217,8 @@ class App:
         for note in state.notes:
             self._say(note)
         self._parameters.set(state.parameters)
-        self._parameters.set_quality(state.quality)
+        if self._quality:
+            self._quality.set(state.quality)
         self._compare.set(state.overlay, state.heat)
         self._follow.value = state.follow
         self._playback.jump(state.time)

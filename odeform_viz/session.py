@@ -1,5 +1,6 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
+import json
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from odeform.model.motion import Motion, SolveStats
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
+from odeform.solver.integrate import Quality
 from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
@@ -30,6 +32,7 @@ class Wish:
     parameters: Mapping[str, float]
     time: float
     quality: str
+    """Of all integrations: a name, or a setting as JSON."""
     columns: tuple[Column, ...]
 
 
@@ -122,6 +125,16 @@ def same_motions(one: Frame, other: Frame) -> bool:
     return [shown.motion for shown in one.columns] == [shown.motion for shown in other.columns]
 
 
+def quality_of(source: Predictor, wished: str) -> str | Quality:
+    """What a model makes of a wish: models that do not know the name, or do not integrate, take their own default."""
+    if wished.startswith("{") and source.qualities:
+        try:
+            return Quality(**json.loads(wished))
+        except (ValueError, TypeError) as error:
+            raise InputError(f"quality: expected a name or the setting of a solver, got {wished}: {error}") from None
+    return wished if wished in source.qualities else "balanced"
+
+
 class Session:
     """Columns under one set of parameters and one time. Integrates only when parameters or quality change.
 
@@ -149,7 +162,7 @@ class Session:
     def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> Motion:
         names = {p.name for p in source.schema.parameters}
         parameters = {n: value for n, value in self.parameters(column, wish).items() if n in names}
-        quality = wish.quality if wish.quality in source.qualities else "balanced"
+        quality = quality_of(source, wish.quality)
         wanted = (quality, *sorted(parameters.items()))
         known = self._solved.get((column.key, use))
         if known is None or known[0] != wanted or known[1].geometry is not geometry:
