@@ -65,6 +65,6 @@ def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
 
 def test_settings_without_sense_are_refused(kick: Predictor) -> None:
     for wished in ("{", '{"method": "rk5", "step": 1}', '{"step": 0.1}', '{"method": "rk4", "step": "x"}'):
-        with pytest.raises(ValueError, match="quality|solver"):
+        with pytest.raises(ValueError, match=r"quality|solver"):
             quality_of(kick, wished)
     assert quality_of(kick, "unknown") == "balanced"
