@@ -11,7 +11,7 @@ from odeform.evaluation.timing import milliseconds, typical
 from odeform.predictor import Predictor
 from odeform.types import Floats
 
-__all__ = ["limits", "scaling"]
+__all__ = ["least_ms", "limits", "scaling"]
 
 SIDE = 2048  # of the matrices that are multiplied
 BYTES = 256 << 20  # that are copied
@@ -41,7 +41,7 @@ def memory_gb_s() -> float:
     return 2.0 * BYTES / best / 1e6
 
 
-def _least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -> float:
+def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -> float:
     """What decoding takes where either arithmetic or memory is all that counts, whichever binds.
 
     A frame reads the modes, the points at rest and those it adds them to, and writes the result; frames that are
@@ -68,9 +68,9 @@ def limits(predictor: Predictor) -> dict[str, Any]:
         "memory_gb_s": gb_s,
         "modes": modes,
         "decode_ms": one,
-        "decode_share_of_limit": _least_ms(POINTS, modes, 1, gflops, gb_s) / one,
+        "decode_share_of_limit": least_ms(POINTS, modes, 1, gflops, gb_s) / one,
         f"decode_{FRAMES}_frames_ms": many,
-        f"decode_{FRAMES}_frames_share_of_limit": _least_ms(POINTS, modes, FRAMES, gflops, gb_s) / many,
+        f"decode_{FRAMES}_frames_share_of_limit": least_ms(POINTS, modes, FRAMES, gflops, gb_s) / many,
     }
 
 

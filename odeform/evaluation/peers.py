@@ -18,10 +18,11 @@ from odeform.model.odeform import ODeform
 from odeform.model.reduced import decompose, motion_rmse, rotation_of, to_canonical
 from odeform.predictor import Predictor, load
 from odeform.schema import Parameters, Window
+from odeform.simulation.ball import SEGMENTS
 from odeform.solver.integrate import integrate
 from odeform.types import Floats, Frames, Geometry, Sequence
 
-__all__ = ["carried_over", "peers"]
+__all__ = ["carried_over", "peers", "simulator", "torchdiffeq_peer"]
 
 FRAMES = 20
 PER_POINT = {2_000: 5, 20_000: 2, 100_000: 1}
@@ -42,8 +43,8 @@ def peers(predictor: Predictor, dataset: Dataset | None, places: list[Place]) ->
     rows = {f"per-point latent ODE, {points:,} points": _per_point(predictor, points) for points in PER_POINT}
     rows |= _checkpoints(predictor, dataset)
     if isinstance(predictor, ODeform):
-        rows["torchdiffeq, same field"] = _torchdiffeq(predictor, places[0])
-        rows["mujoco, equal error"] = _simulator(predictor, dataset)
+        rows["torchdiffeq, same field"] = torchdiffeq_peer(predictor, places[0])
+        rows["mujoco, equal error"] = simulator(predictor, dataset)
     return rows
 
 
@@ -142,7 +143,7 @@ def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any
     return rows
 
 
-def _torchdiffeq(model: ODeform, place: Place) -> dict[str, Any]:
+def torchdiffeq_peer(model: ODeform, place: Place) -> dict[str, Any]:
     """The same field, method and step or tolerance, states at the frames of the window."""
     try:
         import torch
@@ -212,7 +213,7 @@ def _on_frames(recorded: Sequence, window: Window) -> Sequence:
     return recorded.until(window.stop, round(1.0 / (window.rate * (recorded.times[1] - recorded.times[0]))))
 
 
-def _simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
+def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     """MuJoCo at the cheapest setting whose error against the scene's declared truth is at most the model's.
 
     The first setting is that of the truth: its error is what packing and another processor leave. `pays_off_after` are
@@ -225,7 +226,6 @@ def _simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
         from odeform.simulation.scene import get_scene
     except ModuleNotFoundError as error:
         return {"skipped": f"{error.name} is not installed: pip install 'odeform[simulate]'"}
-    from odeform.simulation.ball import SEGMENTS
 
     scene, window = get_scene(model.schema.scene), model.schema.window
     if scene.fixed != dataset.fixed:
