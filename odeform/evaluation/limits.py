@@ -9,7 +9,6 @@ import numpy as np
 from odeform.evaluation.probes import round_cloud
 from odeform.evaluation.timing import milliseconds, typical
 from odeform.predictor import Predictor
-from odeform.types import Floats
 
 __all__ = ["least_ms", "limits", "scaling"]
 
@@ -54,14 +53,16 @@ def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -
 
 
 def limits(predictor: Predictor) -> dict[str, Any]:
-    """Rates of this machine, and the share of them at which points are decoded, a frame or `FRAMES` at once."""
+    """Rates of this machine, and the share of them at which points are decoded, a frame or `FRAMES` at once.
+
+    From coordinates to points: a motion keeps the coordinates of the moments that it was asked for last.
+    """
     gflops, gb_s = gemm_gflops(), memory_gb_s()
     motion = predictor.solve(round_cloud(POINTS, predictor))
     window = predictor.schema.window
-    moments = np.random.default_rng(1).uniform(window.start, window.stop, 40)
     times = np.linspace(window.start, window.stop, FRAMES)
     modes = len(motion.placed.values)
-    one = typical(lambda i: motion.vertices(float(moments[i % len(moments)])), 40)
+    one = typical(lambda _: motion.vertices(float(times[FRAMES // 2])), 40)
     many = typical(lambda _: motion.vertices(times), 10)
     return {
         "gemm_gflops": gflops,
@@ -75,15 +76,15 @@ def limits(predictor: Predictor) -> dict[str, Any]:
 
 
 def scaling(predictor: Predictor, sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
-    """Solve, basis and decode of one frame over the number of points."""
+    """Solve, basis, and decode of one frame from its coordinates, over the number of points."""
     window = predictor.schema.window
-    moments: Floats = np.random.default_rng(1).uniform(window.start, window.stop, 30)
+    moment = 0.5 * (window.start + window.stop)
     rows = []
     for points in sizes:
         shape = round_cloud(points, predictor)
         basis = float(milliseconds(lambda _, shape=shape: predictor.solve(shape), 1, warm=0)[0])
         solve = typical(lambda _, shape=shape: predictor.solve(shape), 20)
         motion = predictor.solve(shape)
-        decode = typical(lambda i, motion=motion: motion.vertices(float(moments[i % len(moments)])), 30)
+        decode = typical(lambda _, motion=motion: motion.vertices(moment), 30)
         rows.append({"points": points, "solve_ms": solve, "basis_ms": basis - solve, "decode_ms": decode})
     return rows
