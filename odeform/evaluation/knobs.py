@@ -11,7 +11,7 @@ from odeform.evaluation.timing import typical
 from odeform.model.motion import Motion, SolveStats, Trajectory
 from odeform.model.reduced import POSE
 from odeform.predictor import Predictor
-from odeform.types import Floats, Frames, Points
+from odeform.types import Floats
 
 __all__ = ["knobs", "with_modes"]
 
@@ -45,8 +45,8 @@ def with_modes(motion: Motion, modes: int) -> Motion:
     return replace(motion, placed=placed, trajectory=_Shortened(motion.trajectory, modes))
 
 
-def _followed(coarse: Frames, coarse_rest: Points, rest: Points) -> Frames:
-    """(T, N, 3) points moved as the three nearest of a coarser shape, weighted by inverse distance."""
+def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
+    """(T, M, 3), (M, 3), (N, 3) -> (T, N, 3): points move as the three nearest of a coarser shape, by inverse distance."""
     distance, index = KDTree(coarse_rest).query(rest, k=3)
     share = 1.0 / np.maximum(distance, 1e-9)
     share /= share.sum(axis=1, keepdims=True)
@@ -62,7 +62,7 @@ def knobs(predictor: Predictor) -> list[dict[str, Any]]:
     moments = np.random.default_rng(3).uniform(window.start, window.stop, 40)
     truth = motion.vertices(times).astype(float)
 
-    def row(name: str, work: Any, frames: Frames) -> dict[str, Any]:
+    def row(name: str, work: Any, frames: Floats) -> dict[str, Any]:
         ms = typical(lambda i: work(float(moments[i % len(moments)])), len(moments))
         error = float(1e3 * np.sqrt(((frames - truth) ** 2).mean()))
         return {"knob": name, "points": POINTS, "ms": ms, "saves_ms": whole - ms, "error_mm": error}
