@@ -46,7 +46,7 @@ def with_modes(motion: Motion, modes: int) -> Motion:
 
 
 def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
-    """(T, M, 3), (M, 3), (N, 3) -> (T, N, 3): points move as the three nearest of a coarser shape, by inverse distance."""
+    """(T, M, 3), (M, 3), (N, 3) -> (T, N, 3): points move as the nearest three, by inverse distance."""
     distance, index = KDTree(coarse_rest).query(rest, k=3)
     share = 1.0 / np.maximum(distance, 1e-9)
     share /= share.sum(axis=1, keepdims=True)
