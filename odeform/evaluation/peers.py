@@ -1,7 +1,6 @@
 """Others at the same task in the same run: learned, classical, another solver, and the simulator itself."""
 
 import itertools
-import time
 from typing import Any
 
 import numpy as np
@@ -9,20 +8,18 @@ import numpy as np
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
+from odeform.evaluation.equal_error import simulator
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.precision import Place
 from odeform.evaluation.probes import ball, nearest_sequences, round_cloud
 from odeform.evaluation.timing import milliseconds, typical
-from odeform.model.basis import fit_basis
 from odeform.model.odeform import ODeform
-from odeform.model.reduced import decompose, motion_rmse, rotation_of, to_canonical
+from odeform.model.reduced import motion_rmse
 from odeform.predictor import Predictor, load
-from odeform.schema import Parameters, Window
-from odeform.simulation.ball import SEGMENTS
 from odeform.solver.integrate import integrate
-from odeform.types import Floats, Frames, Geometry, Sequence
+from odeform.types import Floats, Geometry
 
-__all__ = ["carried_over", "peers", "simulator", "torchdiffeq_peer"]
+__all__ = ["peers", "torchdiffeq_peer"]
 
 FRAMES = 20
 PER_POINT = {2_000: 5, 20_000: 2, 100_000: 1}
@@ -30,9 +27,6 @@ PER_POINT = {2_000: 5, 20_000: 2, 100_000: 1}
 CHUNK = 2_000  # points that the per-point model works on at once: its activations then stay in the cache
 POINTS = 5_000
 SEQUENCES = 20  # of the test split, for the errors of other checkpoints
-SIMULATED = 3  # of the test split, for those of coarser simulations
-COARSER = ((1.0, 1.0), (2.0, 1.0), (4.0, 1.0), (1.0, 0.8), (2.0, 0.8), (1.0, 0.5))
-"""Simulations that are tried: times the scene's step, and times its segments along an edge."""
 
 
 def peers(predictor: Predictor, dataset: Dataset | None, places: list[Place]) -> dict[str, Any]:
@@ -48,9 +42,9 @@ def peers(predictor: Predictor, dataset: Dataset | None, places: list[Place]) ->
     return rows
 
 
-def _motion_ms(predictor: Predictor, shape: Geometry, times: Floats, parameters: Parameters | None = None) -> float:
+def _motion_ms(predictor: Predictor, shape: Geometry, times: Floats) -> float:
     """Parameters to all frames; the basis of the shape is cached, and timed by itself."""
-    return typical(lambda _: predictor.solve(shape, parameters).vertices(times), 15)
+    return typical(lambda _: predictor.solve(shape).vertices(times), 15)
 
 
 def _times(predictor: Predictor) -> Floats:
@@ -191,88 +185,4 @@ def torchdiffeq_peer(model: ODeform, place: Place) -> dict[str, Any]:
         "evaluations": taken,
         "error_mm": 1e3 * motion_rmse(reduced[1:], place.exact[1:], model.space.arm),
         "note": f"{quality.method}, error is the solver's",
-    }
-
-
-def carried_over(coarse: Sequence, truth: Sequence, anchor: Floats, azimuth: float) -> Frames:
-    """(T, N, 3) the motion of a coarser mesh at the vertices of a finer one at rest.
-
-    The rigid motion is that of the coarse mesh, its deformation the smoothest field through its vertices.
-    """
-    pose, local = decompose(coarse, anchor, azimuth)
-    rest = to_canonical(truth.vertices[0], anchor, azimuth)
-    scale = float(np.linalg.norm(rest, axis=1).mean())
-    field = fit_basis(to_canonical(coarse.vertices[0], anchor, azimuth), local.transpose(1, 2, 0), scale)
-    rotation, shift = rotation_of(pose, azimuth)
-    moved = rest + field.values(rest).transpose(2, 0, 1)
-    return moved @ rotation.swapaxes(1, 2) + shift[:, None] + anchor
-
-
-def _on_frames(recorded: Sequence, window: Window) -> Sequence:
-    """Test sequences have more frames than those trained on."""
-    return recorded.until(window.stop, round(1.0 / (window.rate * (recorded.times[1] - recorded.times[0]))))
-
-
-def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
-    """MuJoCo at the cheapest setting whose error against the scene's declared truth is at most the model's.
-
-    The first setting is that of the truth: its error is what packing and another processor leave. `pays_off_after` are
-    the queries after which simulating the data set and training have cost less than simulating each query so.
-    """
-    if dataset is None:
-        return {"skipped": f"no data set of scene {model.schema.scene} at hand: --data"}
-    try:
-        from odeform.simulation import shell
-        from odeform.simulation.scene import get_scene
-    except ModuleNotFoundError as error:
-        return {"skipped": f"{error.name} is not installed: pip install 'odeform[simulate]'"}
-
-    scene, window = get_scene(model.schema.scene), model.schema.window
-    if scene.fixed != dataset.fixed:
-        return {"skipped": "the data set is of other physics than this version simulates"}
-    near = nearest_sequences(dataset, model.schema.complete(None), SIMULATED)
-    truths = [_on_frames(recorded, window) for recorded in near.sequences("test")]
-    model_error = evaluate(model, near, "test")["rmse_pooled_mm"]
-
-    def attempt(coarser: float, finer: float) -> dict[str, Any]:
-        step, segments = coarser * scene.step, round(finer * SEGMENTS)
-        errors, ms = [], []
-        for truth in truths:
-            begin = time.perf_counter()
-            try:
-                simulated = scene.simulate(truth.parameters, rate=window.rate, step=step, segments=segments)
-            except shell.SimulationError as error:
-                return {"step": step, "segments": segments, "failed": str(error)}
-            ms.append(1e3 * (time.perf_counter() - begin))
-            azimuth = model.schema.azimuth(truth.parameters)
-            moved = carried_over(simulated.until(window.stop), truth, model.space.anchor, azimuth)
-            errors.append(((moved - truth.vertices)[1:] ** 2).mean())
-        return {
-            "step": step,
-            "segments": segments,
-            "ms": float(np.mean(ms)),
-            "error_mm": float(1e3 * np.sqrt(np.mean(errors))),
-        }
-
-    tried = [attempt(*setting) for setting in COARSER]
-    enough = [row for row in tried if row.get("error_mm", np.inf) <= model_error]
-    equal, truth = min(enough, key=lambda row: row["ms"], default=tried[0]), tried[0]
-    if "failed" in truth:
-        return {"skipped": f"the scene's own setting fails here: {truth['failed']}"}
-    ours = float(np.mean([_motion_ms(model, t.rest, window.times, t.parameters) for t in truths]))
-    # in ms: the data set, and the training on it
-    spent = dataset.provenance["count"] * truth["ms"] + 1e3 * model.checkpoint.provenance["training_seconds"]
-    return {
-        "points": truths[0].vertices.shape[1],
-        "frames": len(window.times),
-        "ms": equal["ms"],
-        "ours_ms": ours,
-        "speedup": equal["ms"] / ours,
-        "error_mm": equal["error_mm"],
-        "ours_error_mm": model_error,
-        "step": equal["step"],
-        "segments": equal["segments"],
-        "sequences": [entry.name for entry in near.entries],
-        "pays_off_after": int(np.ceil(spent / max(equal["ms"] - ours, 1e-9))),
-        "tried": tried,
     }
