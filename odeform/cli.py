@@ -173,7 +173,7 @@ def _info(args: argparse.Namespace) -> None:
 def _bench(args: argparse.Namespace) -> None:
     from odeform.evaluation.bench import bench, report
 
-    result = bench(args.checkpoint)
+    result = bench(args.checkpoint, args.data)
     if args.json:
         _emit(result, args.json)
     print(report(result))
@@ -230,8 +230,9 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--times", metavar="START:STOP:STEP", help="seconds, half-open (default: the trained frames)")
     sub.add_argument("--quality", default="balanced", metavar="NAME")
 
-    sub = command("bench", _bench, "measure latency and compare with peers on this machine")
+    sub = command("bench", _bench, "measure work, precision and latency on this machine, and those of peers")
     sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
+    sub.add_argument("--data", metavar="DATASET", help="the truth (default: the scene's bundled data set, if any)")
     sub.add_argument("--json", metavar="FILE")
 
     sub = command("info", _info, "print what a checkpoint holds")

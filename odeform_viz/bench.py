@@ -13,7 +13,7 @@ import numpy as np
 import odeform
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
-from odeform.evaluation.bench import ball
+from odeform.evaluation.probes import ball
 from odeform.predictor import Predictor
 from odeform.types import Floats, GaussianSplats, Mesh
 from odeform_viz.app import App

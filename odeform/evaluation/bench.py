@@ -1,176 +1,160 @@
-"""What a prediction costs on this machine: latency by stage, and peers in the same run."""
+"""What a prediction costs on this machine and what it is worth: `odeform bench`."""
 
-import itertools
 import os
 import platform
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import trimesh
 
+from odeform.dataset.store import bundled_datasets, open_dataset
+from odeform.evaluation.knobs import knobs
+from odeform.evaluation.limits import limits, scaling
+from odeform.evaluation.peers import peers
+from odeform.evaluation.precision import Place, find_places, measure, work_precision
+from odeform.evaluation.probes import ball, random_parameters, round_splats
+from odeform.evaluation.timing import milliseconds, quantiles
+from odeform.model.odeform import ODeform
 from odeform.model.placed import place
 from odeform.predictor import Predictor, load
-from odeform.schema import Parameters
-from odeform.types import Floats, Geometry, Mesh
 
-__all__ = ["ball", "bench", "report"]
+__all__ = ["bench", "report"]
 
-FRAMES = 20
-PEER_POINTS = 2000
+POINTS = 5_000
+SPLATS = 100_000
 
 
-def _milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> Floats:
-    for index in range(warm):
-        work(index)
-    out = np.empty(repeats)
-    for index in range(repeats):
-        begin = time.perf_counter()
-        work(index)
-        out[index] = 1e3 * (time.perf_counter() - begin)
-    return out
-
-
-def _quantiles(samples: Floats) -> dict[str, float]:
-    return {"p50": float(np.percentile(samples, 50)), "p95": float(np.percentile(samples, 95))}
-
-
-def ball(points: int, predictor: Predictor) -> Mesh:
-    """A round shape of exactly that many points where the predictor expects its body."""
-    rest = np.asarray(predictor.rest.points, dtype=float)
-    centre, radius = 0.5 * (rest.min(axis=0) + rest.max(axis=0)), 0.5 * np.ptp(rest, axis=0).max()
-    index = np.arange(points) + 0.5
-    polar, turn = np.arccos(1.0 - 2.0 * index / points), np.pi * (1.0 + 5.0**0.5) * index
-    unit = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1)
-    hull = trimesh.convex.convex_hull(unit)
-    return Mesh((centre + radius * unit).astype(np.float32), np.asarray(hull.faces))
-
-
-def _random_parameters(predictor: Predictor, count: int) -> list[Parameters]:
-    rng = np.random.default_rng(0)
-    return [{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in predictor.schema.parameters} for _ in range(count)]
-
-
-def _latency(predictor: Predictor, shape: Geometry) -> dict[str, Any]:
-    parameters = _random_parameters(predictor, 60)
-    window = predictor.schema.window
-    # the heading re-evaluates the basis; it is timed by itself below
-    fixed = {p.name: p.default for p in predictor.schema.parameters if p.role == "azimuth"}
-    change = _milliseconds(lambda i: predictor.solve(shape, {**parameters[i % 60], **fixed}), 60)
-    motion = predictor.solve(shape)
-    moments = np.random.default_rng(1).uniform(window.start, window.stop, 300)
-    scrub = _milliseconds(lambda i: motion.vertices(float(moments[i % 300])), 300)
+def _latency(predictor: Predictor) -> dict[str, Any]:
+    """Cold: a change of parameters, of the heading, which needs the basis anew. Warm: a time of a known motion."""
+    shape, window = ball(POINTS, predictor), predictor.schema.window
+    parameters = random_parameters(predictor, 60)
+    motions = [predictor.solve(shape, p) for p in parameters]
+    moments = np.random.default_rng(1).uniform(window.start, window.stop, 300).tolist()
     headings = np.random.default_rng(2).uniform(-np.pi, np.pi, 20)
-    basis = _milliseconds(lambda i: place(shape, motion.space, float(headings[i % 20])), 20)
-    return {
-        "parameter_change_ms": _quantiles(change),
-        "scrub_ms": _quantiles(scrub),
-        "basis_ms": _quantiles(basis),
-        "points": len(shape.points),
+    splats = predictor.solve(round_splats(SPLATS, predictor))
+
+    def show_splats(index: int) -> None:
+        splats.vertices(moments[index])
+        splats.covariances(moments[index])
+
+    timed = {
+        "parameter_change_ms": milliseconds(lambda i: predictor.solve(shape, parameters[i % 60]), 120),
+        "scrub_ms": milliseconds(lambda i: motions[0].vertices(moments[i]), 300 - 3),
+        f"splats_{SPLATS // 1000}k_ms": milliseconds(show_splats, 40),
+        "basis_ms": milliseconds(lambda i: place(shape, motions[0].space, float(headings[i % 20])), 20),
+        "solve_ms": np.array([motion.stats.wall_ms for motion in motions[3:]]),
+        "coordinates_ms": milliseconds(lambda i: motions[1].trajectory.reduced(np.array([moments[i]])), 300 - 3),
     }
+    if isinstance(predictor, ODeform):
+        placed = predictor.place(shape, predictor.schema.azimuth(parameters[0]))
+        thetas = [predictor.schema.vector(predictor.schema.complete(p)) for p in parameters]
+        timed["encode_ms"] = milliseconds(lambda i: predictor.problem(thetas[i % 60], placed, np.float32), 60)
+    return {"points": POINTS, **{name: quantiles(samples) for name, samples in timed.items()}}
 
 
-def _per_point_ms(points: int) -> float:
-    """The paper's layout, one latent of 128 numbers a point (encoder 64-128-128, field 6 x 256, decoder 128-64).
-
-    RK4 with a step a frame, torch, untrained weights: only its time is measured.
-    """
-    import torch
-    from torch import nn
-
-    def mlp(sizes: list[int], act: type[nn.Module]) -> nn.Sequential:
-        layers: list[nn.Module] = []
-        for before, after in itertools.pairwise(sizes):
-            layers += [nn.Linear(before, after), act()]
-        return nn.Sequential(*layers[:-1])
-
-    encode = mlp([41, 64, 128, 128, 128], nn.ReLU)
-    field = mlp([128 + 32 + 1, *([256] * 5), 128], nn.Tanh)
-    decode = mlp([128, 128, 64, 3], nn.ReLU)
-    with torch.inference_mode():
-        inputs, condition = torch.randn(points, 41), torch.randn(points, 33)
-
-        def run(_: int) -> None:
-            z, h = encode(inputs), 1.0 / FRAMES
-            for _ in range(FRAMES - 1):
-                k1 = field(torch.cat([z, condition], dim=1))
-                k2 = field(torch.cat([z + h / 2 * k1, condition], dim=1))
-                k3 = field(torch.cat([z + h / 2 * k2, condition], dim=1))
-                k4 = field(torch.cat([z + h * k3, condition], dim=1))
-                z = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-                decode(z)
-
-        return float(np.median(_milliseconds(run, 5, warm=1)))
-
-
-def _peers(predictor: Predictor) -> dict[str, Any]:
-    shape = ball(PEER_POINTS, predictor)
-    window = predictor.schema.window
-    times = np.linspace(window.start, window.stop, FRAMES)
-    ours = float(np.median(_milliseconds(lambda _: predictor.solve(shape).vertices(times), 30)))
-    theirs = _per_point_ms(PEER_POINTS)
+def _solver(model: ODeform, places: list[Place]) -> dict[str, Any]:
+    default = places[0]
+    qualities = {name: measure(model, default, quality) for name, quality in model.qualities.items()}
+    ms_per_evaluation = float(np.median([row["ms_p50"] / row["evaluations"] for row in qualities.values()]))
     return {
-        "ours": {"points": PEER_POINTS, "frames": FRAMES, "ms": ours, "speedup": 1.0},
-        "per-point latent ODE": {
-            "points": PEER_POINTS,
-            "frames": FRAMES,
-            "ms": theirs,
-            "speedup": theirs / ours,
-            "error_mm": None,
+        "places": {
+            p.name: {
+                "parameters": p.parameters,
+                "reference_unsure_mm": p.unsure_mm,
+                "model_error_mm": p.model_error_mm,
+                "model_error_on": p.sequences,
+            }
+            for p in places
         },
+        "work_precision": work_precision(model, places),
+        "qualities": qualities,
+        "ms_per_evaluation": ms_per_evaluation,
+        "frontier": [{**point.to_json(), "ms": point.evaluations * ms_per_evaluation} for point in model.frontier],
     }
 
 
-def _qualities(predictor: Predictor, shape: Geometry) -> dict[str, Any]:
-    rows = {}
-    for name in predictor.qualities:
-        samples = _milliseconds(lambda _, name=name: predictor.solve(shape, quality=name), 20)
-        stats = predictor.solve(shape, quality=name).stats
-        rows[name] = {
-            "solver": stats.solver,
-            "evaluations": stats.evaluations,
-            "ms_p50": float(np.median(samples)),
-            "ms_p95": float(np.percentile(samples, 95)),
-            "solver_error_mm": stats.solver_error_mm,
-        }
-    return rows
-
-
-def bench(checkpoint: str) -> dict[str, Any]:
-    """Latency at 5,000 vertices, qualities, and peers at 2,000 points."""
+def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
+    """All measurements of one model; `data` is the truth, by default the bundled data set of its scene."""
     predictor = load(checkpoint)
-    shape = ball(5000, predictor)
-    machine = {"processor": platform.processor() or platform.machine(), "cores": os.cpu_count()}
-    return {
-        "machine": machine,
-        "model": predictor.model,
-        "latency": _latency(predictor, shape),
-        "qualities": _qualities(predictor, shape),
-        "peers": _peers(predictor),
+    scene = predictor.schema.scene
+    data = data or (scene if scene in bundled_datasets() else None)
+    dataset = None if data is None else open_dataset(data)
+    machine = {
+        "processor": platform.processor() or platform.machine(),
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     }
+    result = {"machine": machine, "model": predictor.model, "scene": scene, "sha256": predictor.checkpoint.sha256}
+    result |= {"data": data, "latency": _latency(predictor)}
+    places: list[Place] = []
+    if isinstance(predictor, ODeform):
+        places = find_places(predictor, dataset)
+        result |= _solver(predictor, places)
+    return {
+        **result,
+        "knobs": knobs(predictor),
+        "limits": limits(predictor),
+        "scaling": scaling(predictor),
+        "peers": peers(predictor, dataset, places),
+    }
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _table(title: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> list[str]:
+    cells = [list(columns), *([_cell(row.get(column)) for column in columns] for row in rows)]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(columns))]
+    lines = ["  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)) for line in cells]
+    return ["", title, *lines]
+
+
+def _setting(row: Mapping[str, Any]) -> str:
+    return f"h = {1e3 * row['step']:.3g} ms" if "step" in row else f"tol {row['tolerance']:.0e}"
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The figures as a few lines of text."""
-    latency = result["latency"]
+    """The figures as tables."""
+    machine, latency = result["machine"], result["latency"]
     lines = [
-        f"{result['model']} on {result['machine']['cores']} cores",
-        *(
-            f"{key:<24} p50 {value['p50']:8.3f} ms   p95 {value['p95']:8.3f} ms"
-            for key, value in latency.items()
-            if isinstance(value, Mapping)
-        ),
-        *(
-            f"quality {name:<16} {row['solver']}: {row['evaluations']} evaluations, {row['ms_p50']:.2f} ms, "
-            f"solver error {row['solver_error_mm']:.2g} mm"
-            for name, row in result["qualities"].items()
-        ),
-        *(
-            f"{name}: {row['ms']:.1f} ms for {row['frames']} frames of {row['points']} points, "
-            f"ours {row['speedup']:.0f} times faster"
-            for name, row in result["peers"].items()
-            if name != "ours"
-        ),
+        f"{result['model']} of {result['scene']} on {machine['cores']} cores of {machine['processor']}; load at the "
+        f"start {_cell(machine['load'])}; truth: {result['data'] or 'none at hand'}"
     ]
+    stages = [{"stage": key, **value} for key, value in latency.items() if isinstance(value, Mapping)]
+    lines += _table(f"latency at {latency['points']} points, ms", stages, ("stage", "p50", "p95"))
+    columns = ("at", "solver", "setting", "dtype", "evaluations", "ms_p50", "ms_p95", "solver_error_mm")
+    if "qualities" in result:
+        rows = [{**row, "at": name, "setting": _setting(row)} for name, row in result["qualities"].items()]
+        lines += _table("qualities, at the default parameters", rows, columns)
+        for name, place in result["places"].items():
+            rows = [{**row, "setting": _setting(row)} for row in result["work_precision"] if row["at"] == name]
+            lines += _table(
+                f"work and precision at the {name}: model error {_cell(place['model_error_mm'])} mm on "
+                f"{len(place['model_error_on'])} test sequences nearby, reference sure to "
+                f"{place['reference_unsure_mm']:.1g} mm",
+                rows,
+                columns[1:],
+            )
+        rows = [{**row, "setting": _setting(row)} for row in result["frontier"]]
+        lines += _table(
+            "frontier (validation split)", rows, ("method", "setting", "evaluations", "ms", "solver_error_mm")
+        )
+    lines += _table("other knobs, a frame", result["knobs"], ("knob", "points", "ms", "saves_ms", "error_mm"))
+    rows = [{"limit": key, "measured": value} for key, value in result["limits"].items()]
+    lines += _table("limits of the machine", rows, ("limit", "measured"))
+    lines += _table("scaling, a frame", result["scaling"], ("points", "solve_ms", "basis_ms", "decode_ms"))
+    rows = [{"peer": name, **row} for name, row in result["peers"].items()]
+    measured = [row for row in rows if "skipped" not in row]
+    lines += _table("peers", measured, ("peer", "points", "frames", "ms", "ours_ms", "speedup", "error_mm"))
+    lines += [f"{row['peer']}: skipped, {row['skipped']}" for row in rows if "skipped" in row]
+    if "tried" in (simulator := result["peers"].get("mujoco, equal error", {})):
+        lines += _table(
+            f"simulations tried; ours is off by {simulator['ours_error_mm']:.3g} mm on the same "
+            f"{len(simulator['sequences'])} sequences and pays off after {simulator['pays_off_after']} queries",
+            simulator["tried"],
+            ("step", "segments", "ms", "error_mm", "failed"),
+        )
     return "\n".join(lines)

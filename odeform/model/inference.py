@@ -18,10 +18,20 @@ from odeform.model.motion import SolveStats
 from odeform.model.reduced import POSE, body_scale
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution, Status
+from odeform.solver.stages import Field
 from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
-__all__ = ["LatentTrajectory", "check_weights", "make_decoder", "make_encoder", "make_field", "pool_shape"]
+__all__ = [
+    "Decoder",
+    "Field",
+    "LatentTrajectory",
+    "check_weights",
+    "make_decoder",
+    "make_encoder",
+    "make_field",
+    "pool_shape",
+]
 
 
 def _silu(x: Floats) -> Floats:
@@ -107,9 +117,6 @@ def _folded(layers: list[tuple[Floats, Floats]], theta: Floats) -> list[tuple[Fl
     return [(first[:, :seen], bias + first[:, seen:] @ theta), *others]
 
 
-Field = Callable[[float, Floats], Floats]
-
-
 def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Field]:
     """theta (P,) -> the field dz/dt = f(z). Matrices are laid out once; a change of parameters only changes a bias.
 
@@ -124,7 +131,7 @@ def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[F
         [np.pad(m[:, :s], ((0, 0), (0, config.state - s))) for ((m, _), *_), s in zip(branches, sights, strict=True)]
     )
     told = np.concatenate([m[:, s:] for ((m, _), *_), s in zip(branches, sights, strict=True)])
-    middle, last = (block_diag(*(branch[layer][0] for branch in branches)) for layer in (1, 2))
+    middle, last = (np.asarray(block_diag(*(branch[layer][0] for branch in branches))) for layer in (1, 2))
     biases = [np.concatenate([branch[layer][1] for branch in branches]) for layer in range(3)]
     matrices = [np.asfortranarray(m.astype(dtype)) for m in (first, middle, rate * last)]
     others = [biases[1].astype(dtype), (rate * biases[2]).astype(dtype)]
@@ -137,7 +144,7 @@ def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[F
 
 def _field(matrices: list[Floats], biases: list[Floats]) -> Field:
     """Layers with tanh between them."""
-    product = get_blas_funcs("gemv", matrices)
+    (product,) = get_blas_funcs(("gemv",), matrices)
     *hidden, (last, last_bias) = zip(matrices, biases, strict=True)
 
     def field(_: float, state: Floats) -> Floats:
@@ -196,7 +203,7 @@ class LatentTrajectory:
 
     def __init__(
         self,
-        field: Callable[[float, Floats], Floats],
+        field: Field,
         decode: Decoder,
         start: Floats,
         quality: Quality,

@@ -168,9 +168,9 @@ class Motion:
 
     def _deformation(self, y: Floats, block: slice = slice(None)) -> Frames:
         """(T, n, 3) canonical displacements of the points in `block`: one product for all times."""
-        modes = len(self.placed.values)
-        values = self.placed.values.reshape(modes, -1, 3)[:, block].reshape(modes, -1)
-        return (y[:, 6:].astype(np.float32) @ values).reshape(len(y), -1, 3)
+        begin, end, _ = block.indices(len(self.placed.points))
+        moved = y[:, 6:].astype(np.float32) @ self.placed.values[:, 3 * begin : 3 * end]
+        return moved.reshape(len(y), -1, 3)
 
     def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
         """The triads under the deformation of `y` (1, 6 + K), turned from canonical axes by `turn` (3, 3)."""

@@ -5,7 +5,16 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
-from odeform.model.inference import LatentTrajectory, check_weights, make_decoder, make_encoder, make_field, pool_shape
+from odeform.model.inference import (
+    Decoder,
+    Field,
+    LatentTrajectory,
+    check_weights,
+    make_decoder,
+    make_encoder,
+    make_field,
+    pool_shape,
+)
 from odeform.model.placed import PlacedBasis
 from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
@@ -47,9 +56,11 @@ class ODeform(ReducedModel):
         assert quality is not None
         return self.integrate(theta, placed, quality, until)
 
+    def problem(self, theta: Floats, placed: PlacedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
+        """The initial value problem of parameters in [-1, 1]: field, state at time 0, and the decoder of states."""
+        return self._fields[dtype](theta), self._encode(self._pool(placed), theta, dtype), self._decoder(theta)
+
     def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
         """The solved latent motion for parameters in [-1, 1]."""
-        dtype = np.float32 if quality.dtype == "float32" else np.float64
-        start = self._encode(self._pool(placed), theta, dtype)
-        field = self._fields[dtype](theta)
-        return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)
+        field, start, decode = self.problem(theta, placed, np.float32 if quality.dtype == "float32" else np.float64)
+        return LatentTrajectory(field, decode, start, quality, until, self.space.arm)

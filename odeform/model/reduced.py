@@ -17,7 +17,17 @@ from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z,
 from odeform.model.basis import DisplacementBasis, fit_basis
 from odeform.types import Arrays, Basis, Floats, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
-__all__ = ["POSE", "ReducedSpace", "body_scale", "decompose", "fit_modes", "make_space", "rotation_of", "to_canonical"]
+__all__ = [
+    "POSE",
+    "ReducedSpace",
+    "body_scale",
+    "decompose",
+    "fit_modes",
+    "make_space",
+    "motion_rmse",
+    "rotation_of",
+    "to_canonical",
+]
 
 POSE = 6  # numbers of the rigid part of y
 
@@ -111,3 +121,9 @@ def body_scale(arm: float, size: int) -> Floats:
     scale = np.ones(size)
     scale[3:POSE] = arm * np.sqrt(2.0 / 3.0)
     return scale
+
+
+def motion_rmse(one: Float[np.ndarray, "*batch y"], other: Float[np.ndarray, "*batch y"], arm: float) -> float:
+    """Root mean square difference in metres between motions y (..., 6 + K), over coordinates, points and the rest."""
+    difference = (one - other) * body_scale(arm, one.shape[-1])
+    return float(np.sqrt((difference**2).sum(axis=-1).mean() / 3.0))

@@ -7,7 +7,10 @@ from typing import Any
 from odeform.errors import InputError
 from odeform.solver.integrate import Quality
 
-__all__ = ["FrontierPoint", "cheapest_within_error", "finest_within_budget", "non_dominated"]
+__all__ = ["EXACT", "FrontierPoint", "cheapest_within_error", "finest_within_budget", "non_dominated"]
+
+EXACT = Quality("dopri5", tolerance=1e-10, dtype="float64")
+"""What solver errors are measured against."""
 
 
 @dataclass(frozen=True)

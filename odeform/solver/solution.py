@@ -56,7 +56,9 @@ class Solution:
         s = min(max((time - self.times[index]) / step, 0.0), 1.0)
         middle = self.middles[index] if self.middles else None
         weights = _weights(s, step)
-        return _between(weights, *self.states[index : index + 2], *self.slopes[index : index + 2], middle)
+        y0, y1 = self.states[index : index + 2]
+        f0, f1 = self.slopes[index : index + 2]
+        return _between(weights, y0, y1, f0, f1, middle)
 
     def sample(self, times: Floats) -> Any:
         """(T, ...) states at `times`, numpy states only: to the last bit what `at` gives, many in one go."""

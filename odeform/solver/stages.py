@@ -27,7 +27,7 @@ class Stages:
 
     def _keep(self, start: Any) -> None:
         self._slopes = np.empty((start.size, len(self._rows) + 1), start.dtype, order="F")
-        self._product = get_blas_funcs("gemv", dtype=start.dtype)
+        (self._product,) = get_blas_funcs(("gemv",), dtype=start.dtype)
         rows = {*self._rows, self._method.error or (), self._method.middle or ()}
         self._weighed = {row: (self._slopes[:, : len(row)], np.array(row, start.dtype)) for row in rows}
 
@@ -41,12 +41,13 @@ class Stages:
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
         """The state after one step, and the slope there. It takes `evaluations`."""
+        after = state
         self._put(0, slope)
         for index, (weights, node) in enumerate(zip(self._rows, self._nodes, strict=True), start=1):
             after = self._ahead(state, weights, step)
             slope = field(time + node * step, after)
             self._put(index, slope)
-        return after, slope  # pyright: ignore[reportPossiblyUnbound]
+        return after, slope
 
     @property
     def evaluations(self) -> int:

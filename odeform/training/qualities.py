@@ -7,8 +7,8 @@ import numpy as np
 
 from odeform.model.data import TrainingData
 from odeform.model.odeform import ODeform
-from odeform.model.reduced import body_scale
-from odeform.solver.frontier import FrontierPoint, cheapest_within_error, non_dominated
+from odeform.model.reduced import motion_rmse
+from odeform.solver.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
@@ -16,7 +16,6 @@ __all__ = ["choose_qualities", "measure_frontier"]
 
 SHARES = {"draft": 1.0, "balanced": 0.1}
 """Solver error that a quality may add, as a share of the model's own. A tenth adds half a per cent to the total."""
-TRUTH = Quality("dopri5", tolerance=1e-10, dtype="float64")
 
 
 def _candidates(step: float) -> list[Quality]:
@@ -34,7 +33,6 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
     the data; both are root mean squares over the body's points and coordinates, and over time.
     """
     placed = model.place(model.rest, 0.0)
-    scale = body_scale(data.space.arm, data.reduced["val"].shape[-1])
 
     def motions(quality: Quality) -> tuple[Floats, float]:
         """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
@@ -43,15 +41,15 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
         reduced = [s.reduced(data.times) + (0.0 if np.isinf(s.last_good) else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
-    def rmse(a: Floats, b: Floats) -> float:
-        return float(1e3 * np.sqrt((((a - b) * scale)[:, 1:] ** 2).sum(axis=-1).mean() / 3.0))
+    def error_mm(motion: Floats, truth: Floats) -> float:
+        return 1e3 * motion_rmse(motion[:, 1:], truth[:, 1:], data.space.arm)
 
-    truth, _ = motions(TRUTH)
+    truth, _ = motions(EXACT)
     points = []
     for quality in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(quality)
-        points.append(FrontierPoint(quality, evaluations, rmse(reduced, truth)))
-    return non_dominated(points), rmse(truth, data.reduced["val"])
+        points.append(FrontierPoint(quality, evaluations, error_mm(reduced, truth)))
+    return non_dominated(points), error_mm(truth, data.reduced["val"])
 
 
 def choose_qualities(
