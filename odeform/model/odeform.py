@@ -49,4 +49,5 @@ class ODeform(ReducedModel):
         dtype = np.float32 if quality.dtype == "float32" else np.float64
         start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
         field = self._fields[dtype](theta)
-        return LatentTrajectory(field, self._decoder(theta), start, quality, until, self.space.arm)
+        fallback = Quality("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
+        return LatentTrajectory(field, self._decoder(theta), start, quality, fallback, until, self.space.arm)

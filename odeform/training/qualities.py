@@ -39,7 +39,7 @@ def choose_qualities(model: ODeform, data: TrainingData, shares: Mapping[str, fl
         """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
         stop = float(data.times[-1])
         solved = [model.integrate(theta, placed, quality, stop) for theta in data.theta["val"]]
-        reduced = [s.reduced(data.times) + (0.0 if np.isinf(s.last_good) else np.nan) for s in solved]
+        reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
     def rmse(a: Floats, b: Floats) -> float:

@@ -1,5 +1,7 @@
 """What is shown, how it was computed, and how far it may be trusted."""
 
+import math
+
 import viser
 
 from odeform_viz.heat import BANDS
@@ -57,7 +59,8 @@ def describe(shown: ColumnFrame, settled: bool = True) -> str:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
     if stats.status != "ok":
         last = shown.motion.trajectory.last_good  # pyright: ignore[reportAttributeAccessIssue]
-        lines.append(f"⚠ **{stats.status}**: showing the last good state, t = {last:.3f} s")
+        later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
+        lines.append(f"⚠ **{stats.status}**{later}")
     return "  \n".join(lines)
 
 
