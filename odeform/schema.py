@@ -136,7 +136,7 @@ class Schema:
         """Names of the parameters beyond their trained range."""
         return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
 
-    def vector(self, parameters: Parameters) -> NDArray[np.float64]:
+    def vector(self, parameters: Parameters) -> Floats:
         """(P,) the learned parameters as models see them: trained ranges are [-1, 1], and nothing is beyond 1.25."""
         return faded(np.array([p.normalise(parameters[p.name]) for p in self.learned]), 1.0, BEYOND)
 

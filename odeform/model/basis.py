@@ -2,8 +2,8 @@
 
 A deformation is d(x, t) = sum_k c_k(t) phi_k(x). Each phi_k is a radial-basis network over the training surface,
 sum_j w_jk |x - x_j|^3 + a_k + B_k x: exact at the training vertices, the smoothest field between them (it minimises
-bending energy; Duchon 1977), with a closed-form gradient. Points farther from the anchor than twice the trained body
-reaches are taken for points below them, at most three times as far: far off, the sum would be nothing but rounding.
+bending energy; Duchon 1977), with a closed-form gradient. Points farther from the anchor than six times the trained
+body reaches are taken for points below them, at most nine times as far: far off, the sum would be all rounding.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class DisplacementBasis:
 
     @cached_property
     def _far(self) -> float:
-        return 2.0 * float(np.linalg.norm(self.centers, axis=1).max())
+        return 6.0 * float(np.linalg.norm(self.centers, axis=1).max())
 
     def _near(self, points: Points) -> tuple[Points, Perpoint, Perpoint]:
         """Points in units of `scale`, their distances from the anchor, and those of the points they are taken for."""

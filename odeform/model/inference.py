@@ -14,13 +14,13 @@ from scipy.special import expit
 
 from odeform.model.config import ModelConfig
 from odeform.model.motion import SolveStats
-from odeform.model.reduced import POSE
+from odeform.model.reduced import POSE, small_motion
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution, Status
 from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
-__all__ = ["LatentTrajectory", "check_weights", "encode", "make_decoder", "make_field", "pool_shape"]
+__all__ = ["Field", "LatentTrajectory", "check_weights", "encode", "make_decoder", "make_field", "pool_shape"]
 
 
 def _silu(x: Floats) -> Floats:
@@ -269,9 +269,7 @@ class LatentTrajectory:
             return None
         times = np.linspace(0.0, self._span, 129)[1:]
         difference = self._decode(times, self._solution.sample(times)) - self._decode(times, other.sample(times))
-        # a small turn |w| moves a round body of radius of gyration r by sqrt(2/3) r |w| in RMS
-        difference[:, 3:POSE] *= self._arm * np.sqrt(2.0 / 3.0)
-        return float(1e3 * np.linalg.norm(difference, axis=1).max() / share)
+        return float(1e3 * small_motion(difference, self._arm).max() / share)
 
     @property
     def stats(self) -> SolveStats:

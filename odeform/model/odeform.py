@@ -5,7 +5,15 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
-from odeform.model.inference import LatentTrajectory, check_weights, encode, make_decoder, make_field, pool_shape
+from odeform.model.inference import (
+    Field,
+    LatentTrajectory,
+    check_weights,
+    encode,
+    make_decoder,
+    make_field,
+    pool_shape,
+)
 from odeform.model.placed import PlacedBasis
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
@@ -44,10 +52,13 @@ class ODeform(ReducedModel):
         assert quality is not None
         return self.integrate(theta, placed, quality, until)
 
+    def flow(self, theta: Floats, placed: PlacedBasis, precision: str) -> tuple[Field, Floats]:
+        """What is integrated: the field dz/dt = f(t, z), and the latent state (S,) at rest."""
+        dtype = np.float32 if precision == "float32" else np.float64
+        return self._fields[dtype](theta), encode(self.weights, self.config, self._pool(placed), theta, dtype)
+
     def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
         """The solved latent motion for parameters in [-1, 1]."""
-        dtype = np.float32 if quality.dtype == "float32" else np.float64
-        start = encode(self.weights, self.config, self._pool(placed), theta, dtype)
-        field = self._fields[dtype](theta)
+        field, start = self.flow(theta, placed, quality.dtype)
         fallback = Quality("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
         return LatentTrajectory(field, self._decoder(theta), start, quality, fallback, until, self.space.arm)

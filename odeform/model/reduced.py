@@ -17,7 +17,16 @@ from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z,
 from odeform.model.basis import DisplacementBasis, fit_basis
 from odeform.types import Arrays, Basis, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
-__all__ = ["POSE", "ReducedSpace", "decompose", "fit_modes", "make_space", "rotation_of", "to_canonical"]
+__all__ = [
+    "POSE",
+    "ReducedSpace",
+    "decompose",
+    "fit_modes",
+    "make_space",
+    "rotation_of",
+    "small_motion",
+    "to_canonical",
+]
 
 POSE = 6  # numbers of the rigid part of y
 
@@ -101,3 +110,13 @@ def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Ro
     """Pose (..., 6) -> rotation (..., 3, 3) from canonical to scene axes, shift (..., 3) in scene axes."""
     turn = rotation_z(azimuth)
     return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T
+
+
+def small_motion(y: Float[np.ndarray, "*batch y"], arm: float) -> Float[np.ndarray, "*batch"]:
+    """Root-mean-square displacement in metres of a round body of radius of gyration `arm` by a small y (..., 6 + K).
+
+    A small turn |w| moves it by sqrt(2/3) arm |w|.
+    """
+    pose, local = y[..., :POSE], y[..., POSE:]
+    turn = 2.0 / 3.0 * arm**2 * (pose[..., 3:] ** 2).sum(axis=-1)
+    return np.sqrt((pose[..., :3] ** 2).sum(axis=-1) + turn + (local**2).sum(axis=-1))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from odeform.model.inference import LatentTrajectory
+from odeform.solver import integrate as solver
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Status
 from odeform.types import Floats
@@ -28,15 +29,21 @@ def decode(times: Floats, states: Floats) -> Floats:
     return np.concatenate([np.zeros((len(times), 6)), states], axis=1)
 
 
+@pytest.fixture(autouse=True)
+def _few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "MAX_STEPS", 400)
+
+
 def solve(field: Field, quality: Quality, until: float) -> LatentTrajectory:
     return LatentTrajectory(field, decode, np.array([1.0]), quality, FIXED, until, arm=0.1)
 
 
 @pytest.mark.parametrize("method", ["bosh3", "dopri5"])
 def test_fixed_steps_take_over(method: str) -> None:
-    quality, times = Quality(method, tolerance=1e-6, dtype="float64"), np.linspace(0.0, 0.1, 21)
+    quality = Quality(method, tolerance=1e-6, dtype="float64")
     alone = integrate(stiff, np.array([1.0]), quality, 0.1)
     assert alone.status is Status.MAX_STEPS
+    times = np.concatenate([np.linspace(0.0, alone.end, 9), np.linspace(alone.end, 0.1, 21)[1:]])
     motion = solve(stiff, quality, 0.1)
     stats = motion.stats
     assert stats.status == "fixed steps"
@@ -46,9 +53,7 @@ def test_fixed_steps_take_over(method: str) -> None:
     assert stats.solver_error_mm is None
     assert motion.last_good == np.inf
     y = motion.reduced(times)[:, 6] + 1.0
-    sound = times <= alone.end
-    assert 1 < sound.sum() < len(times)
-    assert np.array_equal(y[sound], alone.sample(times[sound])[:, 0])
+    assert np.array_equal(y[:9], alone.sample(times[:9])[:, 0])
     # fixed steps overshoot by at most what the slope of 10 does in one
     assert 1e-6 < np.abs(y - np.cos(times)).max() < 0.1
 

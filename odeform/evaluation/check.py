@@ -1,0 +1,25 @@
+"""What a stress run says of a model: a measured figure, and the bound that a user would need."""
+
+import math
+from dataclasses import dataclass
+
+__all__ = ["Check", "Checks"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """`figure` should not exceed `bound`, or should reach it where `at_least`; what is not finite never holds."""
+
+    figure: float | int
+    bound: float | int
+    at_least: bool = False
+
+    @property
+    def holds(self) -> bool:
+        return math.isfinite(self.figure) and (
+            self.figure >= self.bound if self.at_least else self.figure <= self.bound
+        )
+
+
+Checks = dict[str, Check]
+"""By name; the names end in units."""
