@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["Parameter", "Parameters", "Schema", "Window", "faded"]
+__all__ = ["LATER", "Parameter", "Parameters", "Schema", "Window", "faded"]
 
 Parameters = Mapping[str, float]
 

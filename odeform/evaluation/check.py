@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 __all__ = ["Check", "Checks"]
 
@@ -19,6 +20,13 @@ class Check:
         return math.isfinite(self.figure) and (
             self.figure >= self.bound if self.at_least else self.figure <= self.bound
         )
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "holds": self.holds,
+            "figure": self.figure if math.isfinite(self.figure) else None,
+            "bound": self.bound,
+        }
 
 
 Checks = dict[str, Check]

@@ -39,12 +39,9 @@ def inside(schema: Schema, count: int, seed: int, reach: float = 1.0) -> list[di
     return [{p.name: p.denormalise(rng.uniform(-reach, reach)) for p in schema.parameters} for _ in range(count)]
 
 
-def draws(schema: Schema, window: float, integrates: bool, count: int, seed: int) -> list[Draw]:
-    """`count` distinct ones, the same for the same seed: corners and extremes, then random ones.
-
-    `window` in seconds is what steps are measured by.
-    """
-    rng = np.random.default_rng(seed)
+def draws(schema: Schema, integrates: bool, count: int, seed: int) -> list[Draw]:
+    """`count` distinct ones, the same for the same seed: corners and extremes, or some of these, then random ones."""
+    rng, window = np.random.default_rng(seed), schema.window.stop
     middle = tuple(p.default for p in schema.parameters)
 
     def ways(qualities: list[Quality]) -> list[Quality] | list[None]:

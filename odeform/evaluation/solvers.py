@@ -9,7 +9,9 @@ from odeform.evaluation.check import Check, Checks
 from odeform.evaluation.draws import inside, random_quality
 from odeform.model.inference import Field
 from odeform.model.odeform import ODeform
-from odeform.model.reduced import small_motion
+from odeform.model.placed import PlacedBasis
+from odeform.model.reduced import POSE, small_motion
+from odeform.schema import LATER
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.tableau import METHODS
 from odeform.types import Floats
@@ -68,8 +70,9 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
 def check_field(model: ODeform, seed: int = 0) -> Checks:
     """`lyapunov_per_s`: largest finite-time exponent over the window, from the derivative of its end by its start.
 
-    Its bound lets rounding in single precision grow to a thousandth. `state_growth`: the largest latent number ever,
-    at late times too, over the largest within the window.
+    Its bound lets rounding in single precision grow to a thousandth. `state_growth`: the largest latent number ever
+    shown, at late times too, over the largest within the window. `until_divergence_unbounded_windows`: when deformation
+    would exceed twice the largest within the window if clocks did not stop; to where they stop it has to be sound.
     """
     placed, schema = model.place(model.rest, 0.0), model.schema
     window, step = schema.window, Quality("rk4", step=1.0 / schema.window.rate)
@@ -90,7 +93,19 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
     return {
         "lyapunov_per_s": Check(exponent, allowed),
         "state_growth": Check(ever / within, 2.0),
+        "until_divergence_unbounded_windows": Check(_divergence(model, placed, seed), 1.0 + LATER, at_least=True),
     }
+
+
+def _divergence(model: ODeform, placed: PlacedBasis, seed: int) -> float:
+    """Windows, at most 10, after which any motion of the trained box is deformed twice as much as any within it."""
+    schema, step = model.schema, Quality("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
+    thetas = [schema.vector(parameters) for parameters in inside(schema, 4 * DRAWS, seed)]
+    times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
+    motions = [model.integrate(theta, placed, step, float(times[-1])).reduced(times) for theta in thetas]
+    deformed = np.max([np.linalg.norm(y[:, POSE:], axis=1) for y in motions], axis=0)
+    diverged = deformed > 2.0 * deformed[times <= schema.window.stop].max()
+    return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)
 
 
 def check_calibration(model: ODeform, seed: int = 0) -> Checks:

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,10 +73,10 @@ def _shown(predictor: Predictor, draw: Draw, geometry: Geometry, begin: float) -
 
 
 def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
-    """At least `count` distinct draws, and all checks; the same for the same seed, but for times."""
+    """`count` distinct draws and all checks, as JSON; the same for the same seed, but for wall times."""
     predictor = load(checkpoint)
     schema, geometries = predictor.schema, shapes(predictor.rest)
-    asked = draws(schema, schema.window.stop, bool(predictor.qualities), count, seed)
+    asked = draws(schema, bool(predictor.qualities), count, seed)
     progress = Progress("stress", len(asked))
     outcomes = []
     for draw in asked:
@@ -84,26 +84,14 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
         progress.advance()
     progress.close()
     checks = _of_all(predictor, asked, outcomes, seed)
-    parts: list[Callable[[], Checks]] = [
-        lambda: check_answers(predictor, seed),
-        lambda: check_physics(predictor, seed),
-    ]
+    checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
-        model = predictor
-        parts += [
-            lambda: check_orders(model, seed),
-            lambda: check_field(model, seed),
-            lambda: check_calibration(model, seed),
-        ]
-    for part in parts:
-        checks |= part()
+        checks |= check_orders(predictor, seed) | check_field(predictor, seed) | check_calibration(predictor, seed)
     return {
         "cases": len(asked),
         "non_finite_shown": sum(outcome.non_finite for outcome in outcomes),
         "by_status": dict(Counter(outcome.status for outcome in outcomes).most_common()),
-        "checks": {
-            name: {"holds": check.holds, "figure": check.figure, "bound": check.bound} for name, check in checks.items()
-        },
+        "checks": {name: check.to_json() for name, check in checks.items()},
     }
 
 
@@ -152,8 +140,7 @@ def report(result: Mapping[str, Any]) -> str:
     """The result as a few lines of text."""
     lines = [f"{result['cases']} cases, {result['non_finite_shown']} frames shown that were not finite"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
-    lines += [
-        f"{'holds' if check['holds'] else 'FAILS'}   {name:<36} {check['figure']:>12.4g}   bound {check['bound']:.4g}"
-        for name, check in result["checks"].items()
-    ]
+    for name, check in result["checks"].items():
+        figure = "not finite" if check["figure"] is None else f"{check['figure']:.4g}"
+        lines.append(f"{'holds' if check['holds'] else 'FAILS'}   {name:<40}{figure:>12}   bound {check['bound']:.4g}")
     return "\n".join(lines)

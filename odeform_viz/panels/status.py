@@ -22,7 +22,7 @@ def moment_in_words(frame: Frame) -> str:
     if motion.extrapolates(time):
         beyond.insert(0, "time")
     sunk = [shown.column.label for shown in frame.columns if shown.sunk]
-    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained" if beyond else ""
+    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained, where motions fade" if beyond else ""
     if not words:
         window = motion.schema.window
         phase = (time - window.start) * window.rate

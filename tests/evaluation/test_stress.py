@@ -45,10 +45,10 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
-    some = draws(model.schema, 1.0, True, 3000, seed=0)
+    some = draws(model.schema, True, 3000, seed=0)
     assert len(set(some)) == len(some) == 3000
-    assert repr(draws(model.schema, 1.0, True, 3000, seed=0)) == repr(some)
-    assert repr(draws(model.schema, 1.0, True, 3000, seed=1)) != repr(some)
+    assert repr(draws(model.schema, True, 3000, seed=0)) == repr(some)
+    assert repr(draws(model.schema, True, 3000, seed=1)) != repr(some)
     assert {d.shape for d in some} == set(shapes(model.rest))
     ways = {(d.quality.method, d.quality.dtype) for d in some if d.quality}
     assert ways == set(itertools.product(tableau.METHODS, ("float32", "float64")))
@@ -56,7 +56,7 @@ def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform)
     assert set(np.round([model.schema.parameters[0].normalise(m) for m in mass if 0.0 < m < 1e9], 6)) >= {
         sign * reach for sign in (-1.0, 1.0) for reach in (1.0, 1.5, 3.0, 10.0)
     }
-    few = draws(model.schema, 1.0, True, 50, seed=0)
+    few = draws(model.schema, True, 50, seed=0)
     assert len(few) == 50
     assert sum(math.isinf(max(d.values)) for d in some) > 0
 
@@ -103,7 +103,7 @@ def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytes
 
 
 def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:
-    some = draws(model.schema, model.schema.window.stop, True, 3000, seed=0)[-5:]
+    some = draws(model.schema, True, 3000, seed=0)[-5:]
     return (stress.show(model, draw, shapes(model.rest)) for draw in some)
 
 
