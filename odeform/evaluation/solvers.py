@@ -83,8 +83,8 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
         def end(at: Floats, field: Field = field) -> Floats:
             return integrate(field, at, step, window.stop).at(window.stop)
 
-        moved = np.stack([end(start + by * unit) - end(start - by * unit) for unit in np.eye(len(start))])
-        exponent = max(exponent, math.log(np.linalg.norm(moved / (2.0 * by), 2)) / window.stop)
+        moved = np.stack([end(start + by * unit) for unit in np.eye(len(start))]) - end(start)
+        exponent = max(exponent, math.log(np.linalg.norm(moved / by, 2)) / window.stop)
         states = integrate(field, start, step, float(window.seen(np.array(10.0 * window.stop))))
         sizes = np.abs(states.states).max(axis=1)
         within = max(within, float(sizes[np.array(states.times) <= window.stop].max()))

@@ -27,6 +27,8 @@ from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor
 from odeform.solver import tableau
 
+REFINED = (8, 12, 16, 48)  # within the asymptotic range of all methods
+
 
 @pytest.fixture
 def model(predictors: dict[str, Predictor]) -> ODeform:
@@ -42,6 +44,7 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (answers, physics, solvers):
         monkeypatch.setattr(module, "DRAWS", 1)
     monkeypatch.setattr(solvers, "CALIBRATION", (4, 6))
+    monkeypatch.setattr(solvers, "REFINED", REFINED)
 
 
 def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
@@ -73,7 +76,7 @@ def test_bounds() -> None:
 @pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("name", ["odeform", "pod-rbf"])
 def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    out, cases = tmp_path / "stress.json", 40
+    out, cases = tmp_path / "stress.json", 30
     assert main(["stress", str(trained[name]), "--cases", str(cases), "--json", str(out)]) == 0
     result = json.loads(out.read_text())
     assert set(result) == {"cases", "non_finite_shown", "by_status", "checks"}
@@ -96,6 +99,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
 
 def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solvers, "DRAWS", 1)
+    monkeypatch.setattr(solvers, "REFINED", REFINED)
     monkeypatch.setattr(solvers, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
     monkeypatch.setitem(tableau.METHODS, "rk4", replace(tableau.METHODS["rk4"], b=(1 / 6, 1 / 3, 1 / 6, 1 / 3)))
     checks = solvers.check_orders(model)
