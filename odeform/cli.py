@@ -179,6 +179,23 @@ def _bench(args: argparse.Namespace) -> None:
     print(report(result))
 
 
+def _stress(args: argparse.Namespace) -> None:
+    from odeform.evaluation.stress import report, stress
+
+    if args.cases < 1:
+        raise InputError(f"--cases: expected a positive number, got {args.cases}")
+    if args.map:
+        from odeform.evaluation.stability import map_image, stability_map
+        from odeform.files import write_aside
+        from odeform.predictor import load
+
+        write_aside(Path(args.map), map_image(stability_map(load(args.checkpoint))))
+    result = stress(args.checkpoint, args.cases)
+    if args.json:
+        _emit(result, args.json)
+    print(report(result))
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="odeform", description="Learned continuous motion of soft bodies.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -233,6 +250,12 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("bench", _bench, "measure work, precision and latency on this machine, and those of peers")
     sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
     sub.add_argument("--data", metavar="DATASET", help="the truth (default: the scene's bundled data set, if any)")
+    sub.add_argument("--json", metavar="FILE")
+
+    sub = command("stress", _stress, "ask a model for the extremes and check what it then shows")
+    sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
+    sub.add_argument("--cases", type=int, default=20_000, metavar="N", help="distinct draws, at least (20000)")
+    sub.add_argument("--map", metavar="FILE.png", help="where it is stable, over two parameters and time, as a picture")
     sub.add_argument("--json", metavar="FILE")
 
     sub = command("info", _info, "print what a checkpoint holds")

@@ -9,10 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
+from odeform.types import Floats
 
-__all__ = ["Parameter", "Parameters", "Schema", "Window"]
+__all__ = ["LATER", "Parameter", "Parameters", "Schema", "Window", "faded"]
 
 Parameters = Mapping[str, float]
+
+BEYOND = 0.25
+"""How far models see beyond a trained range, in halves of that range. A cubic interpolant's deformations are doubled
+there, and 400 times too large ten times beyond."""
+LATER = 0.5
+"""How far models see beyond the trained window, in windows: deformations stay below the largest trained, and are 13
+times that at three windows."""
+
+
+def faded(values: Floats, limit: float, margin: float) -> Floats:
+    """Magnitudes up to `limit` to the last bit as they are; beyond, smoothly, ever less, and never by over `margin`.
+
+    What models are asked for passes through here, so that they are continuous functions of a bounded set: whatever is
+    asked, the motion stays bounded.
+    """
+    size = np.abs(values)
+    return np.where(size <= limit, values, np.sign(values) * (limit + margin * np.tanh((size - limit) / margin)))
 
 
 @dataclass(frozen=True)
@@ -78,6 +96,10 @@ class Window:
         count = round((self.stop - self.start) * self.rate)
         return self.start + np.arange(count + 1) / self.rate
 
+    def seen(self, times: Floats) -> Floats:
+        """(T,) times as models see them: clocks run ever slower after the trained span, and stop half a span later."""
+        return faded(times, self.stop, LATER * (self.stop - self.start))
+
 
 @dataclass(frozen=True)
 class Schema:
@@ -114,9 +136,9 @@ class Schema:
         """Names of the parameters beyond their trained range."""
         return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
 
-    def vector(self, parameters: Parameters) -> NDArray[np.float64]:
-        """(P,) the learned parameters, each with its trained range mapped to [-1, 1]."""
-        return np.array([p.normalise(parameters[p.name]) for p in self.learned])
+    def vector(self, parameters: Parameters) -> Floats:
+        """(P,) the learned parameters as models see them: trained ranges are [-1, 1], and nothing is beyond 1.25."""
+        return faded(np.array([p.normalise(parameters[p.name]) for p in self.learned]), 1.0, BEYOND)
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

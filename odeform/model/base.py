@@ -88,13 +88,15 @@ class ReducedModel(ABC):
         """The motion of `geometry` (default: the body the model was trained on) under `parameters`.
 
         The geometry lies in the scene as at rest. Integrates to `until` seconds (default: the trained window); the
-        motion can be asked beyond and then integrates on.
+        motion can be asked beyond and then integrates on. Beyond what was trained motions fade: models see parameters
+        and times that `Schema.vector` and `Window.seen` bound.
         """
         if observed is not None:
             raise InputError(f"{self.model}: predicts from parameters alone and takes no observed frames")
         complete: Parameters = self.schema.complete(parameters)
         shape = self.rest if geometry is None else geometry
         placed = self.place(shape, self.schema.azimuth(complete))
-        span = self.schema.window.stop if until is None else until
+        window = self.schema.window
+        span = float(window.seen(np.array(window.stop if until is None else until)))
         trajectory = self._trajectory(self.schema.vector(complete), placed, self._quality(quality), span)
         return Motion(self.schema, complete, shape, self.space, placed, trajectory)

@@ -2,15 +2,18 @@
 
 A deformation is d(x, t) = sum_k c_k(t) phi_k(x). Each phi_k is a radial-basis network over the training surface,
 sum_j w_jk |x - x_j|^3 + a_k + B_k x: exact at the training vertices, the smoothest field between them (it minimises
-bending energy; Duchon 1977), with a closed-form gradient.
+bending energy; Duchon 1977), with a closed-form gradient. Points farther from the anchor than six times the trained
+body reaches are taken for points below them, at most nine times as far: far off, the sum would be all rounding.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Basis, Floats, Points
+from odeform.schema import faded
+from odeform.types import Basis, Floats, Perpoint, Points
 
 __all__ = ["DisplacementBasis", "fit_basis"]
 
@@ -29,6 +32,16 @@ class DisplacementBasis:
     def modes(self) -> int:
         return self.weights.shape[1] // 3
 
+    @cached_property
+    def _far(self) -> float:
+        return 6.0 * float(np.linalg.norm(self.centers, axis=1).max())
+
+    def _near(self, points: Points) -> tuple[Points, Perpoint, Perpoint]:
+        """Points in units of `scale`, their distances from the anchor, and those of the points they are taken for."""
+        scaled = np.asarray(points, dtype=float) / self.scale
+        away = np.maximum(np.linalg.norm(scaled, axis=1), np.finfo(float).tiny)
+        return scaled, away, faded(away, self._far, 0.5 * self._far)
+
     def values(self, points: Points) -> Basis:
         """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32.
 
@@ -36,7 +49,8 @@ class DisplacementBasis:
         """
         out = np.empty((self.modes, len(points), 3), dtype=np.float32)
         for at in range(0, len(points), CHUNK):
-            chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
+            chunk, away, near = self._near(points[at : at + CHUNK])
+            chunk *= (near / away)[:, None]
             features = np.concatenate([_cubes(chunk, self.centers), np.ones((len(chunk), 1)), chunk], axis=1)
             value = features @ self.weights
             out[:, at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
@@ -52,10 +66,14 @@ class DisplacementBasis:
         out = np.empty((self.modes, directions.shape[1], 3, len(points)), dtype=np.float32)
         count = len(self.centers)
         for at in range(0, len(points), CHUNK):
-            chunk = np.asarray(points[at : at + CHUNK], dtype=float) / self.scale
+            chunk, away, near = self._near(points[at : at + CHUNK])
+            outward, across = chunk / away[:, None], (near / away)[:, None]
+            outwards = 1.0 - (np.maximum(near / self._far - 1.0, 0.0) / 0.5)[:, None] ** 2  # of `faded`
+            chunk *= across
             distance = np.sqrt(_squares(chunk, self.centers))
             for column in range(directions.shape[1]):
                 along = directions[at : at + CHUNK, column]
+                along = across * along + (outwards - across) * (along * outward).sum(axis=1)[:, None] * outward
                 ahead = (chunk * along).sum(axis=1)[:, None] - along @ self.centers.T
                 value = (3.0 * distance * ahead) @ self.weights[:count] + along @ self.weights[count + 1 :]
                 out[:, column, :, at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).transpose(1, 2, 0)

@@ -15,7 +15,7 @@ from scipy.special import expit
 
 from odeform.model.config import ModelConfig
 from odeform.model.motion import SolveStats
-from odeform.model.reduced import POSE, body_scale
+from odeform.model.reduced import POSE, small_motion
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution, Status
 from odeform.solver.stages import Field
@@ -195,11 +195,19 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
     return fold
 
 
+def _in_words(quality: Quality) -> str:
+    setting = f"h = {1e3 * quality.step:.3g} ms" if quality.step else f"tol {quality.tolerance:.0e}"
+    return f"{quality.method}, {setting}"
+
+
 RECENT = 4  # answers that are kept: pose, deformation and gradient of a moment are asked for one after the other
 
 
 class LatentTrajectory:
-    """A solved state z(t), decoded where asked. Grows when asked for later times; never changes."""
+    """A solved state z(t), decoded where asked. Grows when asked for later times; never changes.
+
+    Where controlled steps fail, steps of `fallback`, a fixed quality, take over from the last good state.
+    """
 
     def __init__(
         self,
@@ -207,35 +215,51 @@ class LatentTrajectory:
         decode: Decoder,
         start: Floats,
         quality: Quality,
+        fallback: Quality,
         until: float,
         arm: float,
     ) -> None:
-        self._field, self._decode, self._quality, self._arm = field, decode, quality, arm
+        self._field, self._decode, self._quality, self._fallback, self._arm = field, decode, quality, fallback, arm
         begin = time.perf_counter()
         with np.errstate(all="ignore"):  # an overflow ends the integration with a status
-            self._solution = integrate(field, start, quality, until)
+            self._solution, self._rest = integrate(field, start, quality, until), None
+            self._extend(until)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         self._origin = decode(np.zeros(1), start[None])
         self._span = until
         self._recent: tuple[tuple[bytes, Floats], ...] = ()
 
-    def _extend(self, until: float) -> Solution:
-        if self._solution.end < until:
-            integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
-        return self._solution
+    def _extend(self, until: float) -> None:
+        """Solve at least to `until` seconds, as far as it goes."""
+        first = integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
+        if first.status is not Status.OK and self._quality.tolerance is not None:
+            begin = first.end if self._rest is None else self._rest
+            self._rest = integrate(self._field, first.states[-1], self._fallback, until, begin=begin)
+
+    def _sample(self, times: Floats) -> Floats:
+        """(T, state) at `times` that were solved for."""
+        first, rest = self._solution, self._rest
+        if rest is None:
+            return first.sample(times)
+        return np.where((times <= first.end)[:, None], first.sample(times), rest.sample(times))
+
+    @property
+    def _last(self) -> Solution:
+        return self._solution if self._rest is None else self._rest
 
     @property
     def last_good(self) -> float:
-        return float("inf") if self._solution.status is Status.OK else self._solution.end
+        return float("inf") if self._last.status is Status.OK else self._last.end
 
     def reduced(self, times: Floats) -> Floats:
         asked = np.asarray(times, dtype=float)
         key = asked.tobytes()
         known = next((y for other, y in self._recent if other == key), None)
         if known is None:
-            solution = self._extend(float(asked.max()))
+            with np.errstate(all="ignore"):
+                self._extend(float(asked.max()))
             # y(0) = 0 to the last bit: the product over many rows rounds otherwise than that over one
-            known = (self._decode(asked, solution.sample(asked)) - self._origin) * (asked > 0.0)[:, None]
+            known = (self._decode(asked, self._sample(asked)) - self._origin) * (asked > 0.0)[:, None]
             known.flags.writeable = False
             self._recent = ((key, known), *self._recent)[:RECENT]
         return known
@@ -260,19 +284,24 @@ class LatentTrajectory:
             return None
         times = np.linspace(0.0, self._span, 129)[1:]
         difference = self._decode(times, self._solution.sample(times)) - self._decode(times, other.sample(times))
-        difference *= body_scale(self._arm, difference.shape[1])
-        return float(1e3 * np.linalg.norm(difference, axis=1).max() / share)
+        return float(1e3 * small_motion(difference, self._arm).max() / share)
 
     @property
     def stats(self) -> SolveStats:
-        solution, quality = self._solution, self._quality
-        setting = f"h = {1e3 * quality.step:.3g} ms" if quality.step else f"tol {quality.tolerance:.0e}"
+        first, rest = self._solution, self._rest
+        solver, status = _in_words(self._quality), self._last.status.value
+        steps, evaluations = first.steps, first.evaluations
+        if rest is not None:
+            failed = f"{solver} failed at t = {first.end:.3f} s: {first.status.value}"
+            solver = f"{_in_words(self._fallback)} ({failed})"
+            status = "fixed steps" if rest.status is Status.OK else f"fixed steps, {status}"
+            steps, evaluations = steps + rest.steps, evaluations + rest.evaluations
         return SolveStats(
-            solver=f"{quality.method}, {setting}",
-            steps=solution.steps,
-            evaluations=solution.evaluations,
-            rejected=solution.rejected,
-            status=solution.status.value,
+            solver=solver,
+            steps=steps,
+            evaluations=evaluations,
+            rejected=first.rejected,
+            status=status,
             wall_ms=self._wall_ms,
             estimate=lambda: self._error_mm,
         )

@@ -63,4 +63,5 @@ class ODeform(ReducedModel):
     def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
         """The solved latent motion for parameters in [-1, 1]."""
         field, start, decode = self.problem(theta, placed, np.float32 if quality.dtype == "float32" else np.float64)
-        return LatentTrajectory(field, decode, start, quality, until, self.space.arm)
+        fallback = Quality("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
+        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.arm)

@@ -15,17 +15,17 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Arrays, Basis, Floats, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
+from odeform.types import Arrays, Basis, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
 __all__ = [
     "POSE",
     "ReducedSpace",
-    "body_scale",
     "decompose",
     "fit_modes",
     "make_space",
     "motion_rmse",
     "rotation_of",
+    "small_motion",
     "to_canonical",
 ]
 
@@ -113,17 +113,16 @@ def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Ro
     return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T
 
 
-def body_scale(arm: float, size: int) -> Floats:
-    """(6 + K,) what each number of a small difference in y counts in metres: then |dy| is the RMS over the body.
+def small_motion(y: Float[np.ndarray, "*batch y"], arm: float) -> Float[np.ndarray, "*batch"]:
+    """Root mean square displacement in metres, over the body, by a small y (..., 6 + K).
 
-    A small turn |w| moves a round body of radius of gyration `arm` by sqrt(2/3) arm |w| in RMS.
+    A small turn |w| moves a round body of radius of gyration `arm` by sqrt(2/3) arm |w|.
     """
-    scale = np.ones(size)
+    scale = np.ones(y.shape[-1])
     scale[3:POSE] = arm * np.sqrt(2.0 / 3.0)
-    return scale
+    return np.linalg.norm(y * scale, axis=-1)
 
 
 def motion_rmse(one: Float[np.ndarray, "*batch y"], other: Float[np.ndarray, "*batch y"], arm: float) -> float:
     """Root mean square difference in metres between motions y (..., 6 + K), over coordinates, points and the rest."""
-    difference = (one - other) * body_scale(arm, one.shape[-1])
-    return float(np.sqrt((difference**2).sum(axis=-1).mean() / 3.0))
+    return float(np.sqrt((small_motion(one - other, arm) ** 2).mean() / 3.0))

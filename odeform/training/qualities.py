@@ -38,7 +38,7 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
         """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
         stop = float(data.times[-1])
         solved = [model.integrate(theta, placed, quality, stop) for theta in data.theta["val"]]
-        reduced = [s.reduced(data.times) + (0.0 if np.isinf(s.last_good) else np.nan) for s in solved]
+        reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
     def error_mm(motion: Floats, truth: Floats) -> float:

@@ -1,5 +1,7 @@
 """What is shown, how it was computed, and how far it may be trusted."""
 
+import math
+
 import numpy as np
 import viser
 
@@ -21,7 +23,7 @@ def moment_in_words(frame: Frame) -> str:
     if motion.extrapolates(time):
         beyond.insert(0, "time")
     sunk = [shown.column.label for shown in frame.columns if shown.sunk]
-    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained" if beyond else ""
+    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained, where motions fade" if beyond else ""
     if not words:
         window = motion.schema.window
         phase = (time - window.start) * window.rate
@@ -63,7 +65,8 @@ def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
     if stats.status != "ok":
         last = shown.motion.trajectory.last_good  # pyright: ignore[reportAttributeAccessIssue]
-        lines.append(f"⚠ **{stats.status}**: showing the last good state, t = {last:.3f} s")
+        later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
+        lines.append(f"⚠ **{stats.status}**{later}")
     return "  \n".join(lines)
 
 

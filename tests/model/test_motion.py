@@ -1,5 +1,6 @@
 """What the motions of every model have in common, on really trained checkpoints."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -204,6 +205,17 @@ def test_outside_and_beyond_are_told(predictors: dict[str, Predictor], model: st
     assert motion.extrapolates(1.01)
     assert motion.stats.status == "ok"
     assert np.isfinite(motion.vertices(GRIDS["window"])).all()
+
+
+@everywhere
+def test_nothing_that_is_asked_makes_a_motion_explode(predictors: dict[str, Predictor], model: str) -> None:
+    predictor, times = predictors[model], np.array([0.5, 1.0, 2.0, 1e4])
+    trained = np.abs(predictor.solve(None, SETTING).vertices(GRIDS["window"])).max()
+    for mass, force in itertools.product((1e-300, 1e300), (-1e308, 0.0, 1e308)):
+        frames = predictor.solve(None, {"mass": mass, "force": force}, until=1e4).vertices(times)
+        assert np.abs(frames).max() < 10.0 * trained
+    far = PointCloud(np.array([[1e6, 0.0, 0.0], [-1e-6, 0.0, 1e6]]))
+    assert np.abs(predictor.solve(far).local(GRIDS["window"])).max() < 1.0
 
 
 def test_unknown_quality(predictors: dict[str, Predictor]) -> None:

@@ -1,0 +1,136 @@
+"""Whether the solvers do what they say on a model's own field, and what that field does to small differences."""
+
+import math
+
+import numpy as np
+from scipy.stats import rankdata
+
+from odeform.evaluation.check import Check, Checks
+from odeform.evaluation.draws import inside, random_quality
+from odeform.model.inference import Field
+from odeform.model.odeform import ODeform
+from odeform.model.placed import PlacedBasis
+from odeform.model.reduced import POSE, small_motion
+from odeform.schema import LATER
+from odeform.solver.integrate import Quality, integrate
+from odeform.solver.tableau import METHODS
+from odeform.types import Floats
+
+__all__ = ["check_calibration", "check_field", "check_orders", "observed_order"]
+
+NODES = 32  # moments at which solutions are compared; each step size divides them
+REFINED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # steps between two of them
+FLOOR = 2e-14  # of the states: below, errors are rounding
+TRUTH = Quality("dopri5", tolerance=1e-11, dtype="float64")
+CALIBRATION = (40, 12)  # motions, and ways to integrate each
+DRAWS = 2
+
+
+def _errors(field: Field, start: Floats, method: str, span: float) -> tuple[list[float], list[float]]:
+    """Ever finer steps and their errors, as long as these are above rounding: norms over `NODES` moments."""
+
+    def states(name: str, pieces: int) -> Floats:
+        solution = integrate(field, start, Quality(name, step=span / pieces), span)
+        return np.stack(solution.states[:: pieces // NODES])
+
+    truth = states("dopri5", NODES * REFINED[-1])
+    steps, errors = [], []
+    for pieces in (NODES * times for times in REFINED):
+        error = float(np.linalg.norm(states(method, pieces) - truth))
+        if error < FLOOR * np.linalg.norm(truth):
+            break
+        steps.append(span / pieces)
+        errors.append(error)
+    return steps, errors
+
+
+def observed_order(steps: list[float], errors: list[float]) -> float:
+    """Slope of log error over log step, of the three finest: fifth order shows only just above rounding."""
+    return float(np.polyfit(np.log(steps[-3:]), np.log(errors[-3:]), 1)[0])
+
+
+def check_orders(model: ODeform, seed: int = 0) -> Checks:
+    """`order_METHOD_deviation`: how far the observed order is from the method's own.
+
+    `refining_error_ratio`: the largest ratio of an error to that of the next coarser step, from a thirty-second of the
+    window on.
+    """
+    placed, schema = model.place(model.rest, 0.0), model.schema
+    off, ratio = dict.fromkeys(METHODS, 0.0), 0.0
+    for parameters in inside(schema, DRAWS, seed):
+        field, start, _ = model.problem(schema.vector(parameters), placed, np.float64)
+        for name, method in METHODS.items():
+            steps, errors = _errors(field, start, name, schema.window.stop)
+            off[name] = max(off[name], abs(observed_order(steps, errors) - method.order))
+            ratio = max(ratio, float(np.max(np.divide(errors[1:], errors[:-1]))))
+    checks = {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
+    return {**checks, "refining_error_ratio": Check(ratio, 1.0)}
+
+
+def check_field(model: ODeform, seed: int = 0) -> Checks:
+    """`lyapunov_per_s`: largest finite-time exponent over the window, from the derivative of its end by its start.
+
+    Its bound lets rounding in single precision grow to a thousandth. `state_growth`: the largest latent number ever
+    shown, at late times too, over the largest within the window. `until_divergence_unbounded_windows`: when deformation
+    would exceed twice the largest within the window if clocks did not stop; to where they stop it has to be sound.
+    """
+    placed, schema = model.place(model.rest, 0.0), model.schema
+    window, step = schema.window, Quality("rk4", step=1.0 / schema.window.rate)
+    exponent, within, ever, by = -math.inf, 0.0, 0.0, 1e-6
+    for parameters in inside(schema, DRAWS, seed):
+        field, start, _ = model.problem(schema.vector(parameters), placed, np.float64)
+
+        def end(at: Floats, field: Field = field) -> Floats:
+            return integrate(field, at, step, window.stop).at(window.stop)
+
+        moved = np.stack([end(start + by * unit) for unit in np.eye(len(start))]) - end(start)
+        exponent = max(exponent, math.log(np.linalg.norm(moved / by, 2)) / window.stop)
+        states = integrate(field, start, step, float(window.seen(np.array(10.0 * window.stop))))
+        sizes = np.abs(states.states).max(axis=1)
+        within = max(within, float(sizes[np.array(states.times) <= window.stop].max()))
+        ever = max(ever, float(sizes.max()))
+    allowed = math.log(1e-3 / float(np.finfo(np.float32).eps)) / window.stop
+    return {
+        "lyapunov_per_s": Check(exponent, allowed),
+        "state_growth": Check(ever / within, 2.0),
+        "until_divergence_unbounded_windows": Check(_divergence(model, placed, seed), 1.0 + LATER, at_least=True),
+    }
+
+
+def _divergence(model: ODeform, placed: PlacedBasis, seed: int) -> float:
+    """Windows, at most 10, after which any motion of the trained box is deformed twice as much as any within it."""
+    schema, step = model.schema, Quality("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
+    thetas = [schema.vector(parameters) for parameters in inside(schema, 4 * DRAWS, seed)]
+    times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
+    motions = [model.integrate(theta, placed, step, float(times[-1])).reduced(times) for theta in thetas]
+    deformed = np.max([np.linalg.norm(y[:, POSE:], axis=1) for y in motions], axis=0)
+    diverged = deformed > 2.0 * deformed[times <= schema.window.stop].max()
+    return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)
+
+
+def check_calibration(model: ODeform, seed: int = 0) -> Checks:
+    """`solver_error_rank_correlation` (Spearman) of the error that is shown with that against tolerance 1e-11.
+
+    Over random settings, at parameters up to ten times beyond the trained box; what is shown as unknown is left out.
+    `solver_error_underestimated`: the share of those whose error is more than twice what is shown.
+    """
+    placed, schema = model.place(model.rest, 0.0), model.schema
+    rng, stop = np.random.default_rng(seed), schema.window.stop
+    times = np.linspace(0.0, stop, 129)[1:]
+    said, true = [], []
+    for index in range(CALIBRATION[0]):
+        reach = (1.0, 1.5, 3.0, 10.0)[index % 4]
+        theta = schema.vector(inside(schema, 1, seed + index, reach)[0])
+        truth = model.integrate(theta, placed, TRUTH, stop).reduced(times)
+        for _ in range(CALIBRATION[1]):
+            motion = model.integrate(theta, placed, random_quality(rng, stop), stop)
+            estimate = motion.stats.solver_error_mm
+            if estimate is not None:
+                said.append(estimate)
+                true.append(1e3 * float(small_motion(motion.reduced(times) - truth, model.space.arm).max()))
+    return {
+        "solver_error_rank_correlation": Check(
+            float(np.corrcoef(rankdata(said), rankdata(true))[0, 1]), 0.9, at_least=True
+        ),
+        "solver_error_underestimated": Check(float(np.mean(np.array(true) > 2.0 * np.array(said))), 0.05),
+    }
