@@ -1,6 +1,7 @@
 """The `odeform` command."""
 
 import argparse
+import io
 import json
 import os
 import sys
@@ -189,7 +190,9 @@ def _stress(args: argparse.Namespace) -> None:
         from odeform.files import write_aside
         from odeform.predictor import load
 
-        write_aside(Path(args.map), map_image(stability_map(load(args.checkpoint))))
+        picture = io.BytesIO()
+        map_image(stability_map(load(args.checkpoint))).save(picture, format="PNG", optimize=True)
+        write_aside(Path(args.map), picture.getvalue())
     result = stress(args.checkpoint, args.cases)
     if args.json:
         _emit(result, args.json)

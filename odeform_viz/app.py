@@ -32,6 +32,7 @@ from odeform_viz.panels.plots import PlotPanel
 from odeform_viz.panels.quality import QualityPanel
 from odeform_viz.panels.record import RecordPanel
 from odeform_viz.panels.shape import ShapePanel
+from odeform_viz.panels.stability import StabilityPanel
 from odeform_viz.panels.status import MomentPanel, StatusPanel
 from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
@@ -138,6 +139,10 @@ class App:
             HelpPanel(self.server, keys)
         self._status = StatusPanel(self.server)
         self._plots = PlotPanel(self.server, schema.window)
+        self._stability = None
+        if columns[0].predictor and columns[0].origin:
+            with self._plots.tab("Stability"):
+                self._stability = StabilityPanel(self.server, columns[0].origin)
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
         self._scene = SceneView(self.server, extent, len(columns))
 
@@ -149,6 +154,8 @@ class App:
     def close(self) -> None:
         """Stop serving; a recording is completed."""
         self._truth.cancel()
+        if self._stability:
+            self._stability.close()
         self._worker.stop()
         self.server.stop()
         if self._recorder:

@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
+import numpy as np
+
 from odeform.errors import InputError
 from odeform.types import Sequence
 
-__all__ = ["Job", "simulate_here", "simulator_installed"]
+__all__ = ["Job", "map_here", "simulate_here", "simulator_installed"]
 
 Send = Callable[[float], None]
 
@@ -86,3 +88,11 @@ def simulate_here(send: Send, scene: str, parameters: dict[str, float], rate: fl
     from odeform.simulation.scene import get_scene
 
     return get_scene(scene).simulate(parameters, rate=rate, report=send)
+
+
+def map_here(send: Send, checkpoint: str) -> np.ndarray:
+    """(H, W, 3) pixels: where a model is stable, within the window and beyond."""
+    from odeform.evaluation.stability import map_image, stability_map
+    from odeform.predictor import load
+
+    return np.asarray(map_image(stability_map(load(checkpoint), moments=(0.5, 1.0, 3.0))))

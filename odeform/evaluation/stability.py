@@ -1,10 +1,10 @@
 """How far a body is deformed over two parameters and time, inside the trained box and beyond."""
 
-import io
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from PIL import Image, ImageDraw
 
 from odeform.evaluation.draws import inside
 from odeform.predictor import Predictor
@@ -68,9 +68,8 @@ def stability_map(
     )
 
 
-def map_image(plot: StabilityMap) -> bytes:
-    """A PNG of a panel a moment; grey is where the integration failed."""
-    from PIL import Image, ImageDraw
+def map_image(plot: StabilityMap) -> Image.Image:
+    """A panel a moment; grey is where the integration failed."""
 
     side = CELL * len(plot.units)
     image = Image.new("RGB", (GAP + len(plot.times) * (side + GAP), side + 3 * GAP), (255, 255, 255))
@@ -89,9 +88,7 @@ def map_image(plot: StabilityMap) -> bytes:
         "RMS deformation, of the largest trained: 0 (pale), 1 (orange), 2 and more (dark red). Framed: the trained box"
     )
     draw.text((GAP, side + 2 * GAP), f"{text}; to the edge {plot.units[-1]:g} times as far", fill=(0, 0, 0))
-    file = io.BytesIO()
-    image.save(file, format="PNG", optimize=True)
-    return file.getvalue()
+    return image
 
 
 def _colors(values: Floats) -> Floats:

@@ -129,6 +129,10 @@ class PlotPanel:
         self._lines: list[Line] = []
         self._turns = False
 
+    def tab(self, name: str) -> viser.GuiTabHandle:
+        """Room for something else beside the curves."""
+        return self._panel.add_tab(name)
+
     def show(self, lines: list[Line], moment: float) -> None:
         if [id(c) for _, _, c in lines] != [id(c) for _, _, c in self._lines]:
             self._lines = lines

@@ -1,0 +1,45 @@
+"""Where a model is stable: a picture over two parameters and time, made when asked for."""
+
+import threading
+
+import numpy as np
+import viser
+
+from odeform_viz.jobs import Job, map_here
+
+__all__ = ["StabilityPanel"]
+
+EXPLAINED = (
+    "How far the body is deformed as two parameters leave what was trained (framed), and later than was trained. "
+    "It takes some seconds."
+)
+
+
+class StabilityPanel:
+    """A button, and the picture that it brings; made in a process of its own, once for a model."""
+
+    def __init__(self, server: viser.ViserServer, origin: str) -> None:
+        """`origin` names the checkpoint."""
+        self._server, self._lock = server, threading.Lock()
+        self._text = server.gui.add_markdown(EXPLAINED)
+        self._button = server.gui.add_button("Map stability")
+        self._button.on_click(lambda _: self._start())
+        self._job = Job(map_here, (origin,), self._done, self._failed)
+
+    def _start(self) -> None:
+        with self._lock:
+            if self._job.running:
+                return
+            self._button.disabled, self._text.content = True, "Solving some hundred motions …"
+            self._job.start()
+
+    def _done(self, picture: np.ndarray) -> None:
+        self._button.visible = self._text.visible = False
+        self._server.gui.add_image(picture, format="png")
+
+    def _failed(self, message: str) -> None:
+        self._button.disabled, self._text.content = False, f"⚠ **No map**: {message}"
+
+    def close(self) -> None:
+        if self._job.running:
+            self._job.cancel()
