@@ -22,6 +22,7 @@ __all__ = ["bench", "report"]
 
 POINTS = 5_000
 SPLATS = 100_000
+SIZES = (500, 1_000, 10_000, 100_000, 1_000_000)
 
 
 def _latency(predictor: Predictor) -> dict[str, Any]:
@@ -94,7 +95,7 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
         **result,
         "knobs": knobs(predictor),
         "limits": limits(predictor),
-        "scaling": scaling(predictor),
+        "scaling": scaling(predictor, SIZES),
         "peers": peers(predictor, dataset, places),
     }
 
@@ -138,10 +139,10 @@ def report(result: Mapping[str, Any]) -> str:
                 rows,
                 columns[1:],
             )
+    if result.get("frontier"):
         rows = [{**row, "setting": _setting(row)} for row in result["frontier"]]
-        lines += _table(
-            "frontier (validation split)", rows, ("method", "setting", "evaluations", "ms", "solver_error_mm")
-        )
+        columns = ("method", "setting", "evaluations", "ms", "solver_error_mm")
+        lines += _table("frontier (validation split)", rows, columns)
     lines += _table("other knobs, a frame", result["knobs"], ("knob", "points", "ms", "saves_ms", "error_mm"))
     rows = [{"limit": key, "measured": value} for key, value in result["limits"].items()]
     lines += _table("limits of the machine", rows, ("limit", "measured"))

@@ -1,6 +1,7 @@
 """What this machine can do at most, and what share of it decoding reaches."""
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -17,7 +18,6 @@ BYTES = 256 << 20  # that are copied
 THREADS = os.cpu_count() or 1
 POINTS = 100_000
 FRAMES = 20
-SIZES = (500, 1_000, 10_000, 100_000, 1_000_000)
 
 
 def gemm_gflops() -> float:
@@ -75,7 +75,7 @@ def limits(predictor: Predictor) -> dict[str, Any]:
     }
 
 
-def scaling(predictor: Predictor, sizes: tuple[int, ...] = SIZES) -> list[dict[str, Any]]:
+def scaling(predictor: Predictor, sizes: Sequence[int]) -> list[dict[str, Any]]:
     """Solve, basis, and decode of one frame from its coordinates, over the number of points."""
     window = predictor.schema.window
     moment = 0.5 * (window.start + window.stop)

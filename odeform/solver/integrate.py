@@ -83,14 +83,13 @@ def integrate(field: Field, start: Any, quality: Quality, until: float, begin: f
         if not (_finite(solution.states[0]) and _finite(solution.slopes[0])):
             solution.status = Status.NON_FINITE
     if solution.status is Status.OK:
-        method = get_method(quality.method)
-        stages = (Stages if isinstance(start, np.ndarray) else TensorStages)(method, start)
+        stages = (Stages if isinstance(start, np.ndarray) else TensorStages)(get_method(quality.method), start)
         advance = _fixed if quality.step is not None else _controlled
-        advance(method, stages, field, quality, solution, until)
+        advance(stages, field, quality, solution, until)
     return solution
 
 
-def _fixed(_: Tableau, stages: Stages, field: Field, quality: Quality, solution: Solution, until: float) -> None:
+def _fixed(stages: Stages, field: Field, quality: Quality, solution: Solution, until: float) -> None:
     step, origin = quality.step or 0.0, solution.times[0]
     while solution.end < until - 1e-9 * step:
         if solution.steps >= MAX_STEPS:
@@ -108,11 +107,9 @@ def _fixed(_: Tableau, stages: Stages, field: Field, quality: Quality, solution:
         solution.slopes.append(slope)
 
 
-def _controlled(
-    method: Tableau, stages: Stages, field: Field, quality: Quality, solution: Solution, until: float
-) -> None:
+def _controlled(stages: Stages, field: Field, quality: Quality, solution: Solution, until: float) -> None:
     """Proportional step control on the embedded error estimate."""
-    tolerance = quality.tolerance or 0.0
+    method, tolerance = stages.method, quality.tolerance or 0.0
     if not solution.next_step:
         solution.next_step = _first_step(method, field, solution.end, solution.states[0], solution.slopes[0], tolerance)
         solution.evaluations += 1

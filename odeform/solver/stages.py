@@ -20,7 +20,7 @@ class Stages:
     """
 
     def __init__(self, method: Tableau, start: Any) -> None:
-        self._method = method
+        self.method = method
         self._rows = [*method.a[1:], *(() if method.fsal else (method.b,))]
         self._nodes = (*method.c[1:], *(() if method.fsal else (1.0,)))
         self._keep(start)
@@ -28,7 +28,7 @@ class Stages:
     def _keep(self, start: Any) -> None:
         self._slopes = np.empty((start.size, len(self._rows) + 1), start.dtype, order="F")
         (self._product,) = get_blas_funcs(("gemv",), dtype=start.dtype)
-        rows = {*self._rows, self._method.error or (), self._method.middle or ()}
+        rows = {*self._rows, self.method.error or (), self.method.middle or ()}
         self._weighed = {row: (self._slopes[:, : len(row)], np.array(row, start.dtype)) for row in rows}
 
     def _put(self, index: int, slope: Any) -> None:
@@ -55,13 +55,13 @@ class Stages:
 
     def error(self, state: Any, step: float) -> Any:
         """What the embedded method says that the last step, from `state`, is off."""
-        assert self._method.error is not None
-        return self._ahead(np.zeros_like(state), self._method.error, step)
+        assert self.method.error is not None
+        return self._ahead(np.zeros_like(state), self.method.error, step)
 
     def middle(self, state: Any, step: float) -> Any:
         """The state halfway through the last step, from `state`."""
-        assert self._method.middle is not None
-        return self._ahead(state, self._method.middle, step)
+        assert self.method.middle is not None
+        return self._ahead(state, self.method.middle, step)
 
 
 class TensorStages(Stages):

@@ -1,10 +1,12 @@
 """What integration costs and how far it is off: the frontier of a checkpoint, from its own validation split."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from odeform.checkpoint import Checkpoint
 from odeform.model.data import TrainingData
 from odeform.model.odeform import ODeform
 from odeform.model.reduced import motion_rmse
@@ -12,7 +14,7 @@ from odeform.solver.frontier import EXACT, FrontierPoint, cheapest_within_error,
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
-__all__ = ["choose_qualities", "measure_frontier"]
+__all__ = ["choose_qualities", "measure_frontier", "with_qualities"]
 
 SHARES = {"draft": 1.0, "balanced": 0.1}
 """Solver error that a quality may add, as a share of the model's own. A tenth adds half a per cent to the total."""
@@ -58,3 +60,11 @@ def choose_qualities(
     """Settings of each quality: the cheapest whose error keeps to its share of the model's, and the finest of all."""
     chosen = {name: cheapest_within_error(frontier, share * model_error_mm) for name, share in shares.items()}
     return {name: point.quality.to_json() for name, point in {**chosen, "reference": frontier[-1]}.items()}
+
+
+def with_qualities(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
+    """The checkpoint of a trained model, with its frontier and the qualities on it: the solver may add to the model's
+    error, not more."""
+    frontier, error_mm = measure_frontier(ODeform(checkpoint), data)
+    settings = {"qualities": choose_qualities(frontier, error_mm), "frontier": [p.to_json() for p in frontier]}
+    return replace(checkpoint, config={**checkpoint.config, **settings})

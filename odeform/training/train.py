@@ -18,9 +18,9 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.residuals import validation_residuals
 from odeform.model.data import TrainingData, prepare
-from odeform.model.odeform import PREFIX, ODeform
+from odeform.model.odeform import PREFIX
 from odeform.predictor import load
-from odeform.training.qualities import choose_qualities, measure_frontier
+from odeform.training.qualities import with_qualities
 from odeform.types import Arrays, Mesh
 
 __all__ = ["MODELS", "TrainRequest", "train"]
@@ -103,10 +103,7 @@ def train(
         provenance=provenance,
     )
     if request.model == "odeform":
-        # the solver may add to the model's error, not more
-        frontier, error_mm = measure_frontier(ODeform(checkpoint), data)
-        settings = {"qualities": choose_qualities(frontier, error_mm), "frontier": [p.to_json() for p in frontier]}
-        checkpoint = replace(checkpoint, config={**checkpoint.config, **settings})
+        checkpoint = with_qualities(checkpoint, data)
     write_checkpoint(out, checkpoint)
     arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
     checkpoint = replace(checkpoint, arrays=arrays)

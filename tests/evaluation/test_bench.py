@@ -22,7 +22,7 @@ def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
         (limits, "SIDE", 64),
         (limits, "BYTES", 1 << 16),
         (limits, "POINTS", 400),
-        (limits, "SIZES", (100, 200)),
+        (bench, "SIZES", (100, 200)),
         (peers, "PER_POINT", {50: 1, 100: 1}),
         (peers, "POINTS", 100),
         (peers, "SEQUENCES", 1),
