@@ -7,9 +7,10 @@ from typing import Any, Protocol, runtime_checkable
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.model.motion import Motion
-from odeform.schema import Schema
+from odeform.schema import Parameters, Schema
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
-from odeform.types import Geometry, Mesh
+from odeform.types import Floats, Geometry, Mesh, Times
 
 __all__ = ["Predictor", "load"]
 
@@ -27,6 +28,10 @@ class Predictor(Protocol):
 
     @property
     def qualities(self) -> Mapping[str, Quality]: ...
+
+    def expected_error(self, parameters: Parameters, times: Times) -> Floats | None: ...
+    @property
+    def frontier(self) -> tuple[FrontierPoint, ...]: ...
 
     def solve(
         self,

@@ -4,6 +4,7 @@ import contextlib
 import io
 import socket
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -28,6 +29,7 @@ from odeform_viz.panels.help import HelpPanel
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.plots import PlotPanel
+from odeform_viz.panels.quality import QualityPanel
 from odeform_viz.panels.record import RecordPanel
 from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.status import MomentPanel, StatusPanel
@@ -43,6 +45,7 @@ __all__ = ["App"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
 SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
+READ = 0.1  # s between numbers that change as something moves: nobody reads faster
 SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
 
 
@@ -84,6 +87,8 @@ class App:
         self._looks = Looks()
         self._heat: float | None = None
         self._settled = False
+        self._told: Frame | None = None  # the frame that numbers and curves are of, and since when
+        self._told_at = 0.0
         for column in columns:
             if column.truth:
                 self._parameters.set(column.truth.parameters)
@@ -98,9 +103,9 @@ class App:
         self._moment = MomentPanel(self.server)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Explore"):
-            qualities = tuple(dict.fromkeys(q for c in columns if c.predictor for q in c.predictor.qualities))
-            samples = _training_samples(columns[0])
-            self._parameters = ParameterPanel(self.server, schema, samples, qualities, wake)
+            self._parameters = ParameterPanel(self.server, schema, _training_samples(columns[0]), wake)
+            integrated = next((c.predictor for c in columns if c.predictor and c.predictor.qualities), None)
+            self._quality = QualityPanel(self.server, integrated, wake) if integrated else None
             hold = partial(self._playback.jump, schema.window.start)
             self._shape = ShapePanel(self.server, self.columns, self._body, hold, self._changed, say)
             with gui.add_folder("View"):
@@ -151,7 +156,8 @@ class App:
 
     def _wish(self) -> Wish:
         parameters = self.session.schema.complete(self._parameters.parameters())
-        return Wish(parameters, self.clock.time(), self._parameters.quality(), self.columns.all)
+        quality = self._quality.wish() if self._quality else "balanced"
+        return Wish(parameters, self.clock.time(), quality, self.columns.all)
 
     def _read_looks(self) -> Looks:
         return Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
@@ -211,7 +217,8 @@ class App:
         for note in state.notes:
             self._say(note)
         self._parameters.set(state.parameters)
-        self._parameters.set_quality(state.quality)
+        if self._quality:
+            self._quality.set(state.quality)
         self._compare.set(state.overlay, state.heat)
         self._follow.value = state.follow
         self._playback.jump(state.time)
@@ -247,21 +254,23 @@ class App:
                 self._settled = True
                 self._describe(self._shown)
                 self._tidy()
+            elif self._told is not self._shown:
+                self._describe(self._shown)
         except InputError as error:
             self._moment.show_error(str(error))
-            self._shown, self._settled = None, True  # what comes next is shown, even if it was before
+            self._shown, self._told, self._settled = None, None, True  # what comes next is shown, even if it was before
         if self.clock.playing:
             return TICK
-        return None if self._settled else SETTLE
+        return None if self._settled and self._told is self._shown else SETTLE
 
     def _show(self, frame: Frame, looks: Looks) -> None:
         # colours keep their scale over the whole motion, so it has to be known first
         self._heat = self._scale(frame) if looks.heat else None
         self._settled = self._shown is not None and same_motions(frame, self._shown)
         self._scene.publish(frame, looks, self._heat)
-        self._playback.show(frame.wish.time)
         self._shown, self._looks = frame, looks
-        self._describe(frame)
+        if time.monotonic() - self._told_at > READ:
+            self._describe(frame)
         if self._recorder:
             try:
                 self._recorder.log(frame)
@@ -276,7 +285,9 @@ class App:
         return scale_for(np.concatenate(errors)) if errors else None
 
     def _describe(self, frame: Frame) -> None:
-        """What accompanies a frame: numbers, curves, marks at the sliders."""
+        """What accompanies a frame: the time, numbers, curves, marks at the sliders."""
+        self._told, self._told_at = frame, time.monotonic()
+        self._playback.show(frame.wish.time)
         self._parameters.show()
         truth = frame.truth.column.truth if frame.truth else None
         away = truth is not None and not truth.of(frame.wish.parameters)

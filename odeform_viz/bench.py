@@ -22,7 +22,7 @@ from odeform_viz.columns import Column, truth_column
 from odeform_viz.loopback import LoopbackClient
 from odeform_viz.soak import soak
 
-__all__ = ["drag", "scrub_splats"]
+__all__ = ["drag", "fly", "scrub_splats"]
 
 RATE = 20.0  # Hz; a browser sends a slider no more often
 SPLATS = 100_000
@@ -123,6 +123,19 @@ def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]
         return _answers(values, lambda v: client.set("time (s)", round(v, 4)), wait, 10.0)
 
 
+def fly(model: Predictor, port: int) -> dict[str, float]:
+    """Play the free flight before an impact, ten times slower, for two seconds: bytes on the wire by frame."""
+    assert model.schema.impact is not None
+    with _serving([Column(model.model, model, model.rest)], port, 0.02) as client:
+        client.set("speed", "1/10")
+        client.collect(0.5)
+        begin = client.received
+        client.press("Play or pause")
+        messages = client.collect(2.0)
+        frames = sum(m["type"] == "SetPositionMessage" and m["name"].endswith("/body") for m in messages)
+        return {"frames": frames, "bytes_a_frame": (client.received - begin) / frames}
+
+
 def _soak(model: Predictor, rivals: list[Predictor], truth: Column | None, port: int, wishes: int) -> None:
     shown = [(model, model.schema.scene), *((r, f"{model.schema.scene}/{r.model}") for r in rivals[:1])]
     columns = [Column(m.model, m, m.rest, origin=name) for m, name in shown]
@@ -164,6 +177,8 @@ def main() -> None:
         ),
         "time, 100,000 splats": lambda: scrub_splats(model, args.port, args.messages),
     }
+    if model.schema.impact:
+        runs["free flight"] = lambda: fly(model, args.port)
     for name, run in runs.items():
         print(name)
         for key, value in run().items():

@@ -49,6 +49,8 @@ class LoopbackClient:
         )
         self._controls: dict[str, Control] = {}
         self._commands: dict[str, str] = {}
+        self.received = 0
+        """Bytes so far."""
         self.said: list[str] = []
         """Notifications, the newest last."""
         self.nodes: set[str] = set()
@@ -125,6 +127,7 @@ class LoopbackClient:
         except TimeoutError:
             return None
         assert isinstance(raw, bytes)
+        self.received += len(raw)
         messages = _decode(raw)
         for message in messages:
             self._note(message)

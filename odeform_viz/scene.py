@@ -71,7 +71,6 @@ class _ColumnView:
         self._place.position = (0.0, place, 0.0)
         self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
         self._body.position = frame.pose[:3, 3]
-        self._above.position = self.centre(frame)
         self._shape.fade(opacity)
         points = self._rest if frame.points is None else frame.points
         if heat is not None and frame.error is not None and truth is not None:
@@ -88,7 +87,9 @@ class _ColumnView:
             self._spread = (record, Spread(record.geometry.points, self._rest))
         return self._spread[1]
 
-    def title(self, text: str | None) -> None:
+    def title(self, text: str | None, frame: ColumnFrame) -> None:
+        if text is not None:
+            self._above.position = self.centre(frame)
         if text is None:
             if self._label is not None:
                 self._label.remove()
@@ -197,7 +198,7 @@ class SceneView:
                 view.show(shown, place, GHOST if looks.overlay and index else None, frame.truth, heat)
                 if self._still is not None and shown.column.fit and shown.column.fit.still is self._still[0]:
                     self._still[1].position = (0.0, place, 0.0)
-                view.title(title_of(shown) if several and not looks.overlay else None)
+                view.title(title_of(shown) if several and not looks.overlay else None, shown)
             self._world.position = self._offset(frame, looks)
         self._server.flush()
         for shown in frame.columns:

@@ -1,5 +1,6 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
+import json
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from odeform.model.motion import Motion, SolveStats
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
+from odeform.solver.integrate import Quality
 from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
@@ -30,6 +32,7 @@ class Wish:
     parameters: Mapping[str, float]
     time: float
     quality: str
+    """Of all integrations: a name, or a setting as JSON."""
     columns: tuple[Column, ...]
 
 
@@ -106,19 +109,30 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation` and pooled
-    `error` in mm, the latter None without truth."""
+    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation`, pooled
+    `error` and the `expected` one that nine in ten motions keep to in mm, the last two None where nothing is known."""
 
     times: Times
     height: Times
     turn: Times
     deformation: Times
     error: Times | None
+    expected: Times | None
 
 
 def same_motions(one: Frame, other: Frame) -> bool:
     """Whether two frames differ in time alone."""
     return [shown.motion for shown in one.columns] == [shown.motion for shown in other.columns]
+
+
+def quality_of(source: Predictor, wished: str) -> str | Quality:
+    """What a model makes of a wish: models that do not know the name, or do not integrate, take their own default."""
+    if wished.startswith("{") and source.qualities:
+        try:
+            return Quality(**json.loads(wished))
+        except (ValueError, TypeError) as error:
+            raise InputError(f"quality: expected a name or the setting of a solver, got {wished}: {error}") from None
+    return wished if wished in source.qualities else "balanced"
 
 
 class Session:
@@ -148,7 +162,7 @@ class Session:
     def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> Motion:
         names = {p.name for p in source.schema.parameters}
         parameters = {n: value for n, value in self.parameters(column, wish).items() if n in names}
-        quality = wish.quality if wish.quality in source.qualities else "balanced"
+        quality = quality_of(source, wish.quality)
         wanted = (quality, *sorted(parameters.items()))
         known = self._solved.get((column.key, use))
         if known is None or known[0] != wanted or known[1].geometry is not geometry:
@@ -226,13 +240,16 @@ class Session:
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
         turn = np.degrees(np.arccos(np.clip((np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
-        error = None
+        error = expected = None
+        if shown.column.predictor is not None:
+            band = shown.column.predictor.expected_error(motion.parameters, times)
+            expected = None if band is None else band[:, 1]
         if truth is not None and shown.column.predictor is not None:
             predicted = self._solve(shown.column, shown.column.predictor, 1, truth.geometry, wish)
             off = predicted.vertices(times) - truth.vertices(times)
             error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
-        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error)
+        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error, expected)
 
     def largest_deformation(self, wish: Wish) -> float:
         """The time within the trained window at which the first visible column is deformed most."""

@@ -118,12 +118,21 @@ def evaluate(
     if schema.impact and window is None:
         spans["impact"] = schema.impact
     scores = {name: Scores() for name in spans}
+    covered = []
     for recorded in dataset.sequences(split):
         truth = recorded.until(stop)
         motion = predictor.solve(truth.rest, truth.parameters, quality, until=float(truth.times[-1]))
         predicted = motion.vertices(truth.times)
         on_frames = _on_frames(truth.times, schema.window)
         trained = predictor.schema.window
+        expected = predictor.expected_error(truth.parameters, truth.times)
+        if expected is not None:
+            rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))
+            covered.append(
+                (rmse <= expected[:, 1])[
+                    on_frames & (truth.times > max(begin - 1e-6, 0.0)) & (truth.times < end - 1e-6)
+                ]
+            )
         between = ~_on_frames(truth.times, trained) & (truth.times < trained.stop)
         for name, (first, last) in spans.items():
             inside = (truth.times > first - 1e-6) & (truth.times < last - 1e-6)
@@ -134,5 +143,8 @@ def evaluate(
     if "impact" in scores:
         result["impact"] = scores["impact"].result()
     result["per_object"] = {}
-    result["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith("rest."))
+    # of frames of sequences: errors within what nine in ten are expected to keep to
+    result["coverage_90"] = float(np.concatenate(covered).mean()) if covered else None
+    data = ("rest.", "training.", "val.")
+    result["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith(data))
     return result

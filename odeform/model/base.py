@@ -9,12 +9,14 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
+from odeform.model.expected import ExpectedError
 from odeform.model.motion import Motion, Trajectory
 from odeform.model.placed import PlacedBasis, place
 from odeform.model.reduced import ReducedSpace
 from odeform.schema import Parameters
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, Geometry, Mesh
+from odeform.types import Floats, Geometry, Mesh, Times
 
 __all__ = ["ReducedModel"]
 
@@ -27,6 +29,8 @@ class ReducedModel(ABC):
     model: ClassVar[str]
     qualities: Mapping[str, Quality] = {}
     """Ways to integrate, by name; empty for models that do not integrate."""
+    frontier: tuple[FrontierPoint, ...] = ()
+    """The ways to choose from, cheap to fine; empty for models that do not integrate, and in older checkpoints."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         try:
@@ -34,6 +38,7 @@ class ReducedModel(ABC):
             self.schema = checkpoint.schema
             self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
             self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
+            self._expected = ExpectedError(checkpoint.arrays) if "val.theta" in checkpoint.arrays else None
             self._read(checkpoint)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
@@ -58,6 +63,13 @@ class ReducedModel(ABC):
         self._placed.move_to_end(key)
         return self._placed[key][1]
 
+    def expected_error(self, parameters: Parameters, times: Times) -> Floats | None:
+        """(T, 2) mm RMSE at (T,) seconds, which half and nine in ten of unseen motions of the trained body keep to.
+
+        None where the checkpoint knows nothing of validation.
+        """
+        return None if self._expected is None else self._expected.at(self.schema.vector(parameters), times)
+
     def _quality(self, quality: str | Quality) -> Quality | None:
         if not self.qualities or isinstance(quality, Quality):
             return quality if isinstance(quality, Quality) else None
@@ -77,7 +89,7 @@ class ReducedModel(ABC):
 
         The geometry lies in the scene as at rest. Integrates to `until` seconds (default: the trained window); the
         motion can be asked beyond and then integrates on. Beyond what was trained motions fade: models see parameters
-        and times that `Schema.vector` and `Window.seen` bound.
+        and times that `Schema.seen` and `Window.seen` bound.
         """
         if observed is not None:
             raise InputError(f"{self.model}: predicts from parameters alone and takes no observed frames")
@@ -86,5 +98,5 @@ class ReducedModel(ABC):
         placed = self.place(shape, self.schema.azimuth(complete))
         window = self.schema.window
         span = float(window.seen(np.array(window.stop if until is None else until)))
-        trajectory = self._trajectory(self.schema.vector(complete), placed, self._quality(quality), span)
+        trajectory = self._trajectory(self.schema.seen(complete), placed, self._quality(quality), span)
         return Motion(self.schema, complete, shape, self.space, placed, trajectory)

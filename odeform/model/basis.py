@@ -43,15 +43,18 @@ class DisplacementBasis:
         return scaled, away, faded(away, self._far, 0.5 * self._far)
 
     def values(self, points: Points) -> Basis:
-        """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32, so that a frame is values @ c."""
-        out = np.empty((len(points), 3, self.modes), dtype=np.float32)
+        """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32.
+
+        A view of an array whose modes come first, so that frames are c @ values at the speed of memory or arithmetic.
+        """
+        out = np.empty((self.modes, len(points), 3), dtype=np.float32)
         for at in range(0, len(points), CHUNK):
             chunk, away, near = self._near(points[at : at + CHUNK])
             chunk *= (near / away)[:, None]
             features = np.concatenate([_cubes(chunk, self.centers), np.ones((len(chunk), 1)), chunk], axis=1)
             value = features @ self.weights
-            out[at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(1, 2)
-        return out
+            out[:, at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
+        return out.transpose(1, 2, 0)
 
     def slopes(
         self, points: Points, directions: Float[np.ndarray, "points directions 3"]

@@ -15,6 +15,8 @@ from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Po
 
 __all__ = ["Motion", "SolveStats", "Trajectory"]
 
+BLOCK = 1 << 15  # points times frames that are worked on at once: they stay in the processor's cache
+
 
 @dataclass(frozen=True)
 class SolveStats:
@@ -86,10 +88,17 @@ class Motion:
         rotation, shift = self._rotation_shift(y)
         turned = rotation.swapaxes(-1, -2)
         # as what moved since P0: the turn vanishes identically at rest, so that P(0) is P0 to the last bit
-        out = self.placed.rest @ (turned - self._to_canonical_axes).astype(np.float32)
-        out += self._deformation(y) @ turned.astype(np.float32)
-        out += shift[:, None].astype(np.float32)
-        out += self.placed.points
+        rigid = np.concatenate([turned - self._to_canonical_axes, shift[:, None]], axis=1).astype(np.float32)
+        turned = turned.astype(np.float32)
+        count = len(self.placed.points)
+        out = np.empty((len(y), count, 3), dtype=np.float32)
+        size = max(BLOCK // len(y), 1)
+        for begin in range(0, count, size):
+            block = slice(begin, begin + size)
+            moved = np.matmul(self._deformation(y, block), turned, out=out[:, block])
+            carried = self.placed.homogeneous[block] @ rigid
+            carried += self.placed.points[block]
+            moved += carried
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
@@ -157,11 +166,11 @@ class Motion:
     def _rotation_shift(self, y: Floats) -> tuple[Rotations, Vectors]:
         return rotation_of(y[:, :6], self.schema.azimuth(self.parameters))
 
-    def _deformation(self, y: Floats) -> Frames:
-        coefficients = y[:, 6:].astype(np.float32)
-        # one product for all times; for one time a matrix-vector product at memory speed
-        moved = coefficients @ self.placed.values.T if len(y) > 1 else (self.placed.values @ coefficients[0])[None]
-        return moved.reshape(len(y), -1, 3)
+    def _deformation(self, y: Floats, block: slice = slice(None)) -> Frames:
+        """(T, n, 3) canonical displacements of the points in `block`: one product for all times."""
+        modes = len(self.placed.values)
+        values = self.placed.values.reshape(modes, -1, 3)[:, block].reshape(modes, -1)
+        return (y[:, 6:].astype(np.float32) @ values).reshape(len(y), -1, 3)
 
     def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
         """The triads under the deformation of `y` (1, 6 + K), turned from canonical axes by `turn` (3, 3)."""

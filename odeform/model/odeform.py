@@ -9,12 +9,13 @@ from odeform.model.inference import (
     Field,
     LatentTrajectory,
     check_weights,
-    encode,
     make_decoder,
+    make_encoder,
     make_field,
     pool_shape,
 )
 from odeform.model.placed import PlacedBasis
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
@@ -34,6 +35,8 @@ class ODeform(ReducedModel):
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
         self.qualities = {name: Quality(**setting) for name, setting in checkpoint.config["qualities"].items()}
+        self.frontier = tuple(FrontierPoint.from_json(row) for row in checkpoint.config.get("frontier", ()))
+        self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
@@ -55,7 +58,7 @@ class ODeform(ReducedModel):
     def flow(self, theta: Floats, placed: PlacedBasis, precision: str) -> tuple[Field, Floats]:
         """What is integrated: the field dz/dt = f(t, z), and the latent state (S,) at rest."""
         dtype = np.float32 if precision == "float32" else np.float64
-        return self._fields[dtype](theta), encode(self.weights, self.config, self._pool(placed), theta, dtype)
+        return self._fields[dtype](theta), self._encode(self._pool(placed), theta, dtype)
 
     def integrate(self, theta: Floats, placed: PlacedBasis, quality: Quality, until: float) -> LatentTrajectory:
         """The solved latent motion for parameters in [-1, 1]."""

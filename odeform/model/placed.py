@@ -17,7 +17,7 @@ __all__ = ["PlacedBasis", "place"]
 
 @dataclass(frozen=True, eq=False)
 class PlacedBasis:
-    """A geometry, as it lies in the scene at rest: canonical points (N, 3) and values (3 N, K) of the basis; float32.
+    """A geometry, as it lies in the scene at rest: canonical points (N, 3) and values (K, 3 N) of the basis; float32.
 
     What only some need is computed when first asked for.
     """
@@ -27,7 +27,7 @@ class PlacedBasis:
     azimuth: float
     points: Points
     rest: Points
-    values: Float[np.ndarray, "rows modes"]
+    values: Float[np.ndarray, "modes rows"]
     reach: Float[np.ndarray, " modes"]
     """Largest displacement of any point by each mode."""
     shares: Perpoint
@@ -36,8 +36,13 @@ class PlacedBasis:
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:
         """Mean products of the modes over the surface: c gram c is the mean square displacement, m^2."""
-        shares = np.repeat(self.shares, 3)[:, None].astype(np.float32)
-        return self.values.T @ (self.values * shares)
+        shares = np.repeat(self.shares, 3).astype(np.float32)
+        return (self.values * shares) @ self.values.T
+
+    @cached_property
+    def homogeneous(self) -> Float[np.ndarray, "points 4"]:
+        """`rest` and a column of ones: rigid motions are products."""
+        return np.concatenate([self.rest, np.ones_like(self.rest[:, :1])], axis=1)
 
     @cached_property
     def triads(self) -> Triads:
@@ -56,9 +61,9 @@ class PlacedBasis:
 def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasis:
     """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
     rest = to_canonical(geometry.points, space.anchor, azimuth)
-    values = space.basis.values(rest)
+    values = space.basis.values(rest).transpose(2, 0, 1)
     points = np.asarray(geometry.points, dtype=np.float32)
-    reach = np.sqrt((values**2).sum(axis=1).max(axis=0))
-    flat = values.reshape(-1, space.basis.modes)
+    reach = np.sqrt(np.einsum("kni,kni->kn", values, values).max(axis=1))
+    flat = values.reshape(space.basis.modes, -1)
     shares = surface_shares(geometry)
     return PlacedBasis(geometry, space, azimuth, points, rest.astype(np.float32), flat, reach, shares)

@@ -15,18 +15,9 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
-from odeform.types import Arrays, Basis, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
+from odeform.types import Arrays, Basis, Floats, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
-__all__ = [
-    "POSE",
-    "ReducedSpace",
-    "decompose",
-    "fit_modes",
-    "make_space",
-    "rotation_of",
-    "small_motion",
-    "to_canonical",
-]
+__all__ = ["POSE", "ReducedSpace", "body_scale", "decompose", "fit_modes", "make_space", "rotation_of", "to_canonical"]
 
 POSE = 6  # numbers of the rigid part of y
 
@@ -112,11 +103,11 @@ def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Ro
     return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T
 
 
-def small_motion(y: Float[np.ndarray, "*batch y"], arm: float) -> Float[np.ndarray, "*batch"]:
-    """Root-mean-square displacement in metres of a round body of radius of gyration `arm` by a small y (..., 6 + K).
+def body_scale(arm: float, size: int) -> Floats:
+    """(6 + K,) what each number of a small difference in y counts in metres: then |dy| is the RMS over the body.
 
-    A small turn |w| moves it by sqrt(2/3) arm |w|.
+    A small turn |w| moves a round body of radius of gyration `arm` by sqrt(2/3) arm |w| in RMS.
     """
-    pose, local = y[..., :POSE], y[..., POSE:]
-    turn = 2.0 / 3.0 * arm**2 * (pose[..., 3:] ** 2).sum(axis=-1)
-    return np.sqrt((pose[..., :3] ** 2).sum(axis=-1) + turn + (local**2).sum(axis=-1))
+    scale = np.ones(size)
+    scale[3:POSE] = arm * np.sqrt(2.0 / 3.0)
+    return scale

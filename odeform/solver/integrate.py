@@ -7,19 +7,17 @@ what it says of a time is the same however one came to ask.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from odeform.errors import InputError
 from odeform.solver.solution import Solution, Status
+from odeform.solver.stages import Field, Stages, TensorStages
 from odeform.solver.tableau import Tableau, get_method
 
 __all__ = ["Quality", "integrate"]
-
-Field = Callable[[float, Any], Any]
 
 MAX_STEPS = 20_000
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -45,26 +43,9 @@ class Quality:
         if self.dtype not in ("float32", "float64"):
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
 
-
-def _step(method: Tableau, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, list[Any]]:
-    """The state after one step, and the stages; the last of these is the slope there, evaluated or "same as last"."""
-    stages, at = [slope], state
-    for weights, node in zip(method.a[1:], method.c[1:], strict=True):
-        at = state + _combine(weights, stages, step)
-        stages.append(field(time + node * step, at))
-    if not method.fsal:
-        at = state + _combine(method.b, stages, step)
-        stages.append(field(time + step, at))
-    return at, stages
-
-
-def _combine(weights: tuple[float, ...], stages: list[Any], step: float) -> Any:
-    total = None
-    for weight, stage in zip(weights, stages, strict=False):
-        if weight:
-            term = (weight * step) * stage
-            total = term if total is None else total + term
-    return total
+    def to_json(self) -> dict[str, Any]:
+        """What differs from the defaults: `Quality(**q.to_json()) == q`."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
 
 def _finite(value: Any) -> bool:
@@ -102,36 +83,39 @@ def integrate(field: Field, start: Any, quality: Quality, until: float, begin: f
         if not (_finite(solution.states[0]) and _finite(solution.slopes[0])):
             solution.status = Status.NON_FINITE
     if solution.status is Status.OK:
+        method = get_method(quality.method)
+        stages = (Stages if isinstance(start, np.ndarray) else TensorStages)(method, start)
         advance = _fixed if quality.step is not None else _controlled
-        advance(get_method(quality.method), field, quality, solution, until)
+        advance(method, stages, field, quality, solution, until)
     return solution
 
 
-def _fixed(method: Tableau, field: Field, quality: Quality, solution: Solution, until: float) -> None:
+def _fixed(_: Tableau, stages: Stages, field: Field, quality: Quality, solution: Solution, until: float) -> None:
     step, origin = quality.step or 0.0, solution.times[0]
     while solution.end < until - 1e-9 * step:
         if solution.steps >= MAX_STEPS:
             solution.status = Status.MAX_STEPS
             return
         time, state, slope = solution.times[-1], solution.states[-1], solution.slopes[-1]
-        after, stages = _step(method, field, time, state, slope, step)
-        solution.evaluations += len(stages) - 1
-        if not _finite(after + stages[-1]):
+        after, slope = stages.step(field, time, state, slope, step)
+        solution.evaluations += stages.evaluations
+        if not _finite(after + slope):
             solution.status = Status.NON_FINITE
             return
         # nodes are multiples of the step: no drift, however often the solution is continued
         solution.times.append(origin + (solution.steps + 1) * step)
         solution.states.append(after)
-        solution.slopes.append(stages[-1])
+        solution.slopes.append(slope)
 
 
-def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solution, until: float) -> None:
+def _controlled(
+    method: Tableau, stages: Stages, field: Field, quality: Quality, solution: Solution, until: float
+) -> None:
     """Proportional step control on the embedded error estimate."""
     tolerance = quality.tolerance or 0.0
     if not solution.next_step:
         solution.next_step = _first_step(method, field, solution.end, solution.states[0], solution.slopes[0], tolerance)
         solution.evaluations += 1
-    assert method.error is not None
     while solution.end < until:
         if solution.steps + solution.rejected >= MAX_STEPS:
             solution.status = Status.MAX_STEPS
@@ -140,9 +124,9 @@ def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solut
         if time + step <= time:
             solution.status = Status.UNDERFLOW
             return
-        after, stages = _step(method, field, time, state, slope, step)
-        solution.evaluations += len(stages) - 1
-        ratio = _error_ratio(_combine(method.error, stages, step), state, after, tolerance)
+        after, slope = stages.step(field, time, state, slope, step)
+        solution.evaluations += stages.evaluations
+        ratio = _error_ratio(stages.error(state, step), state, after, tolerance)
         if not math.isfinite(ratio):
             ratio = 1e6  # too far: try again closer
         factor = min(GROW, max(SHRINK, SAFETY * max(ratio, 1e-10) ** (-1.0 / method.order)))
@@ -152,6 +136,6 @@ def _controlled(method: Tableau, field: Field, quality: Quality, solution: Solut
             continue
         solution.times.append(time + step)
         solution.states.append(after)
-        solution.slopes.append(stages[-1])
+        solution.slopes.append(slope)
         if method.middle is not None:
-            solution.middles.append(state + _combine(method.middle, stages, step))
+            solution.middles.append(stages.middle(state, step))

@@ -29,7 +29,7 @@ from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
 from odeform.model.reduced import POSE
 from odeform.training.losses import Metric, balanced
-from odeform.training.readout import NormalEquations, random_layer
+from odeform.training.readout import CLOCK_GAINS, NormalEquations, random_layer
 from odeform.training.tree import fill, strip
 from odeform.types import Arrays
 
@@ -94,6 +94,13 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
                 # features have to differ before a readout can make use of them
                 layer.weight.data *= 2.0
                 nn.init.uniform_(layer.bias, -1.0, 1.0)
+        first = decoder.hidden[0]
+        assert isinstance(first, nn.Linear)
+        (low, high), count = CLOCK_GAINS, first.out_features
+        # contacts are short: smooth features of the clock do not learn to be sharp
+        sharp = low * (high / low) ** torch.rand(count) * torch.randn(count)
+        first.weight.data[:, -1 - config.parameters] = sharp
+        first.bias.data -= sharp * (2.0 * torch.rand(count) - 1.0)
     shape = _shape(data)
     for encoder in net.encoders:
         encoder.standardise([shape])

@@ -5,7 +5,7 @@ A readout is linear, so its best value for any features is a least-squares solve
 
 import torch
 
-__all__ = ["NormalEquations", "random_layer"]
+__all__ = ["CLOCK_GAINS", "NormalEquations", "random_layer"]
 
 STATE_GAINS = (0.1, 1.0)
 CLOCK_GAINS = (3.0, 30.0)

@@ -16,10 +16,11 @@ from odeform.checkpoint import Checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
+from odeform.evaluation.residuals import validation_residuals
 from odeform.model.data import TrainingData, prepare
 from odeform.model.odeform import PREFIX, ODeform
 from odeform.predictor import load
-from odeform.training.qualities import choose_qualities
+from odeform.training.qualities import choose_qualities, measure_frontier
 from odeform.types import Arrays, Mesh
 
 __all__ = ["MODELS", "TrainRequest", "train"]
@@ -103,8 +104,12 @@ def train(
     )
     if request.model == "odeform":
         # the solver may add to the model's error, not more
-        qualities = choose_qualities(ODeform(checkpoint), data)
-        checkpoint = replace(checkpoint, config={**checkpoint.config, "qualities": qualities})
+        frontier, error_mm = measure_frontier(ODeform(checkpoint), data)
+        settings = {"qualities": choose_qualities(frontier, error_mm), "frontier": [p.to_json() for p in frontier]}
+        checkpoint = replace(checkpoint, config={**checkpoint.config, **settings})
+    write_checkpoint(out, checkpoint)
+    arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
+    checkpoint = replace(checkpoint, arrays=arrays)
     write_checkpoint(out, checkpoint)
     scores = evaluate(load(out), dataset, "test")
     scored = replace(checkpoint, scores=scores)

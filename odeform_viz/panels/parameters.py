@@ -84,11 +84,10 @@ class ParameterPanel:
         server: viser.ViserServer,
         schema: Schema,
         samples: Mapping[str, Floats],
-        qualities: tuple[str, ...],
         wake: Callable[[], None],
     ) -> None:
-        """`samples` are the values of the training sequences by parameter; `qualities` the ways to integrate."""
-        self._schema, self._samples, self._qualities = schema, samples, qualities
+        """`samples` are the values of the training sequences by parameter."""
+        self._schema, self._samples = schema, samples
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
         self._presets = presets(schema)
@@ -113,13 +112,6 @@ class ParameterPanel:
             self._preset.on_update(self._choose)
             reset = gui.add_button_group("reset", ("all", *(p.name for p in schema.parameters)))
             reset.on_click(lambda event: self._reset(str(event.target.value)))
-            self._quality = None
-            if qualities:
-                initial = "balanced" if "balanced" in qualities else qualities[0]
-                self._quality = gui.add_dropdown(
-                    "quality", qualities, initial_value=initial, hint="how finely the ODE is integrated"
-                )
-                self._quality.on_update(lambda _: wake())
         self.show()
 
     async def _choose(self, event: viser.GuiEvent) -> None:
@@ -138,10 +130,6 @@ class ParameterPanel:
             slider = self._sliders[name]
             slider.value = min(max(complete[name], slider.min), slider.max)
 
-    def set_quality(self, name: str) -> None:
-        if self._quality is not None and name in self._qualities:
-            self._quality.value = name
-
     def parameters(self) -> dict[str, float]:
         """What the sliders say. `InputError` for what no hand could move them to."""
         values = {name: slider.value for name, slider in self._sliders.items()}
@@ -150,12 +138,6 @@ class ParameterPanel:
                 reach = f"from {slider.min:g} to {slider.max:g}"
                 raise InputError(f"{name}: expected a finite number {reach}, got {values[name]:g}")
         return values
-
-    def quality(self) -> str:
-        value = self._quality.value if self._quality else "balanced"
-        if self._quality and value not in self._qualities:
-            raise InputError(f"quality: expected one of {', '.join(self._qualities)}, got {value!r}")
-        return value
 
     def show(self) -> None:
         """Refresh what stands at the sliders; called by the worker."""

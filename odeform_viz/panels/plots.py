@@ -13,13 +13,20 @@ __all__ = ["PlotPanel", "plots_svg"]
 
 WIDTH, HEIGHT, LEFT, TOP, FOOT = 208, 112, 34, 18, 16  # px of one plot and its margins
 Line = tuple[str, tuple[int, int, int], Curves]
+STYLE = (
+    f".at{{display:block;position:relative;top:-{HEIGHT}px;height:{HEIGHT}px;margin-bottom:-{HEIGHT}px;width:100%;"
+    "overflow:visible;font:10px sans-serif}.at path{stroke:#222}"
+    ".at text{text-anchor:end;stroke:#fff;stroke-width:2.5px;paint-order:stroke}"
+)
+"""Of the moment, which is sent with every frame."""
 QUANTITIES = (("height", "height of the centre, m"), ("turn", "turn, degrees"), ("deformation", "deformation RMS, mm"))
-ERROR = ("error", "error to truth RMS, mm")
+ERROR = ("error", "error RMS, mm (dashed: 9 in 10)")
 
 
 def _quantities(lines: Sequence[Line], turns: bool) -> list[tuple[str, str]]:
     wanted = [q for q in QUANTITIES if q[0] != "turn" or turns]
-    return [*wanted, ERROR] if any(curves.error is not None for _, _, curves in lines) else wanted
+    known = any(c.error is not None or c.expected is not None for _, _, c in lines)
+    return [*wanted, ERROR] if known else wanted
 
 
 def _top(values: list[Floats]) -> float:
@@ -35,6 +42,7 @@ def plots_svg(lines: Sequence[Line], window: Window, turns: bool) -> str:
     quantities = _quantities(lines, turns)
     plots = [_plot(index, name, title, lines, window) for index, (name, title) in enumerate(quantities)]
     return (
+        f"<style>{STYLE}</style>"
         f'<svg width="{WIDTH * len(quantities)}" height="{HEIGHT}" font-family="sans-serif" font-size="10" '
         f'style="display:block">{"".join(plots)}</svg>'
     )
@@ -43,14 +51,16 @@ def plots_svg(lines: Sequence[Line], window: Window, turns: bool) -> str:
 def _plot(index: int, name: str, title: str, lines: Sequence[Line], window: Window) -> str:
     wide, high = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT
     span = REACH * (window.stop - window.start)
-    values = [(color, np.asarray(getattr(c, name))) for _, color, c in lines if getattr(c, name) is not None]
-    top = _top([v for _, v in values])
+    values = [(color, getattr(c, name), "") for _, color, c in lines if getattr(c, name) is not None]
+    if name == "error":
+        values += [(color, c.expected, ' stroke-dasharray="3 2"') for _, color, c in lines if c.expected is not None]
+    top = _top([v for _, v, _ in values])
     trained = wide / REACH
     x = np.linspace(0.0, wide, len(lines[0][2].times)) if lines else np.zeros(0)
     drawn = "".join(
         f'<path d="{_path(x, high - np.clip(v / top, 0.0, 1.05) * high)}" fill="none" '
-        f'stroke="rgb{color}" stroke-width="1.4"/>'
-        for color, v in values
+        f'stroke="rgb{color}" stroke-width="1.4"{dashes}/>'
+        for color, v, dashes in values
     )
     return (
         f'<g transform="translate({WIDTH * index + LEFT},{TOP})">'
@@ -91,22 +101,19 @@ def cursor_svg(lines: Sequence[Line], window: Window, turns: bool, moment: float
     quantities = _quantities(lines, turns)
     wide, high = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT
     share = (moment - window.start) / (REACH * (window.stop - window.start))
-    place, x = share * (len(lines[0][2].times) - 1) if lines else 0.0, share * wide
-    parts = []
-    for index, (name, _) in enumerate(quantities):
-        texts = "".join(
-            f'<text x="{wide - 2}" y="{10 + 11 * row}" text-anchor="end" fill="rgb{color}" '
-            f'stroke="#fff" stroke-width="2.5" paint-order="stroke">{_at(getattr(curves, name), place)}</text>'
-            for row, (_, color, curves) in enumerate(lines[:6])
-        )
-        parts.append(
-            f'<g transform="translate({WIDTH * index + LEFT},{TOP})">'
-            f'<path d="M{x:.1f} 0V{high}" stroke="#222" stroke-width="1"/>{texts}</g>'
-        )
-    return (
-        f'<div style="height:0"><svg width="{WIDTH * len(quantities)}" height="{HEIGHT}" font-family="sans-serif" '
-        f'font-size="10" style="display:block;position:relative;top:-{HEIGHT}px">{"".join(parts)}</svg></div>'
+    place, x = share * (len(lines[0][2].times) - 1) if lines else 0.0, LEFT + share * wide
+    # one line for all plots, and no attribute that the style sheet can tell: it is sent with every frame
+    marks = f"M{x:.0f} {TOP}v{high}" + f"m{WIDTH}-{high}v{high}" * (len(quantities) - 1)
+    texts = "".join(
+        f'<g fill="#{bytes(color).hex()}">{_values(curves, quantities, place, TOP + 10 + 11 * row)}</g>'
+        for row, (_, color, curves) in enumerate(lines[:6])
     )
+    return f'<svg class="at"><path d="{marks}"/>{texts}</svg>'
+
+
+def _values(curves: Curves, quantities: list[tuple[str, str]], place: float, y: int) -> str:
+    known = [(index, _at(getattr(curves, name), place)) for index, (name, _) in enumerate(quantities)]
+    return "".join(f'<text x="{WIDTH * (i + 1) - 8}" y="{y}">{text}</text>' for i, text in known if text)
 
 
 class PlotPanel:

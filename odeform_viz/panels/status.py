@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import viser
 
 from odeform_viz.heat import BANDS
@@ -34,8 +35,8 @@ def moment_in_words(frame: Frame) -> str:
     return words
 
 
-def describe(shown: ColumnFrame, settled: bool = True) -> str:
-    """Solver, work, solver error and the checkpoint's test error of one column, as Markdown.
+def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
+    """Solver, work, solver error and model error of one column at `time`, as Markdown.
 
     The solver error costs as much as the solution: it is left open until the user's hand has `settled`.
     """
@@ -54,6 +55,11 @@ def describe(shown: ColumnFrame, settled: bool = True) -> str:
     if shown.error is not None:
         e = shown.error
         lines.append(f"now off the truth by {e.rmse_mm:.2f} mm RMSE, {e.mae_mm:.2f} MAE, {e.worst_mm:.2f} at worst")
+    expected = column.predictor.expected_error(shown.motion.parameters, np.array([time]))
+    if expected is not None:
+        half, most = expected[0]
+        beyond = shown.motion.extrapolates(time) or shown.motion.outside
+        lines.append(f"model error here ≈ {half:.2g} mm, 9 in 10 below {most:.2g}{' ⚠ a guess' if beyond else ''}")
     score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
     if score is not None:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
@@ -103,7 +109,7 @@ class StatusPanel:
             self._details = server.gui.add_markdown("")
 
     def show(self, frame: Frame, settled: bool) -> None:
-        _say(self._details, "\n\n".join(describe(shown, settled) for shown in frame.columns))
+        _say(self._details, "\n\n".join(describe(shown, frame.wish.time, settled) for shown in frame.columns))
 
 
 def _say(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:

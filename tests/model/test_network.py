@@ -7,7 +7,7 @@ import trimesh
 
 from odeform.geometry.shape import surface_shares
 from odeform.model.config import ModelConfig
-from odeform.model.inference import encode, make_decoder, make_field, pool_shape
+from odeform.model.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.model.network import ODeformNet, ShapeEncoder
 from odeform.solver.integrate import Quality, integrate
 from odeform.training.loop import network_weights
@@ -49,7 +49,7 @@ def test_inference_equals_the_network(rigid: bool, random_features: int, dtype: 
         rolled = net.roll_out(state, theta, [0.02, 0.02])[:, 0]
     vector = theta[0].double().numpy()
     pooled = pool_shape(weights, config, points.double().numpy(), shares.double().numpy())
-    start = encode(weights, config, pooled, vector, dtype)
+    start = make_encoder(weights, config)(pooled, vector, dtype)
     assert start.dtype == dtype
     assert np.allclose(start, state[0], rtol=1e-5, atol=1e-5)
     field = make_field(weights, config, dtype)(vector)

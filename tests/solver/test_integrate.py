@@ -211,3 +211,13 @@ def test_step_limit() -> None:
 def test_impossible_qualities(setting: dict) -> None:
     with pytest.raises(InputError):
         Quality(**setting)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("quality", QUALITIES, ids=str)
+def test_many_times_at_once_are_each_time_alone(quality: Quality, dtype: type) -> None:
+    """To the last bit: what is shown of a moment must not depend on what else was asked for."""
+    solution = integrate(oscillator, np.array([2.0, 0.0], dtype), quality, until=3.0)
+    times = np.concatenate([[-1.0, 0.0, 9.0], np.random.default_rng(0).uniform(0.0, 3.2, 40), solution.times[3:5]])
+    assert np.array_equal(solution.sample(times), np.stack([solution.at(float(time)) for time in times]))
+    assert np.array_equal(solution.sample(times[5:6])[0], solution.at(float(times[5])))

@@ -9,7 +9,7 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.model.data import TrainingData, prepare
-from odeform.model.inference import encode, make_decoder, make_field, pool_shape
+from odeform.model.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
 from odeform.solver.integrate import Quality, integrate
@@ -84,7 +84,7 @@ def test_random_features_leave_less(data: TrainingData) -> None:
         pooled = pool_shape(weights, net.config, data.rest / data.space.arm, data.weights)
         squares = []
         for theta, truth in zip(data.theta["train"], data.reduced["train"], strict=True):
-            start = encode(weights, net.config, pooled, theta, np.float64)
+            start = make_encoder(weights, net.config)(pooled, theta, np.float64)
             field = make_field(weights, net.config, np.float64)(theta)
             stop = float(data.times[-1])
             solution = integrate(field, start, Quality("rk4", step=float(data.times[1]) / 2.0), stop)

@@ -1,37 +1,54 @@
 from typing import cast
 
+import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.model.data import prepare
 from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor
+from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
-from odeform.training.qualities import REFERENCE, choose_qualities
+from odeform.training.qualities import choose_qualities, measure_frontier
+
+Measured = tuple[tuple[FrontierPoint, ...], float]
 
 
-@pytest.mark.parametrize("share", [1.0, 0.1])
-def test_a_smaller_error_asks_for_more_evaluations(
-    dataset: Dataset, predictors: dict[str, Predictor], share: float
-) -> None:
+@pytest.fixture(scope="module")
+def measured(dataset: Dataset, predictors: dict[str, Predictor]) -> Measured:
     model = cast(ODeform, predictors["odeform"])
-    data = prepare(dataset, modes=model.space.basis.modes)
-    evaluations = []
-    for factor in (1.0, 0.01):
-        chosen = choose_qualities(model, data, {"draft": factor * share, "balanced": 0.1 * factor * share})
-        assert chosen["reference"] == REFERENCE
-        motions = [model.solve(quality=Quality(**chosen[name])) for name in ("draft", "balanced")]  # pyright: ignore
-        evaluations += [motion.stats.evaluations for motion in motions]
-    assert evaluations[0] <= evaluations[1]
-    assert evaluations[0] < evaluations[2]
-    assert evaluations[1] < evaluations[3]
+    return measure_frontier(model, prepare(dataset, modes=model.space.basis.modes))
 
 
-def test_nothing_is_exact_enough(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
-    model = cast(ODeform, predictors["odeform"])
-    data = prepare(dataset, modes=model.space.basis.modes)
-    assert choose_qualities(model, data, {"balanced": 1e-12})["balanced"] == REFERENCE
+def test_a_frontier_trades_work_for_accuracy(measured: Measured, predictors: dict[str, Predictor]) -> None:
+    frontier, error_mm = measured
+    work, errors = np.array([(p.evaluations, p.solver_error_mm) for p in frontier]).T
+    assert (np.diff(work) > 0.0).all()
+    assert (np.diff(errors) < 0.0).all()
+    assert errors[-1] < 1e-2 * error_mm
+    motion = predictors["odeform"].solve(quality=frontier[0].quality)
+    assert motion.stats.evaluations == pytest.approx(work[0], rel=0.3)
 
 
-def test_a_checkpoint_brings_its_qualities(predictors: dict[str, Predictor]) -> None:
-    assert list(predictors["odeform"].qualities) == ["draft", "balanced", "reference"]
+def test_qualities_are_points_of_it(measured: Measured) -> None:
+    frontier, error_mm = measured
+    known = {point.quality: point for point in frontier}
+    for share in (1.0, 0.01):
+        chosen = choose_qualities(frontier, share * error_mm)
+        points = {name: known[Quality(**setting)] for name, setting in chosen.items()}
+        assert points["draft"].solver_error_mm <= share * error_mm
+        assert points["balanced"].solver_error_mm <= max(0.1 * share * error_mm, frontier[-1].solver_error_mm)
+        assert points["draft"].evaluations <= points["balanced"].evaluations <= points["reference"].evaluations
+        assert points["reference"] is frontier[-1]
+
+
+def test_nothing_is_exact_enough(measured: Measured) -> None:
+    frontier, _ = measured
+    assert Quality(**choose_qualities(frontier, 1e-12)["balanced"]) == frontier[-1].quality
+
+
+def test_a_checkpoint_brings_its_frontier(predictors: dict[str, Predictor]) -> None:
+    model = predictors["odeform"]
+    assert list(model.qualities) == ["draft", "balanced", "reference"]
+    assert set(model.qualities.values()) <= {point.quality for point in model.frontier}
+    assert predictors["pod-rbf"].frontier == ()

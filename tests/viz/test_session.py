@@ -162,9 +162,13 @@ def test_a_body_below_the_floor_is_remarked(session: Session, wish: Wish) -> Non
 
 def test_status_names_solver_error_as_such(session: Session, wish: Wish) -> None:
     shown = session.frame(wish).columns[0]
-    text = describe(shown)
+    text = describe(shown, wish.time)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
+    assert "model error here ≈" in text
+    assert "a guess" not in text
+    later = replace(wish, time=1.2 * session.schema.window.stop)
+    assert "⚠ a guess" in describe(session.frame(later).columns[0], later.time)
     assert f"{shown.stats.evaluations} evaluations" in text
 
 

@@ -22,8 +22,9 @@ def line(drop: Predictor) -> Line:
 
 
 def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
+    line = (*line[:2], replace(line[2], expected=None))
     svg = plots_svg([line, line], drop.schema.window, turns=False)
-    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error to truth", svg) == [
+    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error RMS", svg) == [
         "height of the centre",
         "deformation RMS",
     ]
@@ -35,10 +36,16 @@ def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, dro
     error = np.linspace(0.0, 2.0, len(line[2].times))
     error[50:] = np.nan
     svg = plots_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, turns=False)
-    assert "error to truth RMS, mm" in svg
+    assert "error RMS, mm" in svg
     assert "nan" not in svg
     cursor = cursor_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, False, 1.0)
     assert "–" in cursor
+
+
+def test_the_expected_error_is_dashed(line: Line, drop: Predictor) -> None:
+    """The model's own truth apart: it is there without any."""
+    assert line[2].error is None
+    assert plots_svg([line], drop.schema.window, turns=False).count("stroke-dasharray") == 1
 
 
 def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:
@@ -56,3 +63,14 @@ def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App,
     assert client.until(lambda: app._plots._curves.content != curves)
     client.set("odeform", False)
     assert client.until(lambda: "nothing shown" in client.text())
+
+
+def test_after_many_moments_the_numbers_are_of_the_last(dropped: tuple[App, LoopbackClient]) -> None:
+    """They are told ten times a second, however often the moment changes."""
+    app, client = dropped
+    for moment in np.linspace(0.3, 0.45, 31):
+        client.set("time (s)", round(float(moment), 3))
+    plots = app._plots
+    last = cursor_svg(plots._lines, app.session.schema.window, plots._turns, 0.45)
+    assert client.until(lambda: plots._cursor.content == last)
+    assert client.until(lambda: app._playback._time.value == 0.45)

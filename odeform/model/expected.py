@@ -1,0 +1,54 @@
+"""How wrong a model is likely to be: an error bar from its errors on sequences that it was not trained on."""
+
+import numpy as np
+
+from odeform.types import Arrays, Floats, Times
+
+__all__ = ["ExpectedError"]
+
+NOMINAL = 0.9
+WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
+"""Candidates for the distance in normalised parameters over which errors are alike."""
+TINY = 1e-6  # mm
+ABOUT = 0.05  # of the frames on either side have their say in the quantiles of a frame
+
+
+class ExpectedError:
+    """The RMSE that half, and `NOMINAL` of all, unseen motions of these parameters keep to at a time.
+
+    A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
+    the product of a profile over time, a scale that is smooth over the parameters, and a rest whose quantiles about
+    each time, with each sequence's scale told by the others alone, make the band. Beyond the trained ranges or window
+    nothing was validated: there the band doubles with each `width` outside, and grows in proportion to the time.
+    """
+
+    def __init__(self, arrays: Arrays) -> None:
+        """`val.theta` (S, P) in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T); KeyError without them."""
+        self._theta = arrays["val.theta"].astype(float)
+        self._times = arrays["val.times"].astype(float)
+        logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
+        profile = np.median(logs, axis=0)
+        self._levels = (logs - profile).mean(axis=1)
+        rests = {width: self._levels - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
+        self._width = min(WIDTHS, key=lambda width: float((rests[width] ** 2).mean()))
+        rest = logs - profile - (self._levels - rests[self._width])[:, None]
+        near, count = round(ABOUT * len(profile)), len(profile)
+        quantiles = [np.quantile(rest[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
+        self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
+
+    def _smooth(self, theta: Floats, width: float, leave_out: bool = False) -> Floats:
+        """(M, P) -> (M,) the log scale there, a kernel mean over the validation sequences."""
+        squares = ((theta[:, None] - self._theta) ** 2).sum(axis=2) / (2.0 * width**2)
+        if leave_out:
+            np.fill_diagonal(squares, np.inf)
+        weights = np.exp(squares.min(axis=1, keepdims=True) - squares)
+        return (weights @ self._levels) / weights.sum(axis=1)
+
+    def at(self, theta: Floats, times: Times) -> Floats:
+        """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and what `NOMINAL` keep to."""
+        inside = np.clip(theta, -1.0, 1.0)
+        level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * np.linalg.norm(theta - inside) / self._width
+        stop = self._times[-1]
+        profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
+        grown = np.maximum(times / stop, 1.0)[:, None]
+        return np.where(times[:, None] > 0.0, grown * np.exp(profile + level), 0.0)

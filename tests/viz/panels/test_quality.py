@@ -1,0 +1,70 @@
+"""How finely to integrate, as its users choose it."""
+
+import json
+
+import pytest
+
+from odeform.predictor import Predictor, load
+from odeform_viz.app import App
+from odeform_viz.columns import Column
+from odeform_viz.loopback import LoopbackClient
+from odeform_viz.panels.quality import WITHIN_MM, WITHIN_MS, quality_names
+from odeform_viz.session import quality_of
+
+
+def chosen(app: App) -> dict[str, object]:
+    return json.loads(app._wish().quality)
+
+
+def test_an_error_chooses_the_cheapest_setting_that_keeps_to_it(
+    kicked: tuple[App, LoopbackClient], kick: Predictor
+) -> None:
+    app, client = kicked
+    assert not client.controls["at most (mm)"].visible
+    client.set("quality", WITHIN_MM)
+    for point in (kick.frontier[0], kick.frontier[len(kick.frontier) // 2], kick.frontier[-1]):
+        client.set("at most (mm)", 1.001 * point.solver_error_mm)
+        assert client.until(lambda point=point: chosen(app) == point.quality.to_json())
+    assert client.until(lambda: kick.frontier[-1].quality.method in client.text())
+    assert client.controls["at most (mm)"].visible
+    assert not client.controls["at most (ms)"].visible
+
+
+def test_a_longer_time_never_chooses_a_coarser_setting(kicked: tuple[App, LoopbackClient], kick: Predictor) -> None:
+    app, client = kicked
+    client.set("quality", WITHIN_MS)
+    settings = [point.quality.to_json() for point in kick.frontier]
+    places = []
+    for budget in (0.1, 2.0, 8.0, 30.0, 1000.0):
+        client.set("at most (ms)", budget)
+        assert client.until(lambda budget=budget: app._quality._budget.value == budget)  # pyright: ignore
+        places.append(settings.index(chosen(app)))
+    assert places == sorted(places)
+    assert (places[0], places[-1]) == (0, len(settings) - 1)
+
+
+def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: Predictor) -> None:
+    app, client = kicked
+    assert app._quality is not None
+    setting = json.dumps(kick.frontier[1].quality.to_json())
+    app._quality.set(setting)
+    assert app._wish().quality == setting
+    app._quality.set("draft")
+    assert app._wish().quality == "draft"
+    client.set("at most (mm)", -1.0)
+    client.set("quality", WITHIN_MM)
+    assert client.until(lambda: "expected a positive bound" in client.text())
+
+
+def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
+    assert quality_names(kick)[-2:] == (WITHIN_MS, WITHIN_MM)
+    app, client = serve(Column("pod-rbf", load("kick/pod-rbf"), kick.rest))
+    assert app._quality is None
+    assert "quality" not in client.controls
+
+
+def test_settings_without_sense_are_refused(kick: Predictor) -> None:
+    for wished in ("{", '{"method": "rk5", "step": 1}', '{"step": 0.1}', '{"method": "rk4", "step": "x"}'):
+        with pytest.raises(ValueError, match=r"quality|solver"):
+            quality_of(kick, wished)
+    assert quality_of(kick, "unknown") == "balanced"
