@@ -136,9 +136,13 @@ class Schema:
         """Names of the parameters beyond their trained range."""
         return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
 
-    def vector(self, parameters: Parameters) -> Floats:
-        """(P,) the learned parameters as models see them: trained ranges are [-1, 1], and nothing is beyond 1.25."""
-        return faded(np.array([p.normalise(parameters[p.name]) for p in self.learned]), 1.0, BEYOND)
+    def vector(self, parameters: Parameters) -> NDArray[np.float64]:
+        """(P,) the learned parameters, each with its trained range mapped to [-1, 1]."""
+        return np.array([p.normalise(parameters[p.name]) for p in self.learned])
+
+    def seen(self, parameters: Parameters) -> Floats:
+        """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.25."""
+        return faded(self.vector(parameters), 1.0, BEYOND)
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

@@ -63,8 +63,8 @@ def test_what_is_beyond_fades() -> None:
 def test_models_see_little_beyond_the_trained_box() -> None:
     inside = {p.name: p.denormalise(0.7) for p in SCHEMA.parameters}
     exact = [p.normalise(inside[p.name]) for p in SCHEMA.learned]
-    assert np.array_equal(SCHEMA.vector(SCHEMA.complete(inside)), exact)
-    enormous = SCHEMA.vector(SCHEMA.complete({**inside, "force": -1e308, "mass": 1e308}))
+    assert np.array_equal(SCHEMA.seen(SCHEMA.complete(inside)), exact)
+    enormous = SCHEMA.seen(SCHEMA.complete({**inside, "force": -1e308, "mass": 1e308}))
     assert enormous.tolist() == [1.25, exact[1], -1.25, exact[3]]
 
 

@@ -58,7 +58,7 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
     placed, schema = model.place(model.rest, 0.0), model.schema
     off, ratio = dict.fromkeys(METHODS, 0.0), 0.0
     for parameters in inside(schema, DRAWS, seed):
-        field, start, _ = model.problem(schema.vector(parameters), placed, np.float64)
+        field, start, _ = model.problem(schema.seen(parameters), placed, np.float64)
         for name, method in METHODS.items():
             steps, errors = _errors(field, start, name, schema.window.stop)
             off[name] = max(off[name], abs(observed_order(steps, errors) - method.order))
@@ -78,7 +78,7 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
     window, step = schema.window, Quality("rk4", step=1.0 / schema.window.rate)
     exponent, within, ever, by = -math.inf, 0.0, 0.0, 1e-6
     for parameters in inside(schema, DRAWS, seed):
-        field, start, _ = model.problem(schema.vector(parameters), placed, np.float64)
+        field, start, _ = model.problem(schema.seen(parameters), placed, np.float64)
 
         def end(at: Floats, field: Field = field) -> Floats:
             return integrate(field, at, step, window.stop).at(window.stop)
@@ -100,7 +100,7 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
 def _divergence(model: ODeform, placed: PlacedBasis, seed: int) -> float:
     """Windows, at most 10, after which any motion of the trained box is deformed twice as much as any within it."""
     schema, step = model.schema, Quality("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
-    thetas = [schema.vector(parameters) for parameters in inside(schema, 4 * DRAWS, seed)]
+    thetas = [schema.seen(parameters) for parameters in inside(schema, 4 * DRAWS, seed)]
     times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
     motions = [model.integrate(theta, placed, step, float(times[-1])).reduced(times) for theta in thetas]
     deformed = np.max([np.linalg.norm(y[:, POSE:], axis=1) for y in motions], axis=0)
@@ -120,7 +120,7 @@ def check_calibration(model: ODeform, seed: int = 0) -> Checks:
     said, true = [], []
     for index in range(CALIBRATION[0]):
         reach = (1.0, 1.5, 3.0, 10.0)[index % 4]
-        theta = schema.vector(inside(schema, 1, seed + index, reach)[0])
+        theta = schema.seen(inside(schema, 1, seed + index, reach)[0])
         truth = model.integrate(theta, placed, TRUTH, stop).reduced(times)
         for _ in range(CALIBRATION[1]):
             motion = model.integrate(theta, placed, random_quality(rng, stop), stop)

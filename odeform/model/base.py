@@ -89,7 +89,7 @@ class ReducedModel(ABC):
 
         The geometry lies in the scene as at rest. Integrates to `until` seconds (default: the trained window); the
         motion can be asked beyond and then integrates on. Beyond what was trained motions fade: models see parameters
-        and times that `Schema.vector` and `Window.seen` bound.
+        and times that `Schema.seen` and `Window.seen` bound.
         """
         if observed is not None:
             raise InputError(f"{self.model}: predicts from parameters alone and takes no observed frames")
@@ -98,5 +98,5 @@ class ReducedModel(ABC):
         placed = self.place(shape, self.schema.azimuth(complete))
         window = self.schema.window
         span = float(window.seen(np.array(window.stop if until is None else until)))
-        trajectory = self._trajectory(self.schema.vector(complete), placed, self._quality(quality), span)
+        trajectory = self._trajectory(self.schema.seen(complete), placed, self._quality(quality), span)
         return Motion(self.schema, complete, shape, self.space, placed, trajectory)

@@ -10,6 +10,7 @@ NOMINAL = 0.9
 WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
 """Candidates for the distance in normalised parameters over which errors are alike."""
 TINY = 1e-6  # mm
+FARTHEST = 10.0  # widths outside, from where on the band is as wide as it gets
 ABOUT = 0.05  # of the frames on either side have their say in the quantiles of a frame
 
 
@@ -47,7 +48,8 @@ class ExpectedError:
     def at(self, theta: Floats, times: Times) -> Floats:
         """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and what `NOMINAL` keep to."""
         inside = np.clip(theta, -1.0, 1.0)
-        level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * np.linalg.norm(theta - inside) / self._width
+        outside = min(float(np.linalg.norm(theta - inside)) / self._width, FARTHEST)
+        level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * outside
         stop = self._times[-1]
         profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
         grown = np.maximum(times / stop, 1.0)[:, None]
