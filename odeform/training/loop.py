@@ -29,12 +29,13 @@ from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
 from odeform.model.reduced import POSE
 from odeform.training.losses import Metric, balanced
-from odeform.training.readout import CLOCK_GAINS, NormalEquations, random_layer
+from odeform.training.readout import NormalEquations, random_layer
 from odeform.training.tree import fill, strip
 from odeform.types import Arrays
 
 __all__ = ["TrainConfig", "build_network", "network_weights", "train_network"]
 
+CLOCK_GAINS = (3.0, 30.0)  # how sharply features of the clock bend at first: contacts are short, and descent is slow
 CHUNK = 64  # sequences rolled out at once where no gradients are wanted
 FREE = ("minutes", "steps", "report", "random_features", "sharpnesses", "components", "last_ridges", "refine")
 """Settings that may change when a training is resumed: of its length, and of what is solved for at its end."""
@@ -57,10 +58,11 @@ class TrainConfig:
     """Share of the motion that is rolled out at first, and share of the time in which it grows to the whole."""
     ridge: float = 1e-6
     """Of the readout's least squares, relative to the mean square of a feature."""
-    random_features: int = 3000
+    random_features: int = 1500
     """Of each decoder, added at the end."""
-    sharpnesses: tuple[float, ...] = (1.0, 2.0)
-    """Of random features: among these and `last_ridges`, validation chooses for each decoder."""
+    sharpnesses: tuple[float, ...] = (0.5, 1.0, 2.0)
+    """Of random features: among these and `last_ridges`, validation chooses for each decoder, fitted to every other
+    frame, so that what is between frames counts."""
     last_ridges: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
     """Of the last solve."""
     longest: float = 0.01
@@ -97,7 +99,6 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
         first = decoder.hidden[0]
         assert isinstance(first, nn.Linear)
         (low, high), count = CLOCK_GAINS, first.out_features
-        # contacts are short: smooth features of the clock do not learn to be sharp
         sharp = low * (high / low) ** torch.rand(count) * torch.randn(count)
         first.weight.data[:, -1 - config.parameters] = sharp
         first.bias.data -= sharp * (2.0 * torch.rand(count) - 1.0)
@@ -200,15 +201,16 @@ class _Trainer:
             yield rows, theta, self.states(theta, counts)
 
     @torch.no_grad()
-    def equations(self) -> list[NormalEquations]:
-        """Of the readout of each decoder, from all training sequences."""
+    def equations(self, every: int = 1) -> list[NormalEquations]:
+        """Of the readout of each decoder, from every k-th frame of all training sequences."""
         all_of = [NormalEquations() for _ in self.net.decoders]
         for rows, theta, states in self._chunks("train"):
             told = self.net.told(self.times, theta)
             for equations, decoder, place, out in zip(
                 all_of, self.net.decoders, self.net.places, self.outputs, strict=True
             ):
-                equations.add(decoder.features(states[..., place], told), self.truth["train"][:, rows][..., out])
+                features = decoder.features(states[..., place], told)
+                equations.add(features[::every], self.truth["train"][::every, rows][..., out])
         return all_of
 
     def solve_readout(self, ridge: float) -> None:
@@ -229,19 +231,21 @@ class _Trainer:
         self.times = self.times.double()
         net.widen(self.config.random_features)
         best = [float("inf") for _ in net.decoders]
-        kept = [decoder.state_dict() for decoder in net.decoders]
+        kept, ridges = [decoder.state_dict() for decoder in net.decoders], [0.0 for _ in net.decoders]
         for sharpness in self.config.sharpnesses:
             self._draw_features(sharpness)
-            all_of = self.equations()
+            all_of = self.equations(every=2)
             for ridge in self.config.last_ridges:
                 for equations, decoder in zip(all_of, net.decoders, strict=True):
                     decoder.readout.weight.data = equations.solve(ridge)
                 errors = self.errors_mm("val")[-len(best) :]
                 for index, (decoder, error) in enumerate(zip(net.decoders, errors, strict=True)):
                     if error < best[index]:
-                        best[index], kept[index] = error, deepcopy(decoder.state_dict())
+                        best[index], ridges[index], kept[index] = error, ridge, deepcopy(decoder.state_dict())
         for decoder, state in zip(net.decoders, kept, strict=True):
             decoder.load_state_dict(state)
+        for equations, decoder, ridge in zip(self.equations(), net.decoders, ridges, strict=True):
+            decoder.readout.weight.data = equations.solve(ridge)
 
     def _draw_features(self, sharpness: float) -> None:
         net = self.net

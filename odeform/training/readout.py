@@ -5,10 +5,10 @@ A readout is linear, so its best value for any features is a least-squares solve
 
 import torch
 
-__all__ = ["CLOCK_GAINS", "NormalEquations", "random_layer"]
+__all__ = ["NormalEquations", "random_layer"]
 
 STATE_GAINS = (0.1, 1.0)
-CLOCK_GAINS = (3.0, 30.0)
+CLOCK_GAINS = (0.5, 5.0)
 PARAMETER_GAINS = (0.3, 3.0)
 """How sharply features bend at sharpness 1: per standard deviation of the principal components together, per unit of
 the clock, and of parameters. Each draws its own between these, alike on a logarithmic scale: contacts are short, and
