@@ -40,7 +40,7 @@ def test_opens_playing_and_a_hand_on_time_stops_it(app: App, port: int) -> None:
         assert app.clock.time() == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(("label", "value"), [("mass (kg)", 0.9), ("bending (N m)", 2.5), ("force (N)", 80.0)])
+@pytest.mark.parametrize(("label", "value"), [("mass (kg)", 0.9), ("bending (N m)", 1.5), ("force (N)", 110.0)])
 def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: str, value: float) -> None:
     with LoopbackClient(port) as client:
         client.set("time (s)", 0.05)

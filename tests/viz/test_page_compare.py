@@ -28,7 +28,7 @@ def test_columns_are_compared_with_the_truth(compared: Tab) -> None:
     compared.button("peak").click()
     compared.turn_to("Compare")
     assert compared.says("from the truth")
-    assert compared.says("error to truth RMS, mm")
+    assert compared.says("error RMS, mm")
     before = compared.settled()
     compared.box("error colours").click()
     assert compared.changes(before)

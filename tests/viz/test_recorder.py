@@ -49,7 +49,7 @@ def test_positions_parameters_and_provenance_read_back(kick: Predictor, path: Pa
         np.testing.assert_array_equal(np.asarray(logged, dtype=np.float32), expected)
     faces = next(v for k, v in rows.items() if "triangle_indices" in k)
     assert len(faces) == 1  # static: once
-    assert rows["/parameters/mass:Scalars:scalars"] == [[0.4]] * 3
+    assert rows["/parameters/mass:Scalars:scalars"] == [[0.6]] * 3
     provenance = next(v for k, v in rows.items() if "provenance" in k and k.endswith(":text"))
     assert kick.checkpoint.sha256 in str(provenance)
 

@@ -165,11 +165,11 @@ def test_status_names_solver_error_as_such(session: Session, wish: Wish) -> None
     text = describe(shown, wish.time)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
+    assert f"{shown.stats.evaluations} evaluations" in text
     assert "model error here ≈" in text
     assert "a guess" not in text
     later = replace(wish, time=1.2 * session.schema.window.stop)
     assert "⚠ a guess" in describe(session.frame(later).columns[0], later.time)
-    assert f"{shown.stats.evaluations} evaluations" in text
 
 
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:

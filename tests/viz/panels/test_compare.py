@@ -33,10 +33,10 @@ def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
 
 def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Predictor) -> None:
     app, client = kicked
-    client.set("mass (kg)", 0.4)
+    client.set("mass (kg)", 0.6)
     client.click("Pin these parameters")
     assert client.until(lambda: len(app.columns.all) == 2)
-    assert _labels(app)[1].startswith("odeform at mass 0.4, bending")
+    assert _labels(app)[1].startswith("odeform at mass 0.6, bending")
     client.collect(0.5)
     client.set("mass (kg)", 0.9)
     moved = client.wait_vertices("/world/column_0/body/part_0")
