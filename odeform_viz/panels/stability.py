@@ -20,10 +20,11 @@ class StabilityPanel:
 
     def __init__(self, server: viser.ViserServer, origin: str) -> None:
         """`origin` names the checkpoint."""
-        self._server, self._lock = server, threading.Lock()
+        self._lock = threading.Lock()
         self._text = server.gui.add_markdown(EXPLAINED)
         self._button = server.gui.add_button("Map stability")
         self._button.on_click(lambda _: self._start())
+        self._picture = server.gui.add_image(np.full((1, 1, 3), 255, dtype=np.uint8), format="png", visible=False)
         self._job = Job(map_here, (origin,), self._done, self._failed)
 
     def _start(self) -> None:
@@ -35,7 +36,8 @@ class StabilityPanel:
 
     def _done(self, picture: np.ndarray) -> None:
         self._button.visible = self._text.visible = False
-        self._server.gui.add_image(picture, format="png")
+        self._picture.image = picture
+        self._picture.visible = True
 
     def _failed(self, message: str) -> None:
         self._button.disabled, self._text.content = False, f"⚠ **No map**: {message}"
