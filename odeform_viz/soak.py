@@ -31,7 +31,14 @@ WEIGHTS = {
     "Upload": 0.3,
 }
 # what takes a while or fills a disk comes seldom, and its end often
-RARE = {"Simulate this": 0.02, "Start recording": 0.1, "Cancel": 3.0, "Stop recording": 3.0, "Download": 0.2}
+RARE = {
+    "Simulate this": 0.02,
+    "Map stability": 0.0,  # both cores are busy for ten seconds, in which nothing else can be measured
+    "Start recording": 0.1,
+    "Cancel": 3.0,
+    "Stop recording": 3.0,
+    "Download": 0.2,
+}
 
 
 @dataclass(frozen=True)
@@ -92,6 +99,8 @@ def _value(control: Control, rng: np.random.Generator, folder: Path) -> Any:
     unfit = rng.random() < 0.1
     if control.kind == "Slider":
         return float(rng.choice(UNFIT) if unfit else rng.uniform(control.props["min"], control.props["max"]))
+    if control.kind == "Number":
+        return float(rng.choice(UNFIT) if unfit else 10.0 ** rng.uniform(-3.0, 2.0))
     if control.kind in ("Dropdown", "ButtonGroup"):
         return NONSENSE if unfit else str(rng.choice(control.props["options"]))
     if control.kind == "Text":
