@@ -69,7 +69,7 @@ def _simulate(args: argparse.Namespace) -> None:
     rate = 1.0 if args.rate is None else args.rate
     if count < 1 or args.workers < 1 or args.seed < 0 or not 0.0 < rate < float("inf"):
         raise InputError("simulate: expected --count and --workers of at least 1, --seed from 0 on, a positive --rate")
-    dataset = simulate_dataset(args.scene, args.out, count, args.seed, args.workers, args.rate)
+    dataset = simulate_dataset(args.scene, args.out, count, args.seed, args.workers, args.rate, corners=args.corners)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
 
@@ -215,6 +215,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--seed", type=int, default=0, metavar="S")
     sub.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W")
     sub.add_argument("--rate", type=float, metavar="HZ", help="frames a second (default: the scene's)")
+    sub.add_argument("--corners", action="store_true", help="also the corners of the trained box, for training")
 
     sub = command("pack", _pack, "write a small compressed copy of a data set")
     sub.add_argument("dataset", metavar="DATASET")

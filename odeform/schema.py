@@ -1,5 +1,6 @@
 """What a scene varies and shows: parameters, time window, and the parts of its motion."""
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -143,6 +144,14 @@ class Schema:
     def seen(self, parameters: Parameters) -> Floats:
         """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.25."""
         return faded(self.vector(parameters), 1.0, BEYOND)
+
+    def corners(self, reach: float = 1.0) -> list[dict[str, float]]:
+        """Those of the trained box, `reach` times as large about its middle; symmetries stay at their default."""
+        ends = [
+            (p.default,) if p.role == "azimuth" else (p.denormalise(-reach), p.denormalise(reach))
+            for p in self.parameters
+        ]
+        return [{p.name: v for p, v in zip(self.parameters, row, strict=True)} for row in itertools.product(*ends)]
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

@@ -15,12 +15,24 @@ from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Times, Vector
+from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Points, Times, Vector
 from odeform_viz.columns import Column
 
-__all__ = ["REACH", "ColumnFrame", "Curves", "Error", "Frame", "Looks", "Session", "Wish", "same_motions"]
+__all__ = [
+    "INVISIBLE",
+    "REACH",
+    "ColumnFrame",
+    "Curves",
+    "Error",
+    "Frame",
+    "Looks",
+    "Session",
+    "Wish",
+    "deformed",
+    "same_motions",
+]
 
-INVISIBLE = 5e-5  # m; a deformation below this cannot be seen on a ball of 0.1 m at any sensible zoom
+INVISIBLE = 1e-4  # m; a third of a pixel of a ball of 0.1 m that is 720 pixels high
 SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
 REACH = 1.5  # trained windows that one can look at
 
@@ -189,7 +201,7 @@ class Session:
     def _column(self, column: Column, wish: Wish) -> ColumnFrame:
         motion, time = self.motion(column, wish), wish.time
         pose = motion.pose(time)
-        points = None if motion.deformation_bound(time) < INVISIBLE else motion.deformed(time)
+        points = deformed(motion, time)
         body = motion.geometry.points if points is None else points
         heights = body @ pose[2, :3].astype(np.float32) + np.float32(pose[2, 3])
         lowest = float(heights.min())
@@ -260,3 +272,13 @@ class Session:
         times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
         with self._lock:
             return float(times[np.argmax(self.motion(column, wish).deformation_rms(times))])
+
+
+def deformed(motion: Motion | RecordedMotion, time: float) -> Points | None:
+    """(N, 3) metres, the deformation alone; None where it cannot be seen, and a pose says all."""
+    if motion.deformation_bound(time) < INVISIBLE:
+        return None
+    points = motion.deformed(time)
+    # the bound takes every mode to be at its largest at the same point
+    farthest = ((points - motion.geometry.points) ** 2).sum(axis=1).max()
+    return None if farthest < INVISIBLE**2 else points

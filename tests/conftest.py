@@ -12,7 +12,7 @@ from odeform.predictor import Predictor, load
 from odeform.simulation import kick as kick_scene
 from odeform.simulation.runner import simulate_dataset
 from odeform.simulation.scene import get_scene
-from odeform.training import loop
+from odeform.training import config
 from odeform.training.train import TrainRequest, train
 
 
@@ -41,9 +41,9 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
 def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A checkpoint of every model, each trained on the small data set; with fewer random features, for time."""
     root, rest, paths = tmp_path_factory.mktemp("models"), get_scene("kick").rest_mesh(), {}
-    few = functools.partial(loop.TrainConfig, random_features=200, sharpnesses=(1.0,))
+    few = functools.partial(config.TrainConfig, random_features=200, sharpnesses=(1.0,))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop, "TrainConfig", few)
+        patch.setattr(config, "TrainConfig", few)
         for model in ("odeform", "pod-rbf", "nearest"):
             paths[model] = root / f"{model}.safetensors"
             train(dataset, rest, paths[model], TrainRequest(model, seed=1, steps=60), lambda _: None)

@@ -83,3 +83,13 @@ def test_clocks_stop_after_the_trained_window() -> None:
 def test_impossible_parameters(given: dict) -> None:
     with pytest.raises(InputError, match=next(iter(given))):
         SCHEMA.complete(given)
+
+
+@pytest.mark.parametrize("reach", [1.0, 3.0])
+def test_corners_are_those_of_the_trained_box(reach: float) -> None:
+    schema = get_scene("kick").schema
+    corners = schema.corners(reach)
+    vectors = np.stack([schema.vector(parameters) for parameters in corners])
+    assert np.allclose(np.abs(vectors), reach)
+    assert len(np.unique(np.round(vectors), axis=0)) == len(corners) == 2 ** len(schema.learned)
+    assert {parameters["azimuth"] for parameters in corners} == {0.0}

@@ -49,7 +49,8 @@ def draws(schema: Schema, integrates: bool, count: int, seed: int) -> list[Draw]
 
     out = dict.fromkeys(Draw("body", middle, quality) for quality in ways(_limits(window)))
     out |= dict.fromkeys(Draw(shape, middle, None) for shape in SHAPES)
-    out |= dict.fromkeys(Draw("body", v, quality) for v in _corners(schema) for quality in ways(_extremes(window)))
+    cornered = [tuple(corner.values()) for reach in SPREADS for corner in schema.corners(reach)]
+    out |= dict.fromkeys(Draw("body", v, quality) for v in cornered for quality in ways(_extremes(window)))
     few = ways([random_quality(rng, window) for _ in range(4)])
     out |= dict.fromkeys(Draw("body", v, quality) for v in _enormous(schema, middle) for quality in few)
     while len(out) < count:
@@ -58,13 +59,6 @@ def draws(schema: Schema, integrates: bool, count: int, seed: int) -> list[Draw]
         out[Draw("body", values, ways([random_quality(rng, window)])[0])] = None
     every = max(len(out) / count, 1.0)
     return [draw for index, draw in enumerate(out) if index % every < 1.0]
-
-
-def _corners(schema: Schema) -> Iterator[tuple[float, ...]]:
-    for reach in SPREADS:
-        ends = [(0.0,) if p.role == "azimuth" else (-reach, reach) for p in schema.parameters]
-        for units in itertools.product(*ends):
-            yield tuple(p.denormalise(unit) for p, unit in zip(schema.parameters, units, strict=True))
 
 
 def _enormous(schema: Schema, middle: tuple[float, ...]) -> Iterator[tuple[float, ...]]:

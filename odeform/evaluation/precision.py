@@ -13,7 +13,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
-from odeform.evaluation.probes import corners, nearest_sequences
+from odeform.evaluation.probes import nearest_sequences
 from odeform.evaluation.timing import milliseconds
 from odeform.model.odeform import ODeform
 from odeform.model.reduced import motion_rmse
@@ -64,7 +64,7 @@ def find_places(model: ODeform, dataset: Dataset | None) -> list[Place]:
         return Place(name, parameters, exact, unsure, error, names)
 
     probe = Quality("dopri5", tolerance=1e-5)
-    hardest = max(corners(model), key=lambda parameters: _reduced(model, parameters, probe)[1])
+    hardest = max(model.schema.corners(), key=lambda parameters: _reduced(model, parameters, probe)[1])
     return [place("default", model.schema.complete(None)), place("corner", hardest)]
 
 

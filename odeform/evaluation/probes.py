@@ -1,6 +1,5 @@
 """What measurements are made on: round shapes of any size, places in the box of parameters, sequences near them."""
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +11,7 @@ from odeform.predictor import Predictor
 from odeform.schema import Parameters
 from odeform.types import GaussianSplats, Mesh, PointCloud, Points
 
-__all__ = ["ball", "corners", "nearest_sequences", "random_parameters", "round_cloud", "round_splats"]
+__all__ = ["ball", "nearest_sequences", "random_parameters", "round_cloud", "round_splats"]
 
 
 def _round(points: int, predictor: Predictor) -> tuple[Points, Points]:
@@ -50,13 +49,6 @@ def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[P
     fixed = {p.name: p.default for p in predictor.schema.parameters if p.role == "azimuth"}
     learned = predictor.schema.learned
     return [{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in learned} | fixed for _ in range(count)]
-
-
-def corners(predictor: Predictor) -> list[dict[str, float]]:
-    """Every corner of the trained box."""
-    learned = predictor.schema.learned
-    ends = itertools.product(*((p.low, p.high) for p in learned))
-    return [predictor.schema.complete({p.name: v for p, v in zip(learned, end, strict=True)}) for end in ends]
 
 
 def nearest_sequences(dataset: Dataset, parameters: Any, count: int) -> Dataset:

@@ -83,15 +83,16 @@ class Decoder(nn.Module):
 
     def features(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
         """(T, B, latent), (T, B, 1 + P) -> (T, B, F), relative to the first of the T."""
-        features = self.trained(states, told)
+        seen = self.seen(states, told)
+        features = seen[..., : -told.shape[-1]]
         if self.random is not None:
-            seen = self.random(torch.cat([features, told], dim=-1))
-            features = torch.cat([features, nn.functional.silu(seen)], dim=-1)
+            features = torch.cat([features, nn.functional.silu(self.random(seen))], dim=-1)
         return features - features[:1]
 
-    def trained(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
-        """(T, B, latent), (T, B, 1 + P) -> (T, B, latent + width): the state and what descent has made of it."""
-        return torch.cat([states, self.hidden(torch.cat([states, told], dim=-1))], dim=-1)
+    def seen(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
+        """What random features are made of, (T, B, latent + width + 1 + P): the state, what descent has made of it, and
+        what the decoder is told."""
+        return torch.cat([states, self.hidden(torch.cat([states, told], dim=-1)), told], dim=-1)
 
 
 class ODeformNet(nn.Module):

@@ -49,10 +49,12 @@ def simulate_dataset(
     workers: int = 1,
     rate: float | None = None,
     step: float | None = None,
+    corners: bool = False,
 ) -> Dataset:
     """Simulate `count` sequences of a scene into the folder `out`; continues where an earlier run stopped.
 
-    `rate` in Hz and `step` in seconds default to the scene's own.
+    `rate` in Hz and `step` in seconds default to the scene's own. With `corners`, those of the trained box besides, for
+    training.
     """
     scene: Scene = get_scene(scene_name)
     root = Path(out)
@@ -60,12 +62,16 @@ def simulate_dataset(
     step = step or scene.step
     schema = replace(scene.schema, window=replace(scene.schema.window, rate=rate))
     provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
+    provenance |= {"corners": True} if corners else {}
     plan = [
         Entry(f"{scene_name}_{index:05d}", split, parameters)
         for index, (parameters, split) in enumerate(
             zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
         )
     ]
+    if corners:
+        # in more than two dimensions hardly any drawn point is near one, and sliders reach them
+        plan += [Entry(f"{scene_name}_corner_{i:02d}", "train", at) for i, at in enumerate(scene.schema.corners())]
     empty = Dataset(root, schema, (), folder_reader(root), scene.fixed, provenance)
     done = _finished(root, plan, empty)
     todo = [entry for entry in plan if entry.name not in done]

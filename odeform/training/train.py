@@ -45,7 +45,9 @@ class TrainRequest:
 def _fit_odeform(
     data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path
 ) -> tuple[Arrays, dict[str, Any]]:
-    from odeform.training.loop import TrainConfig, build_network, network_weights, train_network
+    from odeform.training.config import TrainConfig
+    from odeform.training.loop import network_weights, train_network
+    from odeform.training.start import build_network
 
     net = build_network(data, request.seed)
     config = TrainConfig(request.minutes, request.steps, seed=request.seed)
@@ -120,6 +122,7 @@ def _command(dataset: Dataset, request: TrainRequest) -> list[str]:
     made = dataset.provenance
     simulate = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
     simulate += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
+    simulate += " --corners" if made.get("corners") else ""
     options = f" --model {request.model} --seed {request.seed}"
     if request.model == "odeform":
         options += f" --minutes {request.minutes:g}" if request.steps is None else f" --steps {request.steps}"

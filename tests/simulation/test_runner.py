@@ -55,6 +55,17 @@ def test_test_sequences_have_four_times_the_frames(dataset: Dataset) -> None:
 
 
 @pytest.mark.usefixtures("coarse")
+def test_corners_are_for_training(tmp_path: Path) -> None:
+    """Besides what is drawn, which stays as it was."""
+    corners = get_scene("kick").schema.corners()
+    drawn = simulate_dataset("kick", tmp_path / "drawn", count=1, rate=30.0, step=4e-3)
+    with_corners = simulate_dataset("kick", tmp_path / "both", count=1, rate=30.0, step=4e-3, corners=True)
+    assert with_corners.entries[:1] == drawn.entries
+    assert [entry.parameters for entry in with_corners.entries[1:]] == corners
+    assert {entry.split for entry in with_corners.entries[1:]} == {"train"}
+
+
+@pytest.mark.usefixtures("coarse")
 def test_frames_of_a_rate_asked_for(tmp_path: Path) -> None:
     """The schema says it: what is learned and scored are frames of this rate."""
     made = simulate_dataset("kick", tmp_path, count=2, rate=30.0)

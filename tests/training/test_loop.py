@@ -13,8 +13,11 @@ from odeform.model.inference import make_decoder, make_encoder, make_field, pool
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
 from odeform.solver.integrate import Quality, integrate
-from odeform.training.loop import TrainConfig, _Trainer, build_network, network_weights, train_network
+from odeform.training.config import TrainConfig
+from odeform.training.loop import network_weights, train_network
+from odeform.training.start import build_network
 from odeform.training.train import TrainRequest, train
+from odeform.training.trainer import Trainer
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def test_outputs_are_whitened(data: TrainingData) -> None:
 
 def test_descent_lowers_what_the_readout_leaves(data: TrainingData) -> None:
     """Of the training sequences: these few say little about any other."""
-    trainer = _Trainer(build_network(data, 0), data, TrainConfig(), torch.device("cpu"))
+    trainer = Trainer(build_network(data, 0), data, TrainConfig(), torch.device("cpu"))
     errors = []
     for steps in (0, 40):
         for step in range(steps):
@@ -59,7 +62,7 @@ def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
     """No small change of the readout lowers the training error."""
     net = build_network(data, 0)
     train_network(net, data, TrainConfig(steps=0, random_features=0), silent)
-    trainer = _Trainer(net, data, TrainConfig(), torch.device("cpu"))
+    trainer = Trainer(net, data, TrainConfig(), torch.device("cpu"))
     best = np.square(trainer.errors_mm("train"))
     generator = torch.Generator().manual_seed(0)
     for index, decoder in enumerate(net.decoders):
@@ -77,7 +80,7 @@ def test_random_features_leave_less(data: TrainingData) -> None:
     left = []
     for count in (0, 40, 400):
         net = build_network(data, 0)
-        config = TrainConfig(steps=2, random_features=count, sharpnesses=(1.0,), last_ridges=(1e-10,))
+        config = TrainConfig(steps=2, random_features=count, sharpnesses=(1.0,), ridges=(1e-10,))
         train_network(net, data, config, silent)
         weights = network_weights(net)
         assert all(w.dtype == np.float32 for name, w in weights.items() if not name.endswith("readout.weight"))
@@ -101,7 +104,7 @@ def test_resumes_where_it_was_interrupted(data: TrainingData, tmp_path: Path) ->
 
     def steps(count: int, resume: bool) -> dict[str, np.ndarray]:
         net = build_network(data, 0)
-        trainer = _Trainer(net, data, TrainConfig(batch=8), torch.device("cpu"))
+        trainer = Trainer(net, data, TrainConfig(batch=8), torch.device("cpu"))
         if resume:
             trainer.restore(part)
         for _ in range(count):

@@ -13,7 +13,7 @@ from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
-from odeform_viz.session import Session, Wish
+from odeform_viz.session import INVISIBLE, Session, Wish, deformed
 
 
 @pytest.fixture
@@ -118,6 +118,18 @@ def test_at_rest_a_pose_says_it_all(session: Session, wish: Wish) -> None:
     shown = session.frame(replace(wish, time=0.0)).columns[0]
     assert shown.points is None
     np.testing.assert_allclose(shown.pose, np.eye(4), atol=1e-12)
+
+
+@pytest.mark.parametrize(("size", "seen"), [(0.9, False), (1.1, True)])
+def test_a_deformation_too_small_to_see_is_left_out(kick: Predictor, size: float, seen: bool) -> None:
+    """Also where its modes, each at its largest, would add up to more."""
+    motion = kick.solve(None, None)
+    largest = float(np.linalg.norm(motion.local(0.02), axis=1).max())
+    values = motion.placed.values * np.float32(size * INVISIBLE / largest)
+    reach = motion.placed.reach * (2.0 * INVISIBLE / motion.deformation_bound(0.02))
+    small = replace(motion, placed=replace(motion.placed, values=values, reach=reach))
+    assert small.deformation_bound(0.02) > INVISIBLE
+    assert (deformed(small, 0.02) is not None) == seen
 
 
 def test_splats_deform_with_the_body(kick: Predictor) -> None:

@@ -1,0 +1,54 @@
+"""The network before its first step."""
+
+import numpy as np
+import torch
+from torch import nn
+
+from odeform.model.config import ModelConfig
+from odeform.model.data import TrainingData
+from odeform.model.network import ODeformNet
+from odeform.model.reduced import POSE
+
+__all__ = ["build_network", "training_shape"]
+
+CLOCK_GAINS = (3.0, 30.0)  # how sharply features of the clock bend at first: contacts are short, and descent is slow
+
+
+def build_network(data: TrainingData, seed: int) -> ODeformNet:
+    """A fresh network, whitened by the training data alone."""
+    torch.manual_seed(seed)
+    train = data.reduced["train"]
+    rigid = "rigid" in data.schema.parts
+    config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE, rigid=rigid)
+    net = ODeformNet(config)
+    spread = np.sqrt((train**2).mean(axis=(0, 1)))
+    gains = np.concatenate(
+        [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
+    )
+    # what does not move, as the turn of a ball that falls straight, is not blown up to size one
+    floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.arm, 1.0], [3, 3, len(gains) - POSE])
+    floor[POSE:] = 1e-9
+    net.gains.copy_(torch.as_tensor(np.maximum(gains, floor)))
+    # fields of order one should cross the latent space in a few frames, not in a second
+    net.time_scale.fill_(0.05)
+    for decoder in net.decoders:
+        for layer in decoder.hidden:
+            if isinstance(layer, nn.Linear):
+                # features have to differ before a readout can make use of them
+                layer.weight.data *= 2.0
+                nn.init.uniform_(layer.bias, -1.0, 1.0)
+        first = decoder.hidden[0]
+        assert isinstance(first, nn.Linear)
+        (low, high), count = CLOCK_GAINS, first.out_features
+        sharp = low * (high / low) ** torch.rand(count) * torch.randn(count)
+        first.weight.data[:, -1 - config.parameters] = sharp
+        first.bias.data -= sharp * (2.0 * torch.rand(count) - 1.0)
+    shape = training_shape(data)
+    for encoder in net.encoders:
+        encoder.standardise([shape])
+    return net
+
+
+def training_shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
+    """Points (N, 3) in units of the body's size, and their weights (N,)."""
+    return torch.as_tensor(data.rest / data.space.arm).float(), torch.as_tensor(data.weights).float()

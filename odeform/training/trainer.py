@@ -1,0 +1,182 @@
+"""Descent: one step at a time, with what it needs kept on one device, and a state that can be saved and restored."""
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import nn
+
+from odeform.errors import InputError
+from odeform.files import safetensors_metadata, write_aside
+from odeform.model.data import TrainingData
+from odeform.model.network import ODeformNet
+from odeform.model.reduced import POSE
+from odeform.training.config import FREE, TrainConfig
+from odeform.training.losses import Metric, balanced
+from odeform.training.readout import NormalEquations
+from odeform.training.start import training_shape
+from odeform.training.tree import fill, strip
+
+__all__ = ["CHUNK", "Trainer"]
+
+CHUNK = 64  # sequences rolled out at once where no gradients are wanted
+
+
+def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
+    """Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al. 2024): roll-outs bend the loss differently in
+    every direction, and it takes hundreds of steps to where Adam takes thousands."""
+    try:
+        from pytorch_optimizer import SOAP
+    except ImportError as error:
+        raise InputError(f"training needs {error.name}: pip install 'odeform[train]'") from None
+    return SOAP(weights, lr=rate, weight_decay=1e-4)
+
+
+class Trainer:
+    def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device) -> None:
+        self.net, self.config, self.device = net.to(device), config, device
+        self.metric = Metric(net.gains, data.space.arm)
+        gains = net.gains.cpu().double().numpy()
+        # frames first, as roll-outs have them
+        self.truth = {
+            k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
+            for k, v in data.reduced.items()
+        }
+        self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
+        self.times = torch.as_tensor(data.times).float().to(device)
+        frame = float(data.times[1] - data.times[0])
+        self.frame, self.substeps = frame, max(1, math.ceil(frame / config.longest - 1e-9))
+        self.identity = data.identity
+        points, shares = training_shape(data)
+        self.shape = points.to(device), shares.to(device)
+        self.frames = len(self.truth["train"]) - 1
+        self.generator = torch.Generator().manual_seed(config.seed)
+        for decoder in net.decoders:
+            decoder.readout.requires_grad_(False)  # solved for
+        self.weights = [w for w in net.parameters() if w.requires_grad]
+        self.optimiser = _soap(self.weights, config.rate)
+        self.outputs = [slice(0, POSE), slice(POSE, None)] if net.config.rigid else [slice(POSE, None)]
+        self.done = 0
+        self.elapsed = 0.0
+
+    def states(self, theta: torch.Tensor, counts: list[int]) -> torch.Tensor:
+        """At the start and after each frame, which is integrated in `counts` steps."""
+        start = self.net.encode(self.shape, theta)
+        steps = [self.frame / count for count in counts for _ in range(count)]
+        return self.net.roll_out(start, theta, steps)[np.cumsum([0, *counts])]
+
+    def draw_counts(self, frames: int) -> list[int]:
+        """Some frames in one step more than others: a field that leans on the error of its steps gains nothing by it.
+
+        Descent finds such fields otherwise, which fit the data at one step and miss it by ten times as much at another.
+        """
+        more = torch.randint(0, 2, (frames,), generator=self.generator)
+        return (self.substeps + more).tolist()
+
+    def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
+        """Of a batch, after its readout has been solved for."""
+        theta, truth = self.theta["train"][rows], self.truth["train"][: frames + 1, rows]
+        states = self.states(theta, self.draw_counts(frames))
+        told = self.net.told(self.times[: frames + 1], theta)
+        predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
+        for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
+            features = decoder.features(states[..., place], told)
+            readout = NormalEquations()
+            # every other frame tells as much, and a solve costs as much as the roll-out
+            readout.add(features.detach()[::2], truth[::2][..., out])
+            decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
+            predicted.append(decoder.readout(features))
+        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:])[-len(self.outputs) :])
+
+    def advance(self, share: float) -> None:
+        """One step of descent."""
+        config = self.config
+        start, grown = config.horizon
+        frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
+        warm = min(1.0, (self.done + 1) / 20.0)
+        self.optimiser.param_groups[0]["lr"] = warm * config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
+        rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: config.batch]
+        self.optimiser.zero_grad()
+        self.loss(rows.to(self.device), max(frames, 2)).backward()
+        norm = nn.utils.clip_grad_norm_(self.weights, 1.0)
+        if torch.isfinite(norm):
+            self.optimiser.step()
+        self.done += 1
+
+    @torch.no_grad()
+    def paths(self, split: str) -> torch.Tensor:
+        """States (2 T + 1, B, state) of all sequences, at their frames and halfway between, with no error of steps."""
+        count = self.config.refine * self.substeps
+        steps = [self.frame / 2.0 / count] * (2 * self.frames * count)
+        chunks = self.theta[split].split(CHUNK)
+        states = [self.net.roll_out(self.net.encode(self.shape, theta), theta, steps)[::count] for theta in chunks]
+        return torch.cat(states, dim=1)
+
+    @torch.no_grad()
+    def solve_readout(self, ridge: float) -> None:
+        """The readout of all training sequences."""
+        states, told = self.paths("train")[::2], self.net.told(self.times, self.theta["train"])
+        for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
+            equations = NormalEquations()
+            for rows in torch.arange(states.shape[1]).split(CHUNK):
+                features = decoder.features(states[:, rows][..., place], told[:, rows])
+                equations.add(features, self.truth["train"][:, rows][..., out])
+            decoder.readout.weight.data = equations.solve(ridge).to(decoder.readout.weight.dtype)
+
+    @torch.no_grad()
+    def errors_mm(self, split: str) -> tuple[float, float]:
+        """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
+        predicted = self.net.decode(self.paths(split)[::2], self.times, self.theta[split])
+        rigid, local = (torch.stack(self.metric(predicted[1:], self.truth[split][1:])) / 3.0).sqrt().tolist()
+        return rigid, local
+
+    def double(self) -> None:
+        """Go on in double precision."""
+        self.net.double()
+        self.metric.double()
+        self.truth, self.theta = ({k: v.double() for k, v in x.items()} for x in (self.truth, self.theta))
+        self.shape = self.shape[0].double(), self.shape[1].double()
+        self.times = self.times.double()
+
+    def _fingerprint(self) -> dict[str, Any]:
+        """What has to be the same for a training to go on."""
+        config = {k: v for k, v in asdict(self.config).items() if k not in FREE}
+        network = {k: v for k, v in asdict(self.net.config).items() if k not in FREE}
+        return {"data": self.identity, "network": network, "config": config}
+
+    def save(self, path: Path) -> None:
+        tensors = {f"net.{name}": value for name, value in self.net.state_dict().items()}
+        optimiser = strip(self.optimiser.state_dict(), tensors, "optimiser")
+        tensors["generator"] = self.generator.get_state()
+        meta = {**self._fingerprint(), "done": self.done, "elapsed": self.elapsed, "optimiser": optimiser}
+        tensors = {name: value.contiguous() for name, value in tensors.items()}
+        write_aside(path, save(tensors, {"training": json.dumps(meta)}))
+
+    def restore(self, path: Path) -> None:
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"--resume: {path}: {error.strerror}; expected what an interrupted run left") from None
+        try:
+            tensors = load(data)
+            meta: dict[str, Any] = json.loads(safetensors_metadata(data)["training"])
+            for part, wanted in json.loads(json.dumps(self._fingerprint())).items():
+                if meta[part] != wanted:
+                    raise InputError(f"--resume: {path}: another training, of {part} {meta[part]}; expected {wanted}")
+            weights = {k.removeprefix("net."): v for k, v in tensors.items() if k.startswith("net.")}
+            self.net.load_state_dict(weights)
+            optimiser = fill(meta["optimiser"], tensors)
+            optimiser["state"] = {int(index): state for index, state in optimiser["state"].items()}
+            self.optimiser.load_state_dict(optimiser)
+            self.generator.set_state(tensors["generator"])
+            self.done, self.elapsed = int(meta["done"]), float(meta["elapsed"])
+        except InputError:
+            raise
+        except (SafetensorError, KeyError, ValueError, TypeError, RuntimeError) as error:
+            raise InputError(f"--resume: {path}: not the state of this training: {error}") from None
