@@ -14,6 +14,7 @@ from odeform.model.odeform import ODeform
 from odeform.model.reduced import decompose, rotation_of, to_canonical
 from odeform.schema import Window
 from odeform.simulation.ball import SEGMENTS
+from odeform.simulation.scene import Scene, get_scene
 from odeform.types import Floats, Frames, Sequence
 
 __all__ = ["carried_over", "simulator"]
@@ -48,6 +49,26 @@ def _model_ms(model: ODeform, truth: Sequence) -> float:
     return typical(lambda _: model.solve(truth.rest, truth.parameters).vertices(times), 15)
 
 
+def _attempt(scene: Scene, model: ODeform, truths: list[Sequence], coarser: float, finer: float) -> dict[str, Any]:
+    """Mean time and pooled error of the simulator at one of the settings `COARSER`."""
+    from odeform.simulation.shell import SimulationError
+
+    window, step, segments = model.schema.window, coarser * scene.step, round(finer * SEGMENTS)
+    errors, ms = [], []
+    for truth in truths:
+        begin = time.perf_counter()
+        try:
+            simulated = scene.simulate(truth.parameters, rate=window.rate, step=step, segments=segments)
+        except SimulationError as error:
+            return {"step": step, "segments": segments, "failed": str(error)}
+        ms.append(1e3 * (time.perf_counter() - begin))
+        azimuth = model.schema.azimuth(truth.parameters)
+        moved = carried_over(simulated.until(window.stop), truth, model.space.anchor, azimuth)
+        errors.append(((moved - truth.vertices)[1:] ** 2).mean())
+    error_mm = float(1e3 * np.sqrt(np.mean(errors)))
+    return {"step": step, "segments": segments, "ms": float(np.mean(ms)), "error_mm": error_mm}
+
+
 def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     """MuJoCo at the cheapest setting whose error against the scene's declared truth is at most the model's.
 
@@ -57,8 +78,7 @@ def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     if dataset is None:
         return {"skipped": f"no data set of scene {model.schema.scene} at hand: --data"}
     try:
-        from odeform.simulation import shell
-        from odeform.simulation.scene import get_scene
+        import odeform.simulation.shell  # noqa: F401
     except ModuleNotFoundError as error:
         return {"skipped": f"{error.name} is not installed: pip install 'odeform[simulate]'"}
 
@@ -69,34 +89,14 @@ def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     truths = [_on_frames(recorded, window) for recorded in near.sequences("test")]
     model_error = evaluate(model, near, "test")["rmse_pooled_mm"]
 
-    def attempt(coarser: float, finer: float) -> dict[str, Any]:
-        step, segments = coarser * scene.step, round(finer * SEGMENTS)
-        errors, ms = [], []
-        for truth in truths:
-            begin = time.perf_counter()
-            try:
-                simulated = scene.simulate(truth.parameters, rate=window.rate, step=step, segments=segments)
-            except shell.SimulationError as error:
-                return {"step": step, "segments": segments, "failed": str(error)}
-            ms.append(1e3 * (time.perf_counter() - begin))
-            azimuth = model.schema.azimuth(truth.parameters)
-            moved = carried_over(simulated.until(window.stop), truth, model.space.anchor, azimuth)
-            errors.append(((moved - truth.vertices)[1:] ** 2).mean())
-        return {
-            "step": step,
-            "segments": segments,
-            "ms": float(np.mean(ms)),
-            "error_mm": float(1e3 * np.sqrt(np.mean(errors))),
-        }
-
-    tried = [attempt(*setting) for setting in COARSER]
+    tried = [_attempt(scene, model, truths, *setting) for setting in COARSER]
     enough = [row for row in tried if row.get("error_mm", np.inf) <= model_error]
     equal, truth = min(enough, key=lambda row: row["ms"], default=tried[0]), tried[0]
     if "failed" in truth:
         return {"skipped": f"the scene's own setting fails here: {truth['failed']}"}
     ours = float(np.mean([_model_ms(model, t) for t in truths]))
     # in ms: the data set, and the training on it
-    spent = dataset.provenance["count"] * truth["ms"] + 1e3 * model.checkpoint.provenance["training_seconds"]
+    spent = len(dataset.entries) * truth["ms"] + 1e3 * model.checkpoint.provenance["training_seconds"]
     return {
         "points": truths[0].vertices.shape[1],
         "frames": len(window.times),

@@ -4,7 +4,18 @@ from dataclasses import dataclass
 
 __all__ = ["FREE", "TrainConfig"]
 
-FREE = ("minutes", "steps", "report", "random_features", "sharpnesses", "components", "ridges", "between", "refine")
+FREE = (
+    "minutes",
+    "steps",
+    "report",
+    "random_features",
+    "sharpnesses",
+    "components",
+    "ridges",
+    "between",
+    "deformed",
+    "refine",
+)
 """Settings that may change when a training is resumed: of its length, and of what is solved for at its end."""
 
 
@@ -29,10 +40,12 @@ class TrainConfig:
     """Of each decoder, added at the end."""
     sharpnesses: tuple[float, ...] = (0.5, 1.0, 2.0)
     """Of random features: among these and `ridges`, validation chooses for each decoder."""
-    ridges: tuple[float, ...] = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+    ridges: tuple[float, ...] = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
     """Of the last solve."""
     between: float = 0.1
     """Weight in the last solve, relative to that of a frame, of the spline through the truth halfway between frames."""
+    deformed: float = 4.0
+    """Weight in it of moments at which a body is deformed by more than a tenth of its peak, for the local decoder."""
     longest: float = 0.01
     """Seconds; longer frames are integrated in several steps while descending."""
     refine: int = 2

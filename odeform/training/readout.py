@@ -8,8 +8,8 @@ import torch
 __all__ = ["NormalEquations", "random_layer"]
 
 STATE_GAINS = (0.1, 1.0)
-CLOCK_GAINS = (0.5, 5.0)
-PARAMETER_GAINS = (0.3, 3.0)
+CLOCK_GAINS = (1.0, 10.0)
+PARAMETER_GAINS = (0.1, 1.0)
 """How sharply features bend at sharpness 1: per standard deviation of the principal components together, per unit of
 the clock, and of parameters. Each draws its own between these, alike on a logarithmic scale: contacts are short, and
 where a bounce sends a body depends on the parameters more finely than the motion until then does.
@@ -23,9 +23,9 @@ class NormalEquations:
         self._gram: torch.Tensor | None = None
 
     def add(self, features: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor | None = None) -> None:
-        """(T, B, F) and (T, B, outputs), without frame 0, where features and truth vanish; (T,) weights of squares."""
+        """(T, B, F) and (T, B, outputs), without frame 0, where features and truth vanish; (T, B) weights of squares."""
         if weights is not None:
-            features, truth = (weights.sqrt()[:, None, None] * v for v in (features, truth))
+            features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
         x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
         gram, cross = x.T @ x, x.T @ y
         self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)

@@ -10,6 +10,7 @@ import copy
 import torch
 from scipy.interpolate import CubicSpline
 
+from odeform.model.reduced import POSE
 from odeform.training.readout import NormalEquations, random_layer
 from odeform.training.trainer import CHUNK, Trainer
 
@@ -25,6 +26,14 @@ def _halves(truth: torch.Tensor) -> torch.Tensor:
     return all_of
 
 
+def _weights(truth: torch.Tensor, between: float, deformed: float) -> torch.Tensor:
+    """(2 T + 1, B) of the truth in mm, (2 T + 1, B, 6 + K)."""
+    size = truth[..., POSE:].square().sum(dim=-1).sqrt()
+    weights = torch.where(size > 0.1 * size.amax(dim=0), deformed, 1.0).to(truth)
+    weights[1::2] *= between
+    return weights
+
+
 @torch.no_grad()
 def widen(trainer: Trainer) -> None:
     """Add the random features that leave least of the validation sequences; solve for the readout.
@@ -38,10 +47,10 @@ def widen(trainer: Trainer) -> None:
     truth = {split: _halves(trainer.truth[split]) for split in states}
     times = trainer.frame / 2.0 * torch.arange(len(truth["val"]), device=trainer.device)
     told = {split: net.told(times, trainer.theta[split]) for split in states}
-    weights = torch.ones(len(times), dtype=torch.float64, device=trainer.device)
-    weights[1::2] = config.between
     rows = torch.arange(len(trainer.theta["train"])).split(CHUNK)
-    for decoder, place, out in zip(net.decoders, net.places, trainer.outputs, strict=True):
+    for branch, decoder, place, out in zip(net.config.branches, net.decoders, net.places, trainer.outputs, strict=True):
+        deformed = config.deformed if branch == "local" else 1.0
+        weights = {split: _weights(truth[split] * trainer.metric.scale, config.between, deformed) for split in truth}
         assert decoder.random is not None
         seen = [decoder.seen(states["train"][::2, r][..., place], told["train"][::2, r]).flatten(0, 1) for r in rows]
         best, kept = float("inf"), decoder.state_dict()
@@ -52,12 +61,12 @@ def widen(trainer: Trainer) -> None:
             equations = NormalEquations()
             for r in rows:
                 features = decoder.features(states["train"][:, r][..., place], told["train"][:, r])
-                equations.add(features, truth["train"][:, r][..., out], weights)
+                equations.add(features, truth["train"][:, r][..., out], weights["train"][:, r])
             held_out = decoder.features(states["val"][..., place], told["val"])
             for ridge in config.ridges:
                 decoder.readout.weight.data = equations.solve(ridge)
                 missed = (decoder.readout(held_out) - truth["val"][..., out]) * trainer.metric.scale[out]
-                error = float((weights[:, None, None] * missed**2).sum())
+                error = float((weights["val"][..., None] * missed**2).sum())
                 if error < best:
                     best, kept = error, copy.deepcopy(decoder.state_dict())
         decoder.load_state_dict(kept)
