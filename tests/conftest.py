@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from joblib import parallel_config
 
+import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
 from odeform.dataset.index import Dataset
 from odeform.predictor import Predictor, load
 from odeform.simulation import kick as kick_scene

@@ -85,7 +85,8 @@ def prepare(
     if modes is None:
         enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
         modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
-    space = make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor)
+    largest = max(float(np.linalg.norm(c[:, :modes], axis=1).max()) for c in coefficients["train"])
+    space = replace(make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor), largest=largest)
     reduced, truncation = {}, {}
     for split in ("train", "val"):
         pairs = zip(poses[split], coefficients[split], strict=True)

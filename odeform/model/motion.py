@@ -80,7 +80,8 @@ class Motion:
         return not self.schema.window.start <= time <= self.schema.window.stop + 1e-9
 
     def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
-        return self.trajectory.reduced(self.schema.window.seen(np.atleast_1d(np.asarray(t, dtype=float))))
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        return self.space.bounded(self.trajectory.reduced(self.schema.window.seen(times)))
 
     def vertices(self, t: float | Times) -> Points | Frames:
         """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""

@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.model.basis import DisplacementBasis, fit_basis
+from odeform.schema import faded
 from odeform.types import Arrays, Basis, Frames, Mesh, Perpoint, Rotations, Sequence, Vector, Vectors
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
 ]
 
 POSE = 6  # numbers of the rigid part of y
+MARGIN = 1.25  # times the largest trained deformation, up to which a deformation is as it was predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +41,30 @@ class ReducedSpace:
     The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
     displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
     does the same for small rotation errors. `surface`, canonical, is where the training data lie; None where they
-    fill a volume, so that their derivatives are known in every direction.
+    fill a volume, so that their derivatives are known in every direction. `largest` is that of |c| in the
+    training data.
     """
 
     anchor: Vector
     arm: float
     basis: DisplacementBasis
     surface: Mesh | None
+    largest: float = float("inf")
+
+    def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
+        """(T, 6 + K), to the last bit as they are up to a deformation a quarter larger than any trained.
+
+        Beyond, by parameters or times far from those trained or by a solver too coarse, it grows ever less, and never
+        to half as much again: a body keeps its shape whatever is asked.
+        """
+        limit = MARGIN * self.largest
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            size = np.linalg.norm(y[:, POSE:], axis=1)
+            if not (size > limit).any():
+                return y
+            out = y.copy()
+            out[:, POSE:] *= np.where(size > limit, faded(size, limit, limit - self.largest) / size, 1.0)[:, None]
+        return out
 
     def to_json(self) -> dict[str, object]:
         return {
@@ -53,6 +72,7 @@ class ReducedSpace:
             "arm": self.arm,
             "basis_scale": self.basis.scale,
             "surface": self.surface is not None,
+            **({"largest": self.largest} if np.isfinite(self.largest) else {}),
         }
 
     def arrays(self) -> Arrays:
@@ -65,7 +85,8 @@ class ReducedSpace:
         anchor = np.array(data["anchor"], dtype=float)
         # older checkpoints do not say: all of them are of surfaces
         surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
-        return cls(anchor, float(data["arm"]), basis, surface)  # pyright: ignore
+        largest = float(data.get("largest", "inf"))  # pyright: ignore
+        return cls(anchor, float(data["arm"]), basis, surface, largest)  # pyright: ignore
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:

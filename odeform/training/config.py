@@ -4,18 +4,9 @@ from dataclasses import dataclass
 
 __all__ = ["FREE", "TrainConfig"]
 
-FREE = (
-    "minutes",
-    "steps",
-    "report",
-    "random_features",
-    "sharpnesses",
-    "components",
-    "ridges",
-    "between",
-    "deformed",
-    "refine",
-)
+LENGTH = ("minutes", "steps", "report", "refine")
+END = ("random_features", "components", "sharpnesses", "ridges", "between", "deformed")
+FREE = (*LENGTH, *END)
 """Settings that may change when a training is resumed: of its length, and of what is solved for at its end."""
 
 

@@ -23,7 +23,7 @@ class NormalEquations:
         self._gram: torch.Tensor | None = None
 
     def add(self, features: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor | None = None) -> None:
-        """(T, B, F) and (T, B, outputs), without frame 0, where features and truth vanish; (T, B) weights of squares."""
+        """(T, B, F) and (T, B, outputs), with weights (T, B) of squares; without frame 0, where both vanish."""
         if weights is not None:
             features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
         x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))

@@ -78,7 +78,7 @@ def test_the_readout_is_the_least_squares_one(data: TrainingData) -> None:
 def test_random_features_leave_less(data: TrainingData) -> None:
     """Of the training sequences, the more of them the less; and what a checkpoint keeps says the same."""
     left = []
-    for count in (0, 40, 400):
+    for count in (0, 100, 400):
         net = build_network(data, 0)
         config = TrainConfig(steps=2, random_features=count, sharpnesses=(1.0,), ridges=(1e-10,))
         train_network(net, data, config, silent)

@@ -54,7 +54,7 @@ def test_validation_chooses(data: TrainingData) -> None:
     """Of several settings the result is the best, for each decoder by itself."""
 
     def errors(**settings: object) -> tuple[float, float]:
-        return widened(data, between=0.0, **settings).errors_mm("val")
+        return widened(data, between=0.0, deformed=1.0, **settings).errors_mm("val")
 
     each = [errors(sharpnesses=(s,), ridges=(r,)) for s in (0.5, 2.0) for r in (1e-4, 1e-8)]
     assert len(set(each)) == 4
