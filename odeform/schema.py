@@ -19,9 +19,9 @@ Parameters = Mapping[str, float]
 BEYOND = 0.25
 """How far models see beyond a trained range, in halves of that range. A cubic interpolant's deformations are doubled
 there, and 400 times too large ten times beyond."""
-LATER = 0.5
-"""How far models see beyond the trained window, in windows: deformations stay below the largest trained, and are 13
-times that at three windows."""
+LATER = 0.05
+"""How far models see beyond the trained window, in windows: a ball at rest stays as it is. At twice that,
+some motions of the bundled models are deformed several times as much as ever before; at ten times that, all are."""
 
 
 def faded(values: Floats, limit: float, margin: float) -> Floats:
@@ -98,7 +98,7 @@ class Window:
         return self.start + np.arange(count + 1) / self.rate
 
     def seen(self, times: Floats) -> Floats:
-        """(T,) times as models see them: clocks run ever slower after the trained span, and stop half a span later."""
+        """(T,) times as models see them: clocks run ever slower after the trained span, and soon stop."""
         return faded(times, self.stop, LATER * (self.stop - self.start))
 
 

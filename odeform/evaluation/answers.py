@@ -17,8 +17,8 @@ DRAWS = 6
 def check_answers(predictor: Predictor, seed: int = 0) -> Checks:
     """Any set of queries in any order, repetition, parts of a shape, precision, and sensitivities.
 
-    `sensitivity_relative`: central differences over a fiftieth and a hundredth of the trained range, the one against
-    the other: a slider moves a motion smoothly.
+    `sensitivity_relative`: central differences over a fiftieth and a hundredth of the trained range, some steps of a
+    slider, the one against the other: sliders move a motion smoothly.
     """
     window, rng = predictor.schema.window, np.random.default_rng(seed)
     times = window.times
@@ -64,7 +64,7 @@ def _unevenness(predictor: Predictor, parameters: dict[str, float], times: Float
     quality = finest if predictor.qualities else "balanced"
     for p in predictor.schema.learned:
         unit, slopes = 0.95 * p.normalise(parameters[p.name]), []
-        for width in (0.04, 0.02):
+        for width in (0.02, 0.01):
             ends = [
                 predictor.solve(None, {**parameters, p.name: p.denormalise(unit + end)}, quality)
                 for end in (width, -width)

@@ -19,7 +19,7 @@ from odeform.types import Floats
 __all__ = ["check_calibration", "check_field", "check_orders", "observed_order"]
 
 NODES = 32  # moments at which solutions are compared; each step size divides them
-REFINED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)  # steps between two of them
+REFINED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)  # steps between two of them
 FLOOR = 2e-14  # of the states: below, errors are rounding
 TRUTH = Quality("dopri5", tolerance=1e-11, dtype="float64")
 CALIBRATION = (40, 12)  # motions, and ways to integrate each
@@ -33,7 +33,7 @@ def _errors(field: Field, start: Floats, method: str, span: float) -> tuple[list
         solution = integrate(field, start, Quality(name, step=span / pieces), span)
         return np.stack(solution.states[:: pieces // NODES])
 
-    truth = states("dopri5", NODES * REFINED[-1])
+    truth = states("dopri5", 2 * NODES * REFINED[-1])
     steps, errors = [], []
     for pieces in (NODES * times for times in REFINED):
         error = float(np.linalg.norm(states(method, pieces) - truth))
@@ -50,20 +50,24 @@ def observed_order(steps: list[float], errors: list[float]) -> float:
 
 
 def check_orders(model: ODeform, seed: int = 0) -> Checks:
-    """`order_METHOD_deviation`: how far the observed order is from the method's own.
+    """`order_METHOD_shortfall`: by how much the observed order falls short of the method's own.
 
-    `refining_error_ratio`: the largest ratio of an error to that of the next coarser step, from a thirty-second of the
-    window on.
+    Dormand and Prince made the leading term of their error so small that on a model's field the next one rules until
+    rounding does: their method converges faster than its order says.
+
+    `refining_error_ratio`: the largest ratio of an error to that of twice the step, from a thirty-second of the window
+    on.
     """
     placed, schema = model.place(model.rest, 0.0), model.schema
-    off, ratio = dict.fromkeys(METHODS, 0.0), 0.0
+    short, ratio = dict.fromkeys(METHODS, 0.0), 0.0
     for parameters in inside(schema, DRAWS, seed):
         field, start, _ = model.problem(schema.seen(parameters), placed, np.float64)
         for name, method in METHODS.items():
             steps, errors = _errors(field, start, name, schema.window.stop)
-            off[name] = max(off[name], abs(observed_order(steps, errors) - method.order))
-            ratio = max(ratio, float(np.max(np.divide(errors[1:], errors[:-1]))))
-    checks = {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
+            short[name] = max(short[name], method.order - observed_order(steps, errors))
+            by_step = dict(zip(REFINED, errors, strict=False))
+            ratio = max(ratio, *(e / by_step[n // 2] for n, e in by_step.items() if n / 2 in by_step))
+    checks = {f"order_{name}_shortfall": Check(value, 0.2) for name, value in short.items()}
     return {**checks, "refining_error_ratio": Check(ratio, 1.0)}
 
 

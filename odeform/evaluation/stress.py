@@ -122,7 +122,7 @@ def _of_all(predictor: Predictor, asked: list[Draw], outcomes: list[Outcome], se
 def _trained(predictor: Predictor, seed: int) -> Floats:
     """(2,) metres: largest distance of a point from rest, and RMS deformation, of the trained box and window."""
     times, rest, rows = predictor.schema.window.times, thinned(predictor.rest), []
-    for parameters in inside(predictor.schema, 64, seed):
+    for parameters in (*predictor.schema.corners(), *inside(predictor.schema, 64, seed)):
         motion = predictor.solve(rest, parameters)
         moved = np.linalg.norm(motion.vertices(times) - rest.points, axis=2)
         rows.append((moved.max(), motion.deformation_rms(times).max()))

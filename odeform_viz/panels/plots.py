@@ -138,4 +138,5 @@ class PlotPanel:
             self._lines = lines
             self._turns = any(float(c.turn.max()) > 1.0 for _, _, c in lines)
             self._curves.content = plots_svg(lines, self._window, self._turns)
+            self._panel.set_width(WIDTH * max(len(_quantities(lines, self._turns)), 3) + 40)
         self._cursor.content = cursor_svg(lines, self._window, self._turns, moment)

@@ -89,7 +89,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
     sure = {"faults", "non_finite_frames", "start_off_m", "grid_invariance_m", "scrub_order_m", "determinism_m"}
     sure |= {"batch_invariance_m", "single_precision_mm"}
     if name == "odeform":
-        sure |= {f"order_{method}_deviation" for method in tableau.METHODS}
+        sure |= {f"order_{method}_shortfall" for method in tableau.METHODS}
         sure |= {"refining_error_ratio", "solver_error_rank_correlation"}
     assert sure <= set(result["checks"])
     assert [check for check in sure if not result["checks"][check]["holds"]] == []
@@ -101,7 +101,7 @@ def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytes
     monkeypatch.setattr(solvers, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
     monkeypatch.setitem(tableau.METHODS, "rk4", replace(tableau.METHODS["rk4"], b=(1 / 6, 1 / 3, 1 / 6, 1 / 3)))
     checks = solvers.check_orders(model)
-    assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
+    assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_shortfall"]
 
 
 def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:
@@ -114,7 +114,7 @@ def test_what_is_not_finite_is_counted(model: ODeform, monkeypatch: pytest.Monke
     sound = LatentTrajectory.reduced
 
     def broken(self: LatentTrajectory, times: np.ndarray) -> np.ndarray:
-        return sound(self, times) * np.where(times > 1.2, np.nan, 1.0)[:, None]
+        return sound(self, times) * np.where(times > 1.02, np.nan, 1.0)[:, None]
 
     monkeypatch.setattr(LatentTrajectory, "reduced", broken)
     assert [outcome.non_finite for outcome in _outcomes(model)] == [3] * 5
@@ -186,7 +186,7 @@ def test_map_shows_where_and_when(model: ODeform, monkeypatch: pytest.MonkeyPatc
     assert np.allclose(shares, shares[0])
     picture = np.asarray(map_image(plot))
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
-    monkeypatch.setattr(LatentTrajectory, "last_good", property(lambda _: 1.2))
+    monkeypatch.setattr(LatentTrajectory, "last_good", property(lambda _: 1.02))
     failed = stability_map(model, reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
     assert failed.sound.all(axis=(1, 2)).tolist() == [True, True, False]
     assert not np.array_equal(picture, np.asarray(map_image(failed)))
