@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 from odeform.evaluation.probes import round_cloud
 from odeform.evaluation.timing import typical
 from odeform.model.motion import Motion, SolveStats, Trajectory
+from odeform.model.placed import STILL
 from odeform.model.reduced import POSE
 from odeform.predictor import Predictor
 from odeform.types import Floats
@@ -41,7 +42,7 @@ class _Shortened(Trajectory):
 
 def with_modes(motion: Motion, modes: int) -> Motion:
     """The motion with the first `modes` of its modes; with none it is rigid."""
-    placed = replace(motion.placed, values=motion.placed.values[:modes], reach=motion.placed.reach[:modes])
+    placed = replace(motion.placed, rows=motion.placed.rows[: STILL + modes], reach=motion.placed.reach[:modes])
     return replace(motion, placed=placed, trajectory=_Shortened(motion.trajectory, modes))
 
 

@@ -65,7 +65,7 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
         for name, method in METHODS.items():
             steps, errors = _errors(field, start, name, schema.window.stop)
             short[name] = max(short[name], method.order - observed_order(steps, errors))
-            by_step = dict(zip(REFINED, errors, strict=False))
+            by_step: dict[int, float] = dict(zip(REFINED, errors, strict=False))
             ratio = max(ratio, *(e / by_step[n // 2] for n, e in by_step.items() if n / 2 in by_step))
     checks = {f"order_{name}_shortfall": Check(value, 0.2) for name, value in short.items()}
     return {**checks, "refining_error_ratio": Check(ratio, 1.0)}

@@ -12,14 +12,16 @@ from odeform.model.reduced import ReducedSpace, to_canonical
 from odeform.model.triads import Axes, Triads, place_triads
 from odeform.types import GaussianSplats, Geometry, Perpoint, Points
 
-__all__ = ["PlacedBasis", "place"]
+__all__ = ["STILL", "PlacedBasis", "place"]
+
+STILL = 4  # rows of `PlacedBasis` that are no modes
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedBasis:
-    """A geometry, as it lies in the scene at rest: canonical points (N, 3) and values (K, 3 N) of the basis; float32.
+    """A geometry, as it lies in the scene at rest, and the basis on it; float32.
 
-    What only some need is computed when first asked for.
+    `points` (N, 3) are as given, `rest` canonical. What only some need is computed when first asked for.
     """
 
     geometry: Geometry
@@ -27,22 +29,23 @@ class PlacedBasis:
     azimuth: float
     points: Points
     rest: Points
-    values: Float[np.ndarray, "modes rows"]
+    rows: Float[np.ndarray, "rows entries"]
+    """(4 + K, 3 N): shifts along the three axes, `rest`, and the modes. Bodies deformed and shifted are one product."""
     reach: Float[np.ndarray, " modes"]
     """Largest displacement of any point by each mode."""
     shares: Perpoint
     """Share of the surface at each point."""
+
+    @property
+    def values(self) -> Float[np.ndarray, "modes entries"]:
+        """(K, 3 N), of the basis."""
+        return self.rows[STILL:]
 
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:
         """Mean products of the modes over the surface: c gram c is the mean square displacement, m^2."""
         shares = np.repeat(self.shares, 3).astype(np.float32)
         return (self.values * shares) @ self.values.T
-
-    @cached_property
-    def homogeneous(self) -> Float[np.ndarray, "points 4"]:
-        """`rest` and a column of ones: rigid motions are products."""
-        return np.concatenate([self.rest, np.ones_like(self.rest[:, :1])], axis=1)
 
     @cached_property
     def triads(self) -> Triads:
@@ -64,6 +67,9 @@ def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasi
     values = space.basis.values(rest).transpose(2, 0, 1)
     points = np.asarray(geometry.points, dtype=np.float32)
     reach = np.sqrt(np.einsum("kni,kni->kn", values, values).max(axis=1))
-    flat = values.reshape(space.basis.modes, -1)
-    shares = surface_shares(geometry)
-    return PlacedBasis(geometry, space, azimuth, points, rest.astype(np.float32), flat, reach, shares)
+    rest, count = rest.astype(np.float32), len(rest)
+    rows = np.empty((STILL + space.basis.modes, 3 * count), dtype=np.float32)
+    rows[:3] = np.tile(np.eye(3), count)
+    rows[3] = rest.ravel()
+    rows[STILL:] = values.reshape(space.basis.modes, -1)
+    return PlacedBasis(geometry, space, azimuth, points, rest, rows, reach, surface_shares(geometry))

@@ -125,9 +125,9 @@ def test_a_deformation_too_small_to_see_is_left_out(kick: Predictor, size: float
     """Also where its modes, each at its largest, would add up to more."""
     motion = kick.solve(None, None)
     largest = float(np.linalg.norm(motion.local(0.02), axis=1).max())
-    values = motion.placed.values * np.float32(size * INVISIBLE / largest)
+    rows = motion.placed.rows * np.float32(size * INVISIBLE / largest)
     reach = motion.placed.reach * (2.0 * INVISIBLE / motion.deformation_bound(0.02))
-    small = replace(motion, placed=replace(motion.placed, values=values, reach=reach))
+    small = replace(motion, placed=replace(motion.placed, rows=rows, reach=reach))
     assert small.deformation_bound(0.02) > INVISIBLE
     assert (deformed(small, 0.02) is not None) == seen
 
