@@ -16,9 +16,9 @@ __all__ = ["LATER", "Parameter", "Parameters", "Schema", "Window", "faded"]
 
 Parameters = Mapping[str, float]
 
-BEYOND = 0.25
-"""How far models see beyond a trained range, in halves of that range. A cubic interpolant's deformations are doubled
-there, and 400 times too large ten times beyond."""
+BEYOND = 0.15
+"""How far models see beyond a trained range, in halves of that range: the deformations of the bundled models stay
+within a fifth above the largest trained. At a quarter, one in a hundred is several times as large."""
 LATER = 0.05
 """How far models see beyond the trained window, in windows: a ball at rest stays as it is. At twice that,
 some motions of the bundled models are deformed several times as much as ever before; at ten times that, all are."""
@@ -142,7 +142,7 @@ class Schema:
         return np.array([p.normalise(parameters[p.name]) for p in self.learned])
 
     def seen(self, parameters: Parameters) -> Floats:
-        """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.25."""
+        """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.15."""
         return faded(self.vector(parameters), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:

@@ -90,9 +90,9 @@ SHAPES = ("one point", "duplicate points", "1e-6 m", "1e6 m", "1e6 m away", "a m
 
 
 def thinned(rest: Mesh) -> PointCloud:
-    """Some 64 points of a body: the motion of a few tells that of all."""
+    """Some 400 points of a body: the motion of a few tells that of all."""
     points = np.asarray(rest.points, dtype=np.float32)
-    return PointCloud(points[:: max(len(points) // 64, 1)])
+    return PointCloud(points[:: max(len(points) // 400, 1)])
 
 
 def shapes(rest: Mesh) -> dict[str, Geometry]:

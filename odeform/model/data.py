@@ -85,7 +85,10 @@ def prepare(
     if modes is None:
         enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
         modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
-    largest = max(float(np.linalg.norm(c[:, :modes], axis=1).max()) for c in coefficients["train"])
+    largest = (
+        max(float(np.linalg.norm(pose[:, :3], axis=1).max()) for pose in poses["train"]),
+        max(float(np.linalg.norm(c[:, :modes], axis=1).max()) for c in coefficients["train"]),
+    )
     space = replace(make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor), largest=largest)
     reduced, truncation = {}, {}
     for split in ("train", "val"):

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 POSE = 6  # numbers of the rigid part of y
-MARGIN = 1.25  # times the largest trained deformation, up to which a deformation is as it was predicted
+MARGIN = 1.25  # times the largest that was trained, up to which shifts and deformations are as predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,30 +41,30 @@ class ReducedSpace:
     The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
     displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
     does the same for small rotation errors. `surface`, canonical, is where the training data lie; None where they
-    fill a volume, so that their derivatives are known in every direction. `largest` is that of |c| in the
-    training data.
+    fill a volume, so that their derivatives are known in every direction. `largest` are those of |p| and |c| in
+    the training data.
     """
 
     anchor: Vector
     arm: float
     basis: DisplacementBasis
     surface: Mesh | None
-    largest: float = float("inf")
+    largest: tuple[float, float] = (float("inf"), float("inf"))
 
     def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
-        """(T, 6 + K), to the last bit as they are up to a deformation a quarter larger than any trained.
+        """(T, 6 + K), to the last bit as they are up to shifts and deformations a quarter larger than any trained.
 
-        Beyond, by parameters or times far from those trained or by a solver too coarse, it grows ever less, and never
-        to half as much again: a body keeps its shape whatever is asked.
+        Beyond, by parameters or times far from those trained or by a solver too coarse, they grow ever less, and never
+        to half as much again: a body keeps its shape and its place whatever is asked.
         """
-        limit = MARGIN * self.largest
-        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            size = np.linalg.norm(y[:, POSE:], axis=1)
-            if not (size > limit).any():
-                return y
-            out = y.copy()
-            out[:, POSE:] *= np.where(size > limit, faded(size, limit, limit - self.largest) / size, 1.0)[:, None]
-        return out
+        for part, largest in zip((slice(0, 3), slice(POSE, None)), self.largest, strict=True):
+            limit = MARGIN * largest
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                size = np.linalg.norm(y[:, part], axis=1)
+                if (size > limit).any():
+                    y = y.copy()
+                    y[:, part] *= np.where(size > limit, faded(size, limit, limit - largest) / size, 1.0)[:, None]
+        return y
 
     def to_json(self) -> dict[str, object]:
         return {
@@ -72,7 +72,7 @@ class ReducedSpace:
             "arm": self.arm,
             "basis_scale": self.basis.scale,
             "surface": self.surface is not None,
-            **({"largest": self.largest} if np.isfinite(self.largest) else {}),
+            **({"largest": list(self.largest)} if np.isfinite(self.largest).all() else {}),
         }
 
     def arrays(self) -> Arrays:
@@ -85,8 +85,8 @@ class ReducedSpace:
         anchor = np.array(data["anchor"], dtype=float)
         # older checkpoints do not say: all of them are of surfaces
         surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
-        largest = float(data.get("largest", "inf"))  # pyright: ignore
-        return cls(anchor, float(data["arm"]), basis, surface, largest)  # pyright: ignore
+        shift, deformation = data.get("largest", ("inf", "inf"))  # pyright: ignore
+        return cls(anchor, float(data["arm"]), basis, surface, (float(shift), float(deformation)))  # pyright: ignore
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:

@@ -107,20 +107,24 @@ def test_a_vertex_without_a_face_is_inside() -> None:
     assert ReducedSpace.from_parts(old, shell.arrays(), Mesh(points[:-1], faces)).surface is not None
 
 
-def test_deformations_stay_below_half_as_much_again_as_trained() -> None:
+def test_nothing_grows_to_half_as_much_again_as_was_trained() -> None:
     """And what is within a quarter of that is left alone, to the last bit; directions are kept."""
     points, faces = np.random.default_rng(0).normal(size=(8, 3)), np.array([[0, 1, 2]])
     shapes, weights = np.random.default_rng(1).normal(size=(8, 3, 2)), np.full(8, 0.125)
-    space = replace(make_space(Mesh(points, faces), shapes, weights, np.zeros(3)), largest=2e-3)
+    space = replace(make_space(Mesh(points, faces), shapes, weights, np.zeros(3)), largest=(0.4, 2e-3))
+    sizes = np.array([1.0, 1.2, 1.3, 1e6])
     y = np.zeros((4, 8))
-    y[:, :6] = np.arange(6)
-    y[:, 6:] = np.array([1e-3, 2.4e-3, 2.6e-3, 1e3])[:, None] * [0.6, -0.8]
+    y[:, :3] = 0.4 * sizes[:, None] * [0.0, 0.6, -0.8]
+    y[:, 3:6] = 100.0
+    y[:, 6:] = 2e-3 * sizes[::-1, None] * [0.6, -0.8]
     bounded = space.bounded(y)
-    assert np.array_equal(bounded[:2], y[:2])
-    assert np.array_equal(bounded[:, :6], y[:, :6])
-    sizes = np.linalg.norm(bounded[:, 6:], axis=1)
-    assert 2.5e-3 < sizes[2] < 2.6e-3
-    assert sizes[3] == pytest.approx(3e-3)
-    assert np.allclose(bounded[:, 6:] / sizes[:, None], [0.6, -0.8])
+    assert np.array_equal(bounded[:2, :6], y[:2, :6])
+    assert np.array_equal(bounded[2:, 6:], y[2:, 6:])
+    assert np.array_equal(bounded[:, 3:6], y[:, 3:6])
+    for part, largest in ((bounded[2:, :3], 0.4), (bounded[1::-1, 6:], 2e-3)):
+        size = np.linalg.norm(part, axis=1) / largest
+        assert 1.25 < size[0] < 1.3
+        assert size[1] == pytest.approx(1.5)
+        assert np.allclose(part[:, -2:] / (largest * size[:, None]), [0.6, -0.8])
     assert np.isfinite(space.bounded(np.full((1, 8), 1e300))).all()
-    assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == 2e-3
+    assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == (0.4, 2e-3)
