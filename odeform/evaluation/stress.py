@@ -11,7 +11,7 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.evaluation.answers import check_answers
 from odeform.evaluation.check import Check, Checks
-from odeform.evaluation.draws import Draw, draws, inside, shapes, thinned
+from odeform.evaluation.draws import Draw, draws, shapes, thinned
 from odeform.evaluation.physics import check_physics
 from odeform.evaluation.solvers import check_calibration, check_field, check_orders
 from odeform.model.odeform import ODeform
@@ -83,7 +83,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
         outcomes.append(show(predictor, draw, geometries))
         progress.advance()
     progress.close()
-    checks = _of_all(predictor, asked, outcomes, seed)
+    checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
         checks |= check_orders(predictor, seed) | check_field(predictor, seed) | check_calibration(predictor, seed)
@@ -95,13 +95,13 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     }
 
 
-def _of_all(predictor: Predictor, asked: list[Draw], outcomes: list[Outcome], seed: int) -> Checks:
+def _of_all(predictor: Predictor, asked: list[Draw], outcomes: list[Outcome]) -> Checks:
     """What all outcomes have to keep to.
 
-    Growth is relative to the largest of the trained box and window: what is moved or deformed twice as far as anything
+    Growth is relative to the largest of the trained motions: what is moved or deformed twice as far as anything
     that was trained is no motion of that body. Settings coarser than a step a frame or a tolerance of 1e-2 count apart.
     """
-    largest = _trained(predictor, seed)
+    largest = _trained(predictor)
     of_body = [(d, o) for d, o in zip(asked, outcomes, strict=True) if o.moved and d.shape == "body"]
     growth = np.array([np.divide((o.moved, o.deformed), largest[:, None]) for _, o in of_body])  # (draws, 2, moments)
     coarse = np.array([_coarse(d, predictor.schema.window) for d, _ in of_body])
@@ -119,11 +119,12 @@ def _of_all(predictor: Predictor, asked: list[Draw], outcomes: list[Outcome], se
     }
 
 
-def _trained(predictor: Predictor, seed: int) -> Floats:
-    """(2,) metres: largest distance of a point from rest, and RMS deformation, of the trained box and window."""
+def _trained(predictor: Predictor) -> Floats:
+    """(2,) metres: largest distance of a point from rest, and RMS deformation, of the trained motions and window."""
     times, rest, rows = predictor.schema.window.times, thinned(predictor.rest), []
-    for parameters in (*predictor.schema.corners(), *inside(predictor.schema, 64, seed)):
-        motion = predictor.solve(rest, parameters)
+    for theta in predictor.checkpoint.arrays["training.theta"]:
+        units = zip(predictor.schema.learned, theta, strict=True)
+        motion = predictor.solve(rest, {p.name: p.denormalise(float(unit)) for p, unit in units})
         moved = np.linalg.norm(motion.vertices(times) - rest.points, axis=2)
         rows.append((moved.max(), motion.deformation_rms(times).max()))
     return np.max(rows, axis=0)

@@ -43,11 +43,11 @@ def test_opens_playing_and_a_hand_on_time_stops_it(app: App, port: int) -> None:
 @pytest.mark.parametrize(("label", "value"), [("mass (kg)", 0.9), ("bending (N m)", 1.5), ("force (N)", 110.0)])
 def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: str, value: float) -> None:
     with LoopbackClient(port) as client:
-        client.set("time (s)", 0.05)
+        client.set("time (s)", 0.02)
         client.collect(0.5)
         client.set(label, value)
         shown = client.wait_vertices(BODY)
-    expected = kick.solve(kick.rest, {label.split()[0]: value}).deformed(0.05)
+    expected = kick.solve(kick.rest, {label.split()[0]: value}).deformed(0.02)
     np.testing.assert_array_equal(shown, checker_parts(kick.rest)[0].of(expected))
 
 
