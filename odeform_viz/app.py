@@ -46,7 +46,7 @@ __all__ = ["App"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
 SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
-READ = 0.1  # s between numbers that change as something moves: nobody reads faster
+READ = 0.2  # s between numbers that change as something moves: nobody reads faster
 SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
 
 

@@ -109,8 +109,8 @@ def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]
     splats = GaussianSplats(
         body.points, np.tile(1e-6 * np.eye(3), (count, 1, 1)), np.ones((count, 1, 3)), np.ones(count)
     )
-    begin = 0.26 if model.schema.impact else 0.005
-    values = begin + np.linspace(0.0, 0.06, messages)
+    begin = 0.288 if model.schema.impact else 0.005
+    values = begin + np.linspace(0.0, 0.025, messages)
     motion = model.solve(splats)
     expected = np.array([motion.deformed(float(v))[0] for v in np.round(values, 4)])
 
