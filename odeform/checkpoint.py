@@ -15,7 +15,14 @@ from odeform.files import bundled, safetensors_metadata, write_aside
 from odeform.schema import Schema
 from odeform.types import Arrays
 
-__all__ = ["Checkpoint", "bundled_checkpoints", "read_checkpoint", "resolve_checkpoint", "write_checkpoint"]
+__all__ = [
+    "Checkpoint",
+    "bundled_checkpoints",
+    "checkpoint_bytes",
+    "read_checkpoint",
+    "resolve_checkpoint",
+    "write_checkpoint",
+]
 
 FORMAT = 1
 LIMIT = 1 << 30  # bytes; a larger file is not one of ours
@@ -52,15 +59,20 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     write_aside(Path(path), data)
 
 
-def read_checkpoint(path: str | Path) -> Checkpoint:
-    """Read and validate a checkpoint file; `InputError` in one line for anything that is not one."""
-    path = Path(path)
+def checkpoint_bytes(path: Path) -> bytes:
+    """The whole file, unread; `InputError` where it cannot be had or is too large to be one."""
     try:
         if path.stat().st_size > LIMIT:
             raise InputError(f"{path}: expected a checkpoint of at most {LIMIT >> 20} MiB")
-        data = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise InputError(f"checkpoint {path}: {error.strerror}") from None
+
+
+def read_checkpoint(path: str | Path) -> Checkpoint:
+    """Read and validate a checkpoint file; `InputError` in one line for anything that is not one."""
+    path = Path(path)
+    data = checkpoint_bytes(path)
     try:
         arrays = load(data)
         metadata = safetensors_metadata(data)

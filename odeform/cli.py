@@ -74,6 +74,16 @@ def _simulate(args: argparse.Namespace) -> None:
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
 
 
+def _import(args: argparse.Namespace) -> None:
+    from odeform.dataset.importing import import_dataset
+
+    dataset = import_dataset(args.source, args.out, args.rate, args.seed)
+    failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
+    counts = ", ".join(f"{len(dataset.select(split))} {split}" for split in ("train", "val", "test"))
+    varied = ", ".join(p.name for p in dataset.schema.parameters)
+    print(f"{dataset.schema.scene} in {args.out}: {counts}; {varied} vary; failed: {', '.join(failed) or 'none'}")
+
+
 def _pack(args: argparse.Namespace) -> None:
     from odeform.dataset.packed import SUFFIX, pack
     from odeform.dataset.store import open_dataset
@@ -90,18 +100,18 @@ def _pack(args: argparse.Namespace) -> None:
 
 def _train(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
-    from odeform.simulation.scene import get_scene
-    from odeform.training.train import TrainRequest, train
+    from odeform.training.train import TrainRequest, rest_of, train
 
     dataset = open_dataset(args.dataset)
-    rest = get_scene(dataset.schema.scene).rest_mesh()
     window = parse_window(args.window)
     if not 0.0 < args.minutes < float("inf"):
         raise InputError(f"--minutes: expected a positive number, got {args.minutes:g}")
     if args.steps is not None and args.steps < 1:
         raise InputError(f"--steps: expected a positive number, got {args.steps}")
-    request = TrainRequest(args.model, args.seed, args.minutes, args.steps, window, args.every, args.resume)
-    train(dataset, rest, args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
+    request = TrainRequest(
+        args.model, args.seed, args.minutes, args.steps, window, args.every, args.stagger, args.resume
+    )
+    train(dataset, rest_of(dataset), args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
 
 
 def _evaluate(args: argparse.Namespace) -> None:
@@ -114,7 +124,7 @@ def _evaluate(args: argparse.Namespace) -> None:
     for name in args.checkpoints:
         predictor = load(name)
         taught = predictor.checkpoint.provenance.get("fixed")
-        if taught != dataset.fixed:
+        if taught is not None and taught != dataset.fixed:
             print(f"note: {name} was trained on other physics: {taught}, not {dataset.fixed}", file=sys.stderr)
         key = predictor.model if predictor.model not in models else name
         models[key] = evaluate(predictor, dataset, args.split, window, args.quality)
@@ -130,19 +140,37 @@ def _evaluate(args: argparse.Namespace) -> None:
         print(f"{key:<24}" + "".join(f"{cell:>22}" for cell in cells))
 
 
+def _identify(args: argparse.Namespace) -> None:
+    from odeform.dataset.store import open_dataset
+    from odeform.inverse.observation import View
+    from odeform.inverse.table import identify_split, report
+    from odeform.predictor import load
+
+    if args.limit is not None and args.limit < 1:
+        raise InputError(f"--limit: expected a positive number, got {args.limit}")
+    view = View(args.points, args.frames, args.noise, args.seed)
+    result = identify_split(load(args.checkpoint), open_dataset(args.data), args.split, args.limit, view)
+    if args.json:
+        _emit(result, args.json)
+    print(report(result))
+
+
 def _predict(args: argparse.Namespace) -> None:
     from odeform.export import parse_times, write_motion
     from odeform.geometry.bundled import read_shape
     from odeform.geometry.shape import fit_to
+    from odeform.geometry.similarity import Similarity
     from odeform.predictor import load
     from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
     fit = None
-    if args.geometry is not None:
+    if args.geometry is None and not predictor.fits:
+        print(f"note: {args.checkpoint}: {predictor.schema.notes[-1]}", file=sys.stderr)
+    elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
-        fit = fit_to(shape, predictor.rest, region)
+        fit = fit_to(shape, predictor.rest, region, place=None if predictor.fits else Similarity())
     geometry = fit.geometry if fit else None
     for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
         print(f"note: {args.geometry}: {note}", file=sys.stderr)
@@ -154,9 +182,9 @@ def _predict(args: argparse.Namespace) -> None:
 
 
 def _info(args: argparse.Namespace) -> None:
-    from odeform.checkpoint import read_checkpoint, resolve_checkpoint
+    from odeform.predictor import open_checkpoint
 
-    checkpoint = read_checkpoint(resolve_checkpoint(args.checkpoint))
+    checkpoint = open_checkpoint(args.checkpoint)
     config = {k: v for k, v in checkpoint.config.items() if k != "trials"}
     result = {
         "schema": checkpoint.schema.to_json(),
@@ -188,15 +216,26 @@ def _stress(args: argparse.Namespace) -> None:
     if args.map:
         from odeform.evaluation.stability import map_image, stability_map
         from odeform.files import write_aside
-        from odeform.predictor import load
+        from odeform.predictor import load_continuous
 
         picture = io.BytesIO()
-        map_image(stability_map(load(args.checkpoint))).save(picture, format="PNG", optimize=True)
+        map_image(stability_map(load_continuous(args.checkpoint))).save(picture, format="PNG", optimize=True)
         write_aside(Path(args.map), picture.getvalue())
     result = stress(args.checkpoint, args.cases)
     if args.json:
         _emit(result, args.json)
     print(report(result))
+
+
+Command = Callable[[str, Callable[[argparse.Namespace], None], str], argparse.ArgumentParser]
+
+
+def _tables(args: argparse.Namespace) -> None:
+    from odeform.tables.tables import tables
+
+    if not 0.0 < args.share < float("inf") or args.jobs < 1:
+        raise InputError("--share and --jobs: expected positive numbers")
+    tables(Path(args.keep), Path(args.out), args.share, args.jobs, args.kept_only)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -208,6 +247,13 @@ def _parser() -> argparse.ArgumentParser:
         sub.set_defaults(run=run)
         return sub
 
+    _add_makers(command)
+    _add_askers(command)
+    return parser
+
+
+def _add_makers(command: Command) -> None:
+    """Commands that make data sets and checkpoints."""
     sub = command("simulate", _simulate, "simulate a data set of a scene (needs odeform[simulate])")
     sub.add_argument("scene", metavar="SCENE", help="mass-elastic or kick")
     sub.add_argument("--out", required=True, metavar="DIR")
@@ -217,6 +263,12 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--rate", type=float, metavar="HZ", help="frames a second (default: the scene's)")
     sub.add_argument("--corners", action="store_true", help="also the corners of the trained box, for training")
 
+    sub = command("import", _import, "bring in the released data, or a folder of mesh frames")
+    sub.add_argument("source", metavar="SRC", help="the released layout, or a folder a sequence and parameters.csv")
+    sub.add_argument("--out", required=True, metavar="DIR")
+    sub.add_argument("--rate", type=float, metavar="HZ", help="of mesh frames, where the table does not say")
+    sub.add_argument("--seed", type=int, default=0, metavar="S", help="draws the splits of a source without any")
+
     sub = command("pack", _pack, "write a small compressed copy of a data set")
     sub.add_argument("dataset", metavar="DATASET")
     sub.add_argument("--out", required=True, metavar="FILE")
@@ -225,14 +277,32 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("train", _train, "train a model on a data set and score it on the test split")
     sub.add_argument("dataset", metavar="DATASET")
     sub.add_argument("--out", required=True, metavar="FILE")
-    sub.add_argument("--model", default="odeform", metavar="NAME", help="odeform (default), pod-rbf, nearest")
+    sub.add_argument(
+        "--model",
+        default="odeform",
+        metavar="NAME",
+        help="odeform (default), odeform-per-point, node, rnn, direct, occupancy-flow, pod-rbf, nearest",
+    )
     sub.add_argument("--window", metavar="A:B", help="frames to train on, half-open")
     sub.add_argument("--every", type=int, default=1, metavar="K", help="train on every k-th frame")
+    sub.add_argument("--stagger", action="store_true", help="not on the same frames of all sequences: they interleave")
     sub.add_argument("--seed", type=int, default=0, metavar="S")
-    sub.add_argument("--minutes", type=float, default=30.0, metavar="M", help="wall time (default 30)")
+    sub.add_argument(
+        "--minutes", type=float, default=30.0, metavar="M", help="of processor time (default 30), trials included"
+    )
     sub.add_argument("--steps", type=int, metavar="N", help="so many steps of training instead: repeatable")
     sub.add_argument("--resume", action="store_true", help="continue an interrupted training (FILE.part)")
 
+    sub = command("tables", _tables, "train every model of the paper's tables and write them as a page; resumable")
+    sub.add_argument("--keep", required=True, metavar="DIR", help="where checkpoints and scores are kept")
+    sub.add_argument("--out", required=True, metavar="FILE.md")
+    sub.add_argument("--share", type=float, default=1.0, metavar="X", help="of the planned minutes of trainings (1)")
+    sub.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="trainings at a time")
+    sub.add_argument("--kept-only", action="store_true", help="train nothing; leave open what is not kept")
+
+
+def _add_askers(command: Command) -> None:
+    """Commands that ask something of checkpoints."""
     sub = command("evaluate", _evaluate, "score checkpoints on a data set")
     sub.add_argument("checkpoints", nargs="+", metavar="CKPT")
     sub.add_argument("--data", required=True, metavar="DATASET")
@@ -251,6 +321,17 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--times", metavar="START:STOP:STEP", help="seconds, half-open (default: the trained frames)")
     sub.add_argument("--quality", default="balanced", metavar="NAME")
 
+    sub = command("identify", _identify, "recover the parameters of observed motions, all together, with intervals")
+    sub.add_argument("checkpoint", metavar="CKPT")
+    sub.add_argument("--data", required=True, metavar="DATASET")
+    sub.add_argument("--split", default="test", choices=("train", "val", "test", "all"))
+    sub.add_argument("--limit", type=int, metavar="N", help="the first N sequences only")
+    sub.add_argument("--points", type=int, metavar="N", help="see N random points of the surface (default: vertices)")
+    sub.add_argument("--frames", type=int, metavar="K", help="see K random frames (default: all)")
+    sub.add_argument("--noise", type=float, default=0.0, metavar="MM", help="add noise to each coordinate (0)")
+    sub.add_argument("--seed", type=int, default=0, metavar="S", help="of what is drawn (0)")
+    sub.add_argument("--json", metavar="FILE")
+
     sub = command("bench", _bench, "measure work, precision and latency on this machine, and those of peers")
     sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
     sub.add_argument("--data", metavar="DATASET", help="the truth (default: the scene's bundled data set, if any)")
@@ -265,7 +346,6 @@ def _parser() -> argparse.ArgumentParser:
     sub = command("info", _info, "print what a checkpoint holds")
     sub.add_argument("checkpoint", metavar="CKPT")
     sub.add_argument("--json", metavar="FILE")
-    return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,25 +1,28 @@
 """A motion sampled into frames, and the files that take frames."""
 
-import io
 import json
+import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import trimesh
 
 from odeform.errors import InputError
-from odeform.files import write_aside
+from odeform.files import aside, write_aside
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
 from odeform.geometry.splat_inria import inria_bytes
-from odeform.model.motion import Motion
+from odeform.model.predicted import PredictedMotion
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh
 
 __all__ = ["parse_times", "write_motion"]
 
 LIMIT = 1_000_000  # frames
+FAST = 1  # level of compression: floats hardly shrink, whatever time one gives them
 
 
 def parse_times(text: str) -> Floats:
@@ -35,7 +38,7 @@ def parse_times(text: str) -> Floats:
     return np.arange(start, stop, step)
 
 
-def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None = None) -> None:
+def write_motion(motion: PredictedMotion, times: Floats, out: str | Path, fit: Fit | None = None) -> None:
     """Write frames to `out`: `.npz`, or `.ply` with `{frame}` in its name (splats as INRIA's code does).
 
     A shape that was fitted goes back to the units and place of its file; a `.ply` also has what stands still.
@@ -43,7 +46,8 @@ def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None
     path = Path(out)
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        write_aside(path, _npz(motion, times, fit.place.inverse if fit else Similarity()))
+        with aside(path) as file:
+            _write_npz(file, motion, times, fit.place.inverse if fit else Similarity())
     elif suffix == ".ply" and "{frame}" in path.name:
         for frame, time in enumerate(times):
             write_aside(path.with_name(path.name.replace("{frame}", f"{frame:05d}")), _ply(motion, float(time), fit))
@@ -51,24 +55,41 @@ def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None
         raise InputError(f"--out {out}: expected a name ending in .npz, or in .ply with {{frame}} in it")
 
 
-def _npz(motion: Motion, times: Floats, back: Similarity) -> bytes:
+def _write_npz(file: IO[bytes], motion: PredictedMotion, times: Floats, back: Similarity) -> None:
+    """An archive like those of `numpy.savez_compressed`, a frame at a time: splats in motion may outgrow memory."""
     geometry = motion.geometry
-    arrays = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
-    frames = back.points(motion.vertices(times)).astype(np.float32)
-    if isinstance(geometry, GaussianSplats):
-        arrays["centers"] = frames
-        arrays["covariances"] = np.stack(
-            [back.covariances(motion.covariances(float(t))) for t in times], dtype=np.float32
-        )
-    else:
-        arrays["vertices"] = frames
-        arrays["faces"] = np.asarray(geometry.faces if isinstance(geometry, Mesh) else np.zeros((0, 3)), dtype=np.int32)
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return buffer.getvalue()
+    small = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
+    splats = isinstance(geometry, GaussianSplats)
+    if not splats:
+        small["faces"] = np.asarray(geometry.faces if isinstance(geometry, Mesh) else np.zeros((0, 3)), dtype=np.int32)
+
+    def points(time: float) -> Floats:
+        return back.points(motion.vertices(time))
+
+    def covariances(time: float) -> Floats:
+        return back.covariances(motion.covariances(time))
+
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=FAST) as archive:
+        for name, array in small.items():
+            with archive.open(f"{name}.npy", "w") as member:
+                np.lib.format.write_array(member, array)
+        _write_frames(archive, "centers" if splats else "vertices", points, times)
+        if splats:
+            _write_frames(archive, "covariances", covariances, times)
 
 
-def _ply(motion: Motion, time: float, fit: Fit | None) -> bytes:
+def _write_frames(archive: zipfile.ZipFile, name: str, frame: Callable[[float], Floats], times: Floats) -> None:
+    """(T, ...) float32, of which `frame` gives what is known of one time."""
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        for index, time in enumerate(times):
+            array = np.ascontiguousarray(frame(float(time)), dtype="<f4")
+            if index == 0:
+                header = {"descr": "<f4", "fortran_order": False, "shape": (len(times), *array.shape)}
+                np.lib.format.write_array_header_1_0(member, header)
+            member.write(array.data)
+
+
+def _ply(motion: PredictedMotion, time: float, fit: Fit | None) -> bytes:
     moved = _moved(motion, time)
     shape = fit.undo(moved) if fit else moved
     if isinstance(shape, GaussianSplats):
@@ -81,7 +102,7 @@ def _ply(motion: Motion, time: float, fit: Fit | None) -> bytes:
     return data if isinstance(data, bytes) else str(data).encode()
 
 
-def _moved(motion: Motion, time: float) -> Geometry:
+def _moved(motion: PredictedMotion, time: float) -> Geometry:
     geometry = motion.geometry
     moved = replace(geometry, points=motion.vertices(time))
     if not isinstance(moved, GaussianSplats):

@@ -6,13 +6,15 @@ from typing import Any, Protocol, runtime_checkable
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
-from odeform.model.motion import Motion
+from odeform.model.base import ReducedModel
+from odeform.model.predicted import PredictedMotion
+from odeform.released.file import ENDING, read_released
 from odeform.schema import Parameters, Schema
 from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, Geometry, Mesh, Times
+from odeform.types import Floats, Geometry, Mesh, Sequence, Times
 
-__all__ = ["Predictor", "load"]
+__all__ = ["Predictor", "load", "load_continuous", "load_reduced", "observations", "open_checkpoint"]
 
 
 @runtime_checkable
@@ -22,6 +24,12 @@ class Predictor(Protocol):
     schema: Schema
     checkpoint: Checkpoint
     rest: Mesh
+    """The body as viewers show it, where it lies at rest."""
+    fits: bool
+    """Whether foreign shapes are brought to the size and place of `rest`, or else taken as they are, in metres."""
+
+    beyond: bool
+    """Whether motions go on beyond the trained window; else it alone can be scored."""
 
     @property
     def model(self) -> str: ...
@@ -33,24 +41,67 @@ class Predictor(Protocol):
     @property
     def frontier(self) -> tuple[FrontierPoint, ...]: ...
 
+    def seated(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
+        """A body that lies in the scene at rest under `parameters`, in the frame in which `solve` expects it."""
+        ...
+
     def solve(
         self,
         geometry: Geometry | None = None,
         parameters: Mapping[str, Any] | None = None,
         quality: str | Quality = "balanced",
         until: float | None = None,
-        observed: None = None,
-    ) -> Motion: ...
+        observed: Sequence | None = None,
+    ) -> PredictedMotion: ...
+
+
+def open_checkpoint(name: str | Path) -> Checkpoint:
+    """By path, ours or a `.pth` of the authors, or by a bundled one's name (SCENE or SCENE/MODEL)."""
+    path = resolve_checkpoint(str(name))
+    if path.suffix.lower() == ENDING:
+        return read_released(path)
+    return read_checkpoint(path)
 
 
 def load(name: str | Path) -> Predictor:
     """A predictor from a checkpoint's path, or a bundled one's name (SCENE or SCENE/MODEL)."""
+    from odeform.baselines.direct import Direct
     from odeform.baselines.nearest import Nearest
+    from odeform.baselines.node import Node
+    from odeform.baselines.occupancy_flow import OccupancyFlow
+    from odeform.baselines.odeform_per_point import OdeformPerPoint
     from odeform.baselines.pod_rbf import PodRbf
+    from odeform.baselines.rnn import Rnn
     from odeform.model.odeform import ODeform
+    from odeform.released.predictor import Released
 
-    checkpoint = read_checkpoint(resolve_checkpoint(str(name)))
-    models = {model.model: model for model in (ODeform, PodRbf, Nearest)}
+    checkpoint = open_checkpoint(name)
+    kinds = (ODeform, OdeformPerPoint, Node, Rnn, Direct, OccupancyFlow, PodRbf, Nearest, Released)
+    models = {model.model: model for model in kinds}
     if checkpoint.model not in models:
         raise InputError(f"checkpoint {name}: unknown model {checkpoint.model!r}; expected one of {', '.join(models)}")
     return models[checkpoint.model](checkpoint)
+
+
+def load_continuous(name: str | Path) -> Predictor:
+    """As `load`; `InputError` for a network that is tied to the frames it was trained on."""
+    predictor = load(name)
+    if not predictor.beyond:
+        raise InputError(f"checkpoint {name}: tied to its trained frames, nothing to measure off them; expected ours")
+    return predictor
+
+
+def load_reduced(name: str | Path) -> ReducedModel:
+    """As `load`; `InputError` for a model that moves each point by itself."""
+    predictor = load(name)
+    if not isinstance(predictor, ReducedModel):
+        raise InputError(f"checkpoint {name}: expected a model of reduced motions, got {predictor.model}")
+    return predictor
+
+
+def observations(schema: Schema, record: Sequence) -> Sequence | None:
+    """What a model of this schema is given of a record: the frames of its window's rate; None for most models."""
+    if not schema.needs_observations:
+        return None
+    step = float(record.times[1] - record.times[0])
+    return record.until(schema.window.stop, max(round(1.0 / (schema.window.rate * step)), 1))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["LATER", "Parameter", "Parameters", "Schema", "Window", "faded"]
+__all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "faded"]
 
 Parameters = Mapping[str, float]
 
@@ -20,8 +20,10 @@ BEYOND = 0.15
 """How far models see beyond a trained range, in halves of that range: the deformations of the bundled models stay
 within a fifth above the largest trained. At a quarter, one in a hundred is several times as large."""
 LATER = 0.05
-"""How far models see beyond the trained window, in windows: a ball at rest stays as it is. At twice that,
+"""How far models see beyond the trained window and its reach, in windows: a ball at rest stays as it is. At twice that,
 some motions of the bundled models are deformed several times as much as ever before; at ten times that, all are."""
+REACH = 0.5
+"""Windows beyond the trained one over which models that go on do so before their clock stops."""
 
 
 def faded(values: Floats, limit: float, margin: float) -> Floats:
@@ -83,6 +85,17 @@ class Parameter:
         return number
 
 
+def _three(name: str, value: Any) -> list[Any]:
+    """The components of a vector, given as a sequence or as text with commas."""
+    try:
+        parts = value.split(",") if isinstance(value, str) else list(value)
+    except TypeError:
+        parts = []
+    if len(parts) != 3:
+        raise InputError(f"{name}: expected three numbers, X,Y,Z, got {value!r}")
+    return parts
+
+
 @dataclass(frozen=True)
 class Window:
     """The trained span of time in seconds, and the rate of its frames in Hz."""
@@ -90,6 +103,8 @@ class Window:
     start: float
     stop: float
     rate: float
+    reach: float = 0.0
+    """Windows beyond the trained one over which a model continues its motions, clocks running on."""
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -98,8 +113,9 @@ class Window:
         return self.start + np.arange(count + 1) / self.rate
 
     def seen(self, times: Floats) -> Floats:
-        """(T,) times as models see them: clocks run ever slower after the trained span, and soon stop."""
-        return faded(times, self.stop, LATER * (self.stop - self.start))
+        """(T,) times as models see them: clocks run ever slower after the trained span and its reach, and soon stop."""
+        span = self.stop - self.start
+        return faded(times, self.stop + self.reach * span, LATER * span)
 
 
 @dataclass(frozen=True)
@@ -125,13 +141,24 @@ class Schema:
         return next((parameters[p.name] for p in self.parameters if p.role == "azimuth"), 0.0)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, float]:
-        """All parameters, checked, in schema order, with defaults where none was given."""
-        given = dict(parameters or {})
+        """All parameters, checked, in schema order, with defaults where none was given.
+
+        Three parameters NAME_x, NAME_y and NAME_z may be given as one vector: NAME, of three numbers or "X,Y,Z".
+        """
         known = [p.name for p in self.parameters]
+        given: dict[str, Any] = {}
+        for name, value in (parameters or {}).items():
+            parts = [f"{name}_{axis}" for axis in "xyz"]
+            vector = name not in known and set(parts) <= set(known)
+            given |= dict(zip(parts, _three(name, value), strict=True)) if vector else {name: value}
         for name in given:
             if name not in known:
                 raise InputError(f"unknown parameter {name!r}: scene {self.scene} has {', '.join(known)}")
         return {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
+
+    def known(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
+        """Those of `parameters` that this scene varies."""
+        return {p.name: parameters[p.name] for p in self.parameters if p.name in parameters}
 
     def outside(self, parameters: Parameters) -> tuple[str, ...]:
         """Names of the parameters beyond their trained range."""

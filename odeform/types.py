@@ -111,6 +111,11 @@ class Sequence:
     def rest(self) -> Mesh:
         return Mesh(self.vertices[0], self.faces)
 
+    def frames(self, stop: float, rate: float) -> "Sequence":
+        """Those of a rate in Hz, which the sequence may be a multiple of, up to `stop` seconds."""
+        step = float(self.times[1] - self.times[0])
+        return self.until(stop, max(round(1.0 / (rate * step)), 1))
+
     def until(self, stop: float, every: int = 1) -> "Sequence":
         """Every k-th frame up to `stop` seconds. A sequence that ended before, at rest, stays as it was."""
         step = float(self.times[1] - self.times[0])

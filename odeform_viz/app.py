@@ -17,7 +17,6 @@ from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.export import write_motion
-from odeform.model.motion import Motion
 from odeform.types import Floats
 from odeform_viz.clock import Clock
 from odeform_viz.columns import Column, Columns
@@ -92,7 +91,7 @@ class App:
         self._told_at = 0.0
         for column in columns:
             if column.truth:
-                self._parameters.set(column.truth.parameters)
+                self._parameters.set(self.session.schema.known(column.truth.setting))
         self.clock.play()
         self._worker.start()
 
@@ -161,7 +160,8 @@ class App:
         if self._recorder:
             self._recorder.close()
 
-    def _wish(self) -> Wish:
+    def wish(self) -> Wish:
+        """What the page asks for now."""
         parameters = self.session.schema.complete(self._parameters.parameters())
         quality = self._quality.wish() if self._quality else "balanced"
         return Wish(parameters, self.clock.time(), quality, self.columns.all)
@@ -170,7 +170,7 @@ class App:
         return Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
 
     def _largest(self) -> float:
-        return self.session.largest_deformation(self._wish())
+        return self.session.largest_deformation(self.wish())
 
     def _changed(self) -> None:
         self._truth.refresh()
@@ -212,7 +212,7 @@ class App:
         print(f"error: {error}", file=sys.stderr)
 
     def _save(self) -> bytes:
-        return state_to_json(capture(self.session.schema.scene, self._wish(), self._read_looks()))
+        return state_to_json(capture(self.session.schema.scene, self.wish(), self._read_looks()))
 
     def _restore(self, data: bytes) -> None:
         """`InputError` if the state is none, or a checkpoint of it is not at hand; the page then stays as it was."""
@@ -233,24 +233,22 @@ class App:
 
     def _export(self, path: Path) -> Path:
         """The motion of the first model that is shown: a `.ply` of this moment, or all frames as `.npz`."""
-        wish = self._wish()
+        wish = self.wish()
         column = next((c for c in wish.columns if c.shown and c.predictor), None)
         if column is None:
             raise InputError("export: no model is shown")
-        with self.session.held() as session:
-            motion = session.motion(column, wish)
-            assert isinstance(motion, Motion)
-            if path.suffix == ".ply":
-                write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
-                return path.with_name(f"{path.stem}_{0:05d}.ply")
-            write_motion(motion, session.schema.window.times, path, column.fit)
-            return path
+        motion = self.session.own_motion(column, wish)
+        if path.suffix == ".ply":
+            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
+            return path.with_name(f"{path.stem}_{0:05d}.ply")
+        write_motion(motion, self.session.schema.window.times, path, column.fit)
+        return path
 
     def _serve(self) -> float | None:
         """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
         try:
             self._keep_recording()
-            wish = self._wish()
+            wish = self.wish()
             looks = self._read_looks()
             if self._shape.arranging:
                 # what one drags is where the first column is, which then is where all are
@@ -321,8 +319,9 @@ def _about(column: Column) -> str:
     """What the scene leaves fixed, what to keep in mind, and where the model comes from."""
     assert column.predictor is not None
     provenance = column.predictor.checkpoint.provenance
-    fixed = ", ".join(f"{name} {value:.4g}" for name, value in provenance.get("fixed", {}).items())
-    lines = [*column.source.schema.notes, f"Fixed: {fixed}."]
+    lines = list(column.source.schema.notes)
+    if fixed := ", ".join(f"{name} {value:.4g}" for name, value in provenance.get("fixed", {}).items()):
+        lines.append(f"Fixed: {fixed}.")
     lines += [f"Made by `{command}`." for command in provenance.get("command", [])]
     return "\n\n".join(lines)
 

@@ -1,34 +1,44 @@
 """How long the viewer takes from a slider's message to what answers it: `python -m odeform_viz.bench`."""
 
 import argparse
+import contextlib
+import io
+import itertools
+import math
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import viser
 
 import odeform
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
-from odeform.evaluation.probes import ball
+from odeform.evaluation.probes import ball, round_splats
+from odeform.evaluation.timing import milliseconds
+from odeform.model.base import ReducedModel
 from odeform.predictor import Predictor
-from odeform.types import Floats, GaussianSplats, Mesh
+from odeform.types import Floats
 from odeform_viz.app import App
 from odeform_viz.checker import checker_parts
-from odeform_viz.columns import Column, truth_column
+from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.loopback import LoopbackClient
+from odeform_viz.scene import SceneView
+from odeform_viz.session import Looks, Session, Wish
 from odeform_viz.soak import soak
 
-__all__ = ["drag", "fly", "scrub_splats"]
+__all__ = ["drag", "fly", "scrub_splats", "stages"]
 
 RATE = 20.0  # Hz; a browser sends a slider no more often
 SPLATS = 100_000
+COLUMNS = (2, 4, 8)
 
 
-@contextmanager
+@contextlib.contextmanager
 def _serving(columns: list[Column], port: int, moment: float) -> Iterator[LoopbackClient]:
     """A client of a viewer with these columns, paused at a moment."""
     app = App(columns, port=port)
@@ -102,16 +112,15 @@ def drag(models: list[Predictor], truth: Column | None, port: int, messages: int
         return _answers(values, lambda v: client.set(f"{slider.name} ({slider.unit})", v), wait, RATE)
 
 
+def _scrub(model: Predictor, messages: int) -> Floats:
+    """Moments about that of the largest deformation."""
+    return (0.288 if model.schema.impact else 0.005) + np.linspace(0.0, 0.025, messages)
+
+
 def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]:
     """Scrub the time of 100,000 splats with their covariances through the moments of the largest deformation."""
-    body: Mesh = ball(SPLATS, model)
-    count = len(body.points)
-    splats = GaussianSplats(
-        body.points, np.tile(1e-6 * np.eye(3), (count, 1, 1)), np.ones((count, 1, 3)), np.ones(count)
-    )
-    begin = 0.288 if model.schema.impact else 0.005
-    values = begin + np.linspace(0.0, 0.025, messages)
-    motion = model.solve(splats)
+    splats, values = round_splats(SPLATS, model), _scrub(model, messages)
+    begin, motion = float(values[0]), model.solve(splats)
     expected = np.array([motion.deformed(float(v))[0] for v in np.round(values, 4)])
 
     with _serving([Column("splats", model, splats)], port, begin) as client:
@@ -121,6 +130,24 @@ def scrub_splats(model: Predictor, port: int, messages: int) -> dict[str, float]
             return None if centers is None else int(np.abs(expected - 0.01 * centers[0]).sum(axis=1).argmin())
 
         return _answers(values, lambda v: client.set("time (s)", round(v, 4)), wait, 10.0)
+
+
+def stages(model: Predictor, port: int, messages: int) -> dict[str, float]:
+    """Of the same without a client: from the wish to a frame of arrays, and from there to messages for the socket."""
+    splats, session = round_splats(SPLATS, model), Session(model.schema)
+    columns = Columns.of([Column("splats", model, splats)]).all
+    wishes = [Wish(model.schema.complete({}), float(t), "balanced", columns) for t in _scrub(model, messages)]
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
+        server = viser.ViserServer(port=port, verbose=False)
+    try:
+        view = SceneView(server, 0.2, 1)
+        view.publish(session.frame(wishes[0]), Looks(), None)
+        compute = milliseconds(lambda i: session.frame(wishes[i]), messages - 3)
+        frames = itertools.cycle([session.frame(wish) for wish in wishes[:: messages // 10]])
+        pack = milliseconds(lambda _: view.publish(next(frames), Looks(), None), messages)
+    finally:
+        server.stop()
+    return {"compute_p50_ms": float(np.median(compute)), "pack_p50_ms": float(np.median(pack))}
 
 
 def fly(model: Predictor, port: int) -> dict[str, float]:
@@ -137,8 +164,8 @@ def fly(model: Predictor, port: int) -> dict[str, float]:
 
 
 def _soak(model: Predictor, rivals: list[Predictor], truth: Column | None, port: int, wishes: int) -> None:
-    shown = [(model, model.schema.scene), *((r, f"{model.schema.scene}/{r.model}") for r in rivals[:1])]
-    columns = [Column(m.model, m, m.rest, origin=name) for m, name in shown]
+    origins = [(model, model.schema.scene), *((r, f"{model.schema.scene}/{r.model}") for r in rivals[:1])]
+    columns = [Column(m.model, m, m.rest, origin=name) for m, name in origins]
     app = App([*columns, truth] if truth is not None else columns, port=port)
     try:
         with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
@@ -146,7 +173,9 @@ def _soak(model: Predictor, rivals: list[Predictor], truth: Column | None, port:
     finally:
         app.close()
     print(f"{done.wishes} wishes in {done.wall_s:.0f} s, {done.refused} refused, {len(done.errors)} errors")
-    print(f"newest frame last: {sum(done.newest_last)} of {len(done.newest_last)} times")
+    shown = [seconds for seconds in done.newest_s if math.isfinite(seconds)]
+    slowest = f", {max(shown):.2f} s after a drag at most" if shown else ""
+    print(f"newest frame last: {len(shown)} of {len(done.newest_s)} times{slowest}")
     print(f"resident MB after each tenth: {', '.join(f'{mb:.0f}' for mb in done.resident_mb)}: {done.growth:+.1%}")
     for error in dict.fromkeys(done.errors):
         print(error)
@@ -162,7 +191,8 @@ def main() -> None:
     model = odeform.load(args.checkpoint)
     scene = model.schema.scene
     bundled = [odeform.load(path) for name, path in bundled_checkpoints().items() if name.startswith(f"{scene}/")]
-    rivals = [r for r in bundled if r.model != model.model]
+    # models of points take seconds for thousands of them
+    rivals: list[Predictor] = [r for r in bundled if isinstance(r, ReducedModel) and r.model != model.model]
     models = [model, *rivals][:3]
     truth = None
     if scene in bundled_datasets():
@@ -175,7 +205,12 @@ def main() -> None:
         f"{len(models)} models{' and truth' * (truth is not None)}, 2,500 points": lambda: drag(
             models, truth, args.port, args.messages, 2500
         ),
+        **{
+            f"{n} columns, 2,500 points": partial(drag, [model] * n, None, args.port, args.messages, 2500)
+            for n in COLUMNS
+        },
         "time, 100,000 splats": lambda: scrub_splats(model, args.port, args.messages),
+        "time, 100,000 splats, its stages": lambda: stages(model, args.port, args.messages),
     }
     if model.schema.impact:
         runs["free flight"] = lambda: fly(model, args.port)

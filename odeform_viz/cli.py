@@ -8,6 +8,9 @@ from collections.abc import Sequence
 import odeform
 from odeform.cli import run_guarded
 from odeform.errors import InputError
+from odeform.geometry.shape import Fit
+from odeform.geometry.similarity import Similarity
+from odeform.predictor import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.replay import TOLERANCE, replay
 from odeform_viz.shaping import describe_fit, shape_from
@@ -20,12 +23,16 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
-        fit = shape_from(geometry, body)
+        fit = shape_from(geometry, body, None if models[checkpoint].fits else Similarity())
         print(describe_fit(fit, geometry, body))
     return [
-        Column(model.model, model, fit.geometry if fit else model.rest, origin=name, fit=fit)
+        Column(_label(model, fit), model, fit.geometry if fit else model.rest, origin=name, fit=fit)
         for name, model in ((name, models[name]) for name in (checkpoint, *compare))
     ]
+
+
+def _label(model: Predictor, fit: Fit | None) -> str:
+    return model.model if fit or model.fits else f"{model.model}, on a ball that stands in"
 
 
 def _serve(args: argparse.Namespace) -> None:

@@ -133,5 +133,5 @@ def truth_column(origin: str) -> Column:
     entry = next((e for e in dataset.select("all") if e.name == name.removesuffix(".npz")), None)
     if entry is None:
         raise InputError(f"sequence {origin}: {dataset.root} has no sequence {name!r}")
-    motion = RecordedMotion(dataset.schema, dataset.read(entry))
+    motion = RecordedMotion(dataset.schema, dataset.read(entry), dataset.fixed)
     return Column("truth", motion, motion.geometry, origin=origin)

@@ -93,6 +93,6 @@ def simulate_here(send: Send, scene: str, parameters: dict[str, float], rate: fl
 def map_here(send: Send, checkpoint: str) -> np.ndarray:
     """(H, W, 3) pixels: where a model is stable, within the window and beyond."""
     from odeform.evaluation.stability import map_image, stability_map
-    from odeform.predictor import load
+    from odeform.predictor import load_continuous
 
-    return np.asarray(map_image(stability_map(load(checkpoint), moments=(0.5, 1.0, 3.0))))
+    return np.asarray(map_image(stability_map(load_continuous(checkpoint), moments=(0.5, 1.0, 3.0))))

@@ -55,7 +55,7 @@ class LoopbackClient:
         """Notifications, the newest last."""
         self.nodes: set[str] = set()
         """Names of the scene's nodes."""
-        self.downloads: dict[str, bytes] = {}
+        self.downloads: dict[str, bytearray] = {}
         """Files that came, by name."""
         self._arriving: dict[str, str] = {}
         # the server calls back only for clients whose camera it knows
@@ -154,9 +154,9 @@ class LoopbackClient:
             self.nodes.discard(message["name"])
         elif kind == "FileTransferStartDownload":
             self._arriving[message["transfer_uuid"]] = message["filename"]
-            self.downloads[message["filename"]] = b""
+            self.downloads[message["filename"]] = bytearray()
         elif kind == "FileTransferPart" and message["transfer_uuid"] in self._arriving:
-            self.downloads[self._arriving[message["transfer_uuid"]]] += bytes(message["content"])
+            self.downloads[self._arriving[message["transfer_uuid"]]] += message["content"]
         elif kind.startswith("Gui") and props:
             name = kind.removeprefix("Gui").removesuffix("Message")
             self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), props)

@@ -16,7 +16,7 @@ import rerun.blueprint as rrb
 
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
-from odeform.model.motion import Motion
+from odeform.model.predicted import PredictedMotion
 from odeform.model.recorded import RecordedMotion
 from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Points
 from odeform_viz.columns import Column
@@ -46,7 +46,7 @@ class _Form:
     name: str
     column: Column
     number: int
-    motion: Motion | RecordedMotion | None = None
+    motion: PredictedMotion | RecordedMotion | None = None
     points: Points | None = None
     frame: int = -1
     """The frame that the points were sent in."""
@@ -208,7 +208,7 @@ class Recorder:
                 "errors/mae_mm": error.mae_mm,
                 "errors/worst_mm": error.worst_mm,
             }
-        if isinstance(motion, Motion):
+        if isinstance(motion, PredictedMotion):
             numbers |= {"statistics/evaluations": float(stats.evaluations), "statistics/wall_ms": stats.wall_ms}
             # it costs as much as the motion: for those that are looked at for longer than a frame
             numbers["statistics/solver_error_mm"] = stats.solver_error_mm if motion is form.motion else None

@@ -91,7 +91,7 @@ def _check(recording: Recording) -> list[Checked]:
             if pose is None:
                 checked[name].missing += 1
                 continue
-            wish = _wish(recording.wishes[frame])
+            wish = _wish(recording.wishes[frame], tuple(columns.values()))
             again = session.motion(columns[name], wish).vertices(wish.time)
             shown = points @ pose[:3, :3].T + pose[:3, 3]
             checked[name].compare(frame, wish.time, shown, again)
@@ -109,8 +109,8 @@ def _wanted(recording: Recording) -> dict[tuple[str, int], list[int]]:
     return wanted
 
 
-def _wish(raw: Mapping[str, Any]) -> Wish:
-    return Wish(dict(raw["parameters"]), float(raw["time"]), str(raw["quality"]), ())
+def _wish(raw: Mapping[str, Any], columns: tuple[Column, ...]) -> Wish:
+    return Wish(dict(raw["parameters"]), float(raw["time"]), str(raw["quality"]), columns)
 
 
 def _columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Checked]]:

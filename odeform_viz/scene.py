@@ -5,12 +5,12 @@ import viser
 import viser.transforms as vtf
 
 from odeform.geometry.rigid import rotation_z
-from odeform.model.motion import Motion
+from odeform.model.predicted import PredictedMotion
 from odeform.model.recorded import RecordedMotion
 from odeform.types import Floats, GaussianSplats, Geometry
 from odeform_viz.columns import Column
 from odeform_viz.heat import Spread
-from odeform_viz.session import ColumnFrame, Frame, Looks
+from odeform_viz.session import INVISIBLE, ColumnFrame, Frame, Looks
 from odeform_viz.shapes import Color, show_shape
 
 __all__ = ["SceneView", "color_of"]
@@ -46,7 +46,7 @@ class _ColumnView:
         # a label lags where its own position changes, not where its parent's does
         self._above = server.scene.add_frame(f"{self.root}/above", show_axes=False)
         self._label: viser.LabelHandle | None = None
-        self._motion: Motion | RecordedMotion | None = None
+        self._motion: PredictedMotion | RecordedMotion | None = None
         self._spread: tuple[RecordedMotion, Spread] | None = None
         self._as_built = True
 
@@ -69,7 +69,9 @@ class _ColumnView:
     ) -> None:
         self._place.visible = True
         self._place.position = (0.0, place, 0.0)
-        self._body.wxyz = vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz
+        # turns that cannot be seen are left out, so that a body that falls without turning is a position alone
+        step = 0.5 * INVISIBLE / self._size
+        self._body.wxyz = np.round(vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz / step) * step
         self._body.position = frame.pose[:3, 3]
         self._shape.fade(opacity)
         points = self._rest if frame.points is None else frame.points
@@ -101,17 +103,17 @@ class _ColumnView:
         elif self._label.text != text:
             self._label.text = text
 
-    def accompany(self, motion: Motion | RecordedMotion) -> None:
+    def accompany(self, motion: PredictedMotion | RecordedMotion) -> None:
         """What only accompanies a motion: its way and its push; sent when the motion is another."""
         if motion is self._motion:
             return
         self._motion = motion
         with self._server.atomic():
             self._show_path(motion)
-            if isinstance(motion, Motion):
+            if isinstance(motion, PredictedMotion):
                 self._show_pulse(motion)
 
-    def _show_path(self, motion: Motion | RecordedMotion) -> None:
+    def _show_path(self, motion: PredictedMotion | RecordedMotion) -> None:
         """The way of the body's centre over the trained window."""
         window = motion.schema.window
         poses = motion.pose(np.linspace(window.start, window.stop, 61))
@@ -125,7 +127,7 @@ class _ColumnView:
             thickness_units="screen",
         )
 
-    def _show_pulse(self, motion: Motion) -> None:
+    def _show_pulse(self, motion: PredictedMotion) -> None:
         """The push, on the side where it drives the body, as long as it is strong; only scenes with a force have one.
 
         It acts on the far side, low at the back, where the floor would hide most of an arrow.
@@ -207,11 +209,12 @@ class SceneView:
     def _match(self, frame: Frame) -> None:
         """A view for each column that is shown, none for those that are gone."""
         wished = {column.key: column for column in frame.wish.columns}
+        visible = {shown.column.key for shown in frame.columns}
         for key, (column, view) in list(self._views.items()):
             if key not in wished or wished[key].geometry is not column.geometry:
                 view.remove()
                 del self._views[key]
-            elif not wished[key].shown:
+            elif key not in visible:
                 view.hide()
         for shown in frame.columns:
             if shown.column.key not in self._views:
@@ -239,8 +242,9 @@ class SceneView:
         if not looks.follow or not frame.columns:
             return (0.0, 0.0, 0.0)
         first = frame.columns[0]
-        moved = self._views[first.column.key][1].moved(first)
-        return (-float(moved[0]), -float(moved[1]), 0.0)
+        # in steps that cannot be seen, so that it stays where it is while a body falls straight down
+        x, y, _ = np.round(self._views[first.column.key][1].moved(first) / INVISIBLE) * INVISIBLE
+        return (-float(x), -float(y), 0.0)
 
 
 def title_of(shown: ColumnFrame) -> str:

@@ -2,20 +2,20 @@
 
 import json
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.model.motion import Motion, SolveStats
+from odeform.model.predicted import PredictedMotion, SolveStats
 from odeform.model.recorded import RecordedMotion
-from odeform.predictor import Predictor
+from odeform.predictor import Predictor, observations
+from odeform.schema import REACH as CONTINUED
 from odeform.schema import Schema
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Points, Times, Vector
+from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Points, Sequence, Times, Vector
 from odeform_viz.columns import Column
 
 __all__ = [
@@ -28,13 +28,13 @@ __all__ = [
     "Looks",
     "Session",
     "Wish",
-    "deformed",
     "same_motions",
+    "visible_deformation",
 ]
 
 INVISIBLE = 1e-4  # m; a third of a pixel of a ball of 0.1 m that is 720 pixels high
 SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
-REACH = 1.5  # trained windows that one can look at
+REACH = 1.0 + CONTINUED  # trained windows that one can look at: as far as models go on
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class ColumnFrame:
     """
 
     column: Column
-    motion: Motion | RecordedMotion
+    motion: PredictedMotion | RecordedMotion
     points: Floats | None
     covariances: Floats | None
     pose: Floats
@@ -103,10 +103,12 @@ class ColumnFrame:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """All visible columns at one moment, in the order of the wish."""
+    """All visible columns at one moment, in the order of the wish, but those that cannot meet it: these are `refused`,
+    with a reason."""
 
     wish: Wish
     columns: tuple[ColumnFrame, ...]
+    refused: tuple[str, ...] = ()
 
     @cached_property
     def truth(self) -> ColumnFrame | None:
@@ -147,6 +149,10 @@ def quality_of(source: Predictor, wished: str) -> str | Quality:
     return wished if wished in source.qualities else "balanced"
 
 
+def _given(source: Predictor, record: RecordedMotion | None) -> Sequence | None:
+    return None if record is None else observations(source.schema, record.sequence)
+
+
 class Session:
     """Columns under one set of parameters and one time. Integrates only when parameters or quality change.
 
@@ -156,14 +162,14 @@ class Session:
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._lock = threading.RLock()
-        self._solved: dict[tuple[int, int], tuple[tuple[object, ...], Motion]] = {}
+        self._solved: dict[tuple[int, int], tuple[tuple[object, ...], PredictedMotion]] = {}
         self._curves: dict[int, tuple[object, object, Curves]] = {}
 
     def parameters(self, column: Column, wish: Wish) -> Mapping[str, float]:
         """Those that a column stands for."""
         return column.pinned if column.pinned is not None else wish.parameters
 
-    def motion(self, column: Column, wish: Wish) -> Motion | RecordedMotion:
+    def motion(self, column: Column, wish: Wish) -> PredictedMotion | RecordedMotion:
         """The motion of one column; the same object until its parameters, shape or quality change."""
         source = column.source
         if isinstance(source, RecordedMotion):
@@ -171,15 +177,43 @@ class Session:
         with self._lock:
             return self._solve(column, source, 0, column.geometry, wish)
 
-    def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> Motion:
-        names = {p.name for p in source.schema.parameters}
-        parameters = {n: value for n, value in self.parameters(column, wish).items() if n in names}
-        quality = quality_of(source, wish.quality)
-        wanted = (quality, *sorted(parameters.items()))
+    def own_motion(self, column: Column, wish: Wish) -> PredictedMotion:
+        """The motion of a model, for long work beside the page: nobody else asks it or waits for it."""
+        source = column.predictor
+        assert source is not None
+        parameters, quality, record = self._asked(column, source, wish)
+        with self._lock:
+            return source.solve(column.geometry, parameters, quality, observed=_given(source, record))
+
+    def _asked(
+        self, column: Column, source: Predictor, wish: Wish
+    ) -> tuple[Mapping[str, float], str | Quality, RecordedMotion | None]:
+        """Parameters and quality that a model knows, and the record that it is given frames of."""
+        parameters = source.schema.known(self.parameters(column, wish))
+        return parameters, quality_of(source, wish.quality), self._observed(column, source, wish)
+
+    def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> PredictedMotion:
+        parameters, quality, record = self._asked(column, source, wish)
+        wanted = (quality, record, *sorted(parameters.items()))
         known = self._solved.get((column.key, use))
         if known is None or known[0] != wanted or known[1].geometry is not geometry:
-            known = self._solved[column.key, use] = (wanted, source.solve(geometry, parameters, quality))
+            motion = source.solve(geometry, parameters, quality, observed=_given(source, record))
+            known = self._solved[column.key, use] = (wanted, motion)
         return known[1]
+
+    def _observed(self, column: Column, source: Predictor, wish: Wish) -> RecordedMotion | None:
+        """The record that a model moves between frames of; None for models that need none."""
+        if not source.schema.needs_observations:
+            return None
+        record = next((c.source for c in wish.columns if isinstance(c.source, RecordedMotion)), None)
+        if record is None or not record.of(self.parameters(column, wish)):
+            raise InputError(f"{column.label} moves between observed frames: expected the truth of these parameters")
+        return record
+
+    def _of_truth(self, column: Column, source: Predictor, truth: RecordedMotion, wish: Wish) -> PredictedMotion:
+        """What a model makes of the body of the record."""
+        known = source.schema.known(self.parameters(column, wish))
+        return self._solve(column, source, 1, source.seated(truth.geometry, known), wish)
 
     def truth_of(self, column: Column, wish: Wish) -> RecordedMotion | None:
         """The record among the columns, where it is of this column's parameters and body."""
@@ -189,26 +223,34 @@ class Session:
         return None if column.foreign else truth
 
     def frame(self, wish: Wish) -> Frame:
-        """What is to be seen; only visible columns are computed. `InputError` for wishes that no motion can meet."""
+        """What is to be seen; only visible columns are computed. `InputError` for wishes that none of them can meet."""
         if not np.isfinite(wish.time) or wish.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {wish.time}")
         kept = {column.key for column in wish.columns}
         with self._lock:
             self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
             self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
-            return Frame(wish, tuple(self._column(column, wish) for column in wish.columns if column.shown))
+            shown, refused = [], []
+            for column in wish.columns:
+                try:
+                    shown += [self._column(column, wish)] if column.shown else []
+                except InputError as error:
+                    refused.append(str(error))
+            if refused and not shown:
+                raise InputError(refused[0])
+            return Frame(wish, tuple(shown), tuple(refused))
 
     def _column(self, column: Column, wish: Wish) -> ColumnFrame:
         motion, time = self.motion(column, wish), wish.time
         pose = motion.pose(time)
-        points = deformed(motion, time)
+        points = visible_deformation(motion, time)
         body = motion.geometry.points if points is None else points
         heights = body @ pose[2, :3].astype(np.float32) + np.float32(pose[2, 3])
         lowest = float(heights.min())
         if not (np.isfinite(heights).all() and np.isfinite(pose).all()):
             raise InputError(f"{column.label} at t = {time:.3f} s is not finite; the last good frame stays")
         covariances = None
-        if points is not None and isinstance(motion, Motion) and isinstance(column.geometry, GaussianSplats):
+        if points is not None and isinstance(motion, PredictedMotion) and isinstance(column.geometry, GaussianSplats):
             covariances = motion.deformed_covariances(time)
         return ColumnFrame(column, motion, points, covariances, pose, max(-lowest, 0.0), self._error(column, wish))
 
@@ -216,19 +258,13 @@ class Session:
         truth = self.truth_of(column, wish)
         if truth is None or truth.extrapolates(wish.time) or column.predictor is None:
             return None
-        predicted = self._solve(column, column.predictor, 1, truth.geometry, wish).vertices(wish.time)
+        predicted = self._of_truth(column, column.predictor, truth, wish).vertices(wish.time)
         true = truth.vertices(wish.time)
         off = np.subtract(predicted, true, dtype=float)
         distances = np.linalg.norm(off, axis=1)
         worst = int(distances.argmax())
         rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
         return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
-
-    @contextmanager
-    def held(self) -> Iterator["Session"]:
-        """To ask motions for more than a frame: they are extended and answer one at a time."""
-        with self._lock:
-            yield self
 
     @property
     def times(self) -> Times:
@@ -257,7 +293,7 @@ class Session:
             band = shown.column.predictor.expected_error(motion.parameters, times)
             expected = None if band is None else band[:, 1]
         if truth is not None and shown.column.predictor is not None:
-            predicted = self._solve(shown.column, shown.column.predictor, 1, truth.geometry, wish)
+            predicted = self._of_truth(shown.column, shown.column.predictor, truth, wish)
             off = predicted.vertices(times) - truth.vertices(times)
             error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
@@ -274,11 +310,11 @@ class Session:
             return float(times[np.argmax(self.motion(column, wish).deformation_rms(times))])
 
 
-def deformed(motion: Motion | RecordedMotion, time: float) -> Points | None:
+def visible_deformation(motion: PredictedMotion | RecordedMotion, time: float) -> Points | None:
     """(N, 3) metres, the deformation alone; None where it cannot be seen, and a pose says all."""
     if motion.deformation_bound(time) < INVISIBLE:
         return None
     points = motion.deformed(time)
     # the bound takes every mode to be at its largest at the same point
-    farthest = ((points - motion.geometry.points) ** 2).sum(axis=1).max()
-    return None if farthest < INVISIBLE**2 else points
+    moved = points - motion.geometry.points
+    return None if np.einsum("ni,ni->n", moved, moved).max() < INVISIBLE**2 else points

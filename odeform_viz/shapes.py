@@ -13,6 +13,8 @@ __all__ = ["Color", "ShapeView", "show_shape"]
 
 Color = tuple[int, int, int]
 
+SUBNORMAL = float(np.finfo(np.float16).smallest_normal)
+
 
 class ShapeView(Protocol):
     """A shape in the scene. `move` takes its points (N, 3) and, of splats, covariances (N, 3, 3), None for those at
@@ -98,8 +100,11 @@ class _CloudView:
 class _SplatView:
     def __init__(self, server: viser.ViserServer, root: str, splats: GaussianSplats) -> None:
         self._scale = _unit(splats)
-        self._look = (splats.colors.astype(np.float32), splats.opacities[:, None].astype(np.float32))
-        self._covariances = (splats.covariances / self._scale**2).astype(np.float32)
+        self._look = [
+            np.round(255.0 * np.clip(part, 0.0, 1.0)).astype(np.uint8)
+            for part in (splats.colors, splats.opacities[:, None])
+        ]
+        self._covariances = _shrunk(splats.covariances, self._scale)
         self._handle = server.scene.add_gaussian_splats(
             f"{root}/splats", self._scaled(splats.points), self._covariances, *self._look, scale=self._scale
         )
@@ -108,7 +113,7 @@ class _SplatView:
         return (points / self._scale).astype(np.float32)
 
     def move(self, points: Points, covariances: Floats | None = None) -> None:
-        shown = self._covariances if covariances is None else covariances / np.float32(self._scale**2)
+        shown = self._covariances if covariances is None else _shrunk(covariances, self._scale)
         self._handle.set_gaussians(self._scaled(points), shown, *self._look)
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
@@ -116,6 +121,13 @@ class _SplatView:
 
     def fade(self, opacity: float | None) -> None:
         """Splats have opacities of their own."""
+
+
+def _shrunk(covariances: Floats, unit: float) -> Floats:
+    """Covariances in units of their own; what is subnormal as float16 takes NumPy fifty times as long to round."""
+    out = np.divide(covariances, unit**2, dtype=np.float32)
+    out *= np.abs(out) >= SUBNORMAL
+    return out
 
 
 def _unit(splats: GaussianSplats) -> float:

@@ -21,8 +21,9 @@ MOST_POINTS = 200_000  # what is moved and sent at interactive rates
 ALIKE = 0.05  # of the body's size; shapes that lie closer are the body in another discretisation
 
 
-def shape_from(name: str | Path, body: Mesh) -> Fit:
-    """The shape of a file, or the bundled one of that name, fitted to the body; of many splats the most visible.
+def shape_from(name: str | Path, body: Mesh, place: Similarity | None = None) -> Fit:
+    """The shape of a file, or the bundled one of that name, fitted to the body or at `place`; of many splats the most
+    visible.
 
     `InputError` for what cannot be read or is too large to be shown.
     """
@@ -34,7 +35,7 @@ def shape_from(name: str | Path, body: Mesh) -> Fit:
             f"geometry {Path(name).name}: {len(geometry.points):,} points; expected at most {MOST_POINTS:,}, which can "
             "be shown moving: decimate it first"
         )
-    return replace(fit_to(geometry, body, region), origin=str(name))
+    return replace(fit_to(geometry, body, region, place=place), origin=str(name))
 
 
 def fit_to_json(fit: Fit) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import io
+import math
 import sys
 import time
 from collections.abc import Iterator
@@ -12,16 +13,18 @@ from typing import Any
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform_viz.app import App
 from odeform_viz.checker import checker_parts
 from odeform_viz.loopback import Control, LoopbackClient
-from odeform_viz.session import deformed
+from odeform_viz.session import visible_deformation
 
 __all__ = ["Soak", "soak"]
 
 UNFIT = (float("nan"), float("inf"), -1e9, 1e9)
 NONSENSE = "nonsense"
 MOMENT = 0.3  # s
+PATIENCE = 120.0  # s; a machine may be busy with other things
 TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 WEIGHTS = {
     "Slider": 4.0,
@@ -45,12 +48,14 @@ RARE = {
 
 @dataclass(frozen=True)
 class Soak:
-    """`resident_mb` is the memory of the process after each part of the wishes, the page being in the same state."""
+    """After each part of the wishes, the page being at rest again: `newest_s`, the seconds from the end of a drag until
+    its last wish is shown, infinite where it is not or something follows it, and `resident_mb`, the memory of the
+    process."""
 
     wishes: int
     refused: int
     errors: tuple[str, ...]
-    newest_last: tuple[bool, ...]
+    newest_s: tuple[float, ...]
     resident_mb: tuple[float, ...]
     wall_s: float
 
@@ -73,7 +78,8 @@ def soak(app: App, port: int, wishes: int, folder: Path, rate: float = 40.0, par
                 _wish(client, rng, folder)
                 client.collect(1.0 / rate)
             _calm(client, app)
-            fresh.append(_newest_is_last(client, app))
+            fresh.append(_until_newest(client, app))
+            client.downloads.clear()  # the browser's, not the viewer's
             gc.collect()
             resident.append(_resident_mb())
         refused = len(client.said)
@@ -105,48 +111,76 @@ def _value(control: Control, rng: np.random.Generator, folder: Path) -> Any:
         return float(rng.choice(UNFIT) if unfit else 10.0 ** rng.uniform(-3.0, 2.0))
     if control.kind in ("Dropdown", "ButtonGroup"):
         return NONSENSE if unfit else str(rng.choice(control.props["options"]))
+    if control.kind == "Vector3":
+        return tuple(rng.uniform(-10.0, 110.0, 3).tolist())
     if control.kind == "Text":
         return "" if unfit else str(folder / "soak.rrd")
     return bool(rng.random() < 0.5) if control.kind == "Checkbox" else True
 
 
 def _calm(client: LoopbackClient, app: App) -> None:
-    """Back to how the page opened: one model at its defaults, of its own shape, paused."""
-    client.collect(1.0)
-    for label in ("Cancel", "Stop recording", "Back to the trained body"):
-        if client.controls[label].visible:
-            client.click(label)
-    client.set("reset", "all")
-    client.set("test sequence", "none")
-    client.collect(1.0)
-    first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
-    boxes = {c.label: c is first for c in app.columns.all}
-    for label, shown in boxes.items():
-        client.set(label, shown)
-    client.collect(0.5)
-    client.click("Remove hidden columns")
-    client.set("quality", "balanced")
-    client.set("time (s)", MOMENT)
-    client.collect(2.0)
+    """Back to how the page opened: one model at its defaults, of its own shape, paused, and so for a second."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        client.collect(1.0)
+        if _is_calm(app):
+            return
+        for label in ("Cancel", "Stop recording", "Back to the trained body"):
+            if client.controls[label].visible:
+                client.click(label)
+        client.set("reset", "all")
+        client.set("test sequence", "none")
+        first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
+        boxes = {c.label: c is first for c in app.columns.all}
+        for label, shown in boxes.items():
+            client.set(label, shown)
+        client.collect(0.5)
+        client.click("Remove hidden columns")
+        client.set("quality", "balanced")
+        client.set("time (s)", MOMENT)
+    raise TimeoutError(f"the page did not come to rest within {PATIENCE:g} s")
 
 
-def _newest_is_last(client: LoopbackClient, app: App) -> bool:
-    """Whether a drag ends with the vertices of its last wish."""
+def _is_calm(app: App) -> bool:
+    columns, parameters = app.columns.all, app.session.schema.parameters
+    try:
+        wish = app.wish()
+    except InputError:  # a slider is out of range
+        return False
+    return (
+        len(columns) == 1
+        and columns[0].predictor is not None
+        and columns[0].pinned is None
+        and columns[0].geometry is columns[0].predictor.rest
+        and not app.clock.playing
+        and wish.time == MOMENT
+        and wish.quality == "balanced"
+        and wish.parameters == {p.name: p.default for p in parameters}
+    )
+
+
+def _until_newest(client: LoopbackClient, app: App) -> float:
+    """Seconds from the end of a drag to the vertices of its last wish; infinite unless they come, and come last."""
     column, schema = app.columns.all[0], app.session.schema
     assert column.predictor is not None
     slider = schema.parameters[0]
     values = np.linspace(slider.low, slider.high, 40)[np.random.default_rng(1).permutation(40)]
     node = f"/world/column_{column.key}/body/part_0"
-    last = None
+    expected = visible_deformation(column.predictor.solve(column.geometry, {slider.name: float(values[-1])}), MOMENT)
+    assert expected is not None, "a moment at which every ball is flattened"
+    wanted = checker_parts(column.predictor.rest)[0].of(expected)
     for value in values:
         client.set(f"{slider.name} ({slider.unit})", float(value))
-    while (vertices := client.wait_vertices(node, 1.0)) is not None:
-        last = vertices
-    expected = deformed(column.predictor.solve(column.geometry, {slider.name: float(values[-1])}), MOMENT)
-    assert expected is not None, "a moment at which every ball is flattened"
-    # frames of other wishes are off by a hundred times as much; a basis placed anew may round otherwise
-    wanted = checker_parts(column.predictor.rest)[0].of(expected)
-    return last is not None and np.allclose(last, wanted, rtol=0.0, atol=1e-6)
+    newest, begin = math.inf, time.monotonic()
+    while time.monotonic() < begin + PATIENCE:
+        vertices = client.wait_vertices(node, 1.0)
+        if vertices is not None:
+            # frames of other wishes are off by a hundred times as much; a basis placed anew may round otherwise
+            right = np.allclose(vertices, wanted, rtol=0.0, atol=1e-6)
+            newest = time.monotonic() - begin if right else math.inf
+        elif newest < math.inf:
+            return newest
+    return math.inf
 
 
 @contextlib.contextmanager

@@ -8,13 +8,14 @@ import pytest
 from joblib import parallel_config
 
 import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
+from odeform.baselines.networks import Trial
 from odeform.dataset.index import Dataset
 from odeform.predictor import Predictor, load
 from odeform.simulation import kick as kick_scene
 from odeform.simulation.runner import simulate_dataset
 from odeform.simulation.scene import get_scene
 from odeform.training import config
-from odeform.training.train import TrainRequest, train
+from odeform.training.train import POINTS, TrainRequest, train
 
 
 def _coarsen(patch: pytest.MonkeyPatch) -> None:
@@ -54,6 +55,20 @@ def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[
 @pytest.fixture(scope="session")
 def predictors(trained: dict[str, Path]) -> dict[str, Predictor]:
     return {model: load(path) for model, path in trained.items()}
+
+
+@pytest.fixture(scope="session")
+def point_models(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A checkpoint of every model that moves each point by itself: narrow, and trained for a few steps."""
+    root, rest, paths = tmp_path_factory.mktemp("points"), get_scene("kick").rest_mesh(), {}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, model in POINTS.items():
+            patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
+            patch.setattr(model.network, "work", 512, raising=False)
+            paths[name] = root / f"{name}.safetensors"
+            steps = 210 if model.network.teaching == "moments" else 56  # which are cheap
+            train(dataset, rest, paths[name], TrainRequest(name, seed=1, steps=steps, every=4), lambda _: None)
+    return paths
 
 
 @pytest.fixture(scope="session")

@@ -49,7 +49,8 @@ def test_predict_npz(
         assert arrays["faces"].dtype == np.int32
         assert np.array_equal(arrays["faces"], motion.geometry.faces)  # pyright: ignore[reportAttributeAccessIssue]
         assert json.loads(str(arrays["parameters"])) == motion.parameters
-        assert np.array_equal(arrays["vertices"], motion.vertices(arrays["times"]))
+        # frames asked for one at a time: they round otherwise than all at once
+        np.testing.assert_allclose(arrays["vertices"], motion.vertices(arrays["times"]), rtol=0.0, atol=1e-6)
     assert list(tmp_path.iterdir()) == [out]
 
 

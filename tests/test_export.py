@@ -45,7 +45,8 @@ def test_points_and_splats(predictors: dict[str, Predictor], tmp_path: Path) -> 
         with np.load(io.BytesIO((tmp_path / "a.npz").read_bytes()), allow_pickle=False) as arrays:
             assert set(arrays) == keys
             frames = arrays["vertices" if "vertices" in keys else "centers"]
-            assert np.array_equal(frames, motion.vertices(times))
+            # frames asked for one at a time: they round otherwise than all at once
+            np.testing.assert_allclose(frames, motion.vertices(times), rtol=0.0, atol=1e-6)
             if "faces" in keys:
                 assert arrays["faces"].shape == (0, 3)
             else:

@@ -1,5 +1,6 @@
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,8 @@ def test_clocks_stop_after_the_trained_window() -> None:
     assert np.array_equal(window.seen(window.times), window.times)
     assert 2.04 < window.seen(np.array([2.05]))[0] < 2.05
     assert np.array_equal(window.seen(np.array([40.0, 1e300])), [2.1, 2.1])
+    continued = replace(window, reach=0.5)
+    assert np.array_equal(continued.seen(np.array([2.5, 3.0, 1e300])), [2.5, 3.0, 3.1])
 
 
 @pytest.mark.parametrize(
@@ -93,3 +96,16 @@ def test_corners_are_those_of_the_trained_box(reach: float) -> None:
     assert np.allclose(np.abs(vectors), reach)
     assert len(np.unique(np.round(vectors), axis=0)) == len(corners) == 2 ** len(schema.learned)
     assert {parameters["azimuth"] for parameters in corners} == {0.0}
+
+
+def test_three_components_are_one_vector() -> None:
+    push = [replace(SCHEMA.parameters[0], name=f"push_{axis}") for axis in "xyz"]
+    schema = replace(SCHEMA, parameters=(*SCHEMA.parameters, *push))
+    for given in ("1,2,3", [1.0, "2", 3], np.array([1.0, 2.0, 3.0])):
+        complete = schema.complete({"push": given})
+        assert [complete[f"push_{axis}"] for axis in "xyz"] == [1.0, 2.0, 3.0]
+    with pytest.raises(InputError, match="push: expected three numbers"):
+        schema.complete({"push": "1,2"})
+    with pytest.raises(InputError, match="unknown parameter 'pull'"):
+        schema.complete({"pull": "1,2,3"})
+    assert SCHEMA.known({"mass": 0.6, "radius_m": 0.1}) == {"mass": 0.6}

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from odeform.model.motion import SolveStats
+from odeform.model.predicted import SolveStats
 from odeform.types import Floats
 
 __all__ = ["FrameTrajectory"]

@@ -20,6 +20,7 @@ class Nearest(ReducedModel):
     model = "nearest"
 
     def _read(self, checkpoint: Checkpoint) -> None:
+        super()._read(checkpoint)
         self._times = checkpoint.arrays["times"]
         self._theta = checkpoint.arrays["theta"]
         self._pose, self._local = checkpoint.arrays["pose"], checkpoint.arrays["local"]

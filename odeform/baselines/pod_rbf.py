@@ -33,6 +33,7 @@ class PodRbf(ReducedModel):
     model = "pod-rbf"
 
     def _read(self, checkpoint: Checkpoint) -> None:
+        super()._read(checkpoint)
         arrays, config = checkpoint.arrays, checkpoint.config
         self._times, self._mean, self._basis = arrays["times"], arrays["pod.mean"], arrays["pod.modes"]
         self._interpolate = RBFInterpolator(

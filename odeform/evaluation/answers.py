@@ -69,8 +69,8 @@ def _unevenness(predictor: Predictor, parameters: dict[str, float], times: Float
                 predictor.solve(None, {**parameters, p.name: p.denormalise(unit + end)}, quality)
                 for end in (width, -width)
             ]
-            y, z = (end.trajectory.reduced(times) for end in ends)
-            slopes.append((y - z) / (2.0 * width))
+            one, other = (end.vertices(times).astype(float) for end in ends)
+            slopes.append((one - other) / (2.0 * width))
         size = max(float(np.abs(slope).max()) for slope in slopes)
         worst = max(worst, _apart(*slopes) / size if size else 0.0)
     return worst

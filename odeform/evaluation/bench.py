@@ -13,10 +13,12 @@ from odeform.evaluation.limits import limits, scaling
 from odeform.evaluation.peers import peers
 from odeform.evaluation.precision import Place, find_places, measure, work_precision
 from odeform.evaluation.probes import ball, random_parameters, round_splats
+from odeform.evaluation.startup import startup
 from odeform.evaluation.timing import milliseconds, quantiles
+from odeform.model.base import ReducedModel
 from odeform.model.odeform import ODeform
 from odeform.model.placed import place
-from odeform.predictor import Predictor, load
+from odeform.predictor import load_reduced
 
 __all__ = ["bench", "report"]
 
@@ -25,7 +27,7 @@ SPLATS = 100_000
 SIZES = (500, 1_000, 10_000, 100_000, 1_000_000)
 
 
-def _latency(predictor: Predictor) -> dict[str, Any]:
+def _latency(predictor: ReducedModel) -> dict[str, Any]:
     """Cold: a change of parameters, of the heading, which needs the basis anew. Warm: a time of a known motion."""
     shape, window = ball(POINTS, predictor), predictor.schema.window
     parameters = random_parameters(predictor, 60)
@@ -76,7 +78,7 @@ def _solver(model: ODeform, places: list[Place]) -> dict[str, Any]:
 
 def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
     """All measurements of one model; `data` is the truth, by default the bundled data set of its scene."""
-    predictor = load(checkpoint)
+    predictor = load_reduced(checkpoint)
     scene = predictor.schema.scene
     data = data or (scene if scene in bundled_datasets() else None)
     dataset = None if data is None else open_dataset(data)
@@ -95,6 +97,7 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
         **result,
         "knobs": knobs(predictor),
         "limits": limits(predictor),
+        "startup": startup(checkpoint),
         "scaling": scaling(predictor, SIZES),
         "peers": peers(predictor, dataset, places),
     }
@@ -146,6 +149,7 @@ def report(result: Mapping[str, Any]) -> str:
     lines += _table("other knobs, a frame", result["knobs"], ("knob", "points", "ms", "saves_ms", "error_mm"))
     rows = [{"limit": key, "measured": value} for key, value in result["limits"].items()]
     lines += _table("limits of the machine", rows, ("limit", "measured"))
+    lines += _table("a new process, seconds", [result["startup"]], tuple(result["startup"]))
     lines += _table("scaling, a frame", result["scaling"], ("points", "solve_ms", "basis_ms", "decode_ms"))
     rows = [{"peer": name, **row} for name, row in result["peers"].items()]
     measured = [row for row in rows if "skipped" not in row]

@@ -8,10 +8,11 @@ from scipy.spatial import KDTree
 
 from odeform.evaluation.probes import round_cloud
 from odeform.evaluation.timing import typical
-from odeform.model.motion import Motion, SolveStats, Trajectory
+from odeform.model.base import ReducedModel
+from odeform.model.motion import Motion, Trajectory
 from odeform.model.placed import STILL
+from odeform.model.predicted import SolveStats
 from odeform.model.reduced import POSE
-from odeform.predictor import Predictor
 from odeform.types import Floats
 
 __all__ = ["knobs", "with_modes"]
@@ -54,7 +55,7 @@ def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
     return rest + np.einsum("tnkj,nk->tnj", (coarse - coarse_rest)[:, index], share)
 
 
-def knobs(predictor: Predictor) -> list[dict[str, Any]]:
+def knobs(predictor: ReducedModel) -> list[dict[str, Any]]:
     """Rows: the knob, ms for a frame as it is and with the knob, and the RMS error that it adds, in mm."""
     shape = round_cloud(POINTS, predictor)
     motion = predictor.solve(shape)

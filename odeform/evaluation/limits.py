@@ -9,7 +9,8 @@ import numpy as np
 
 from odeform.evaluation.probes import round_cloud
 from odeform.evaluation.timing import milliseconds, typical
-from odeform.predictor import Predictor
+from odeform.model.base import ReducedModel
+from odeform.model.placed import place
 
 __all__ = ["least_ms", "limits", "scaling"]
 
@@ -52,7 +53,7 @@ def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -
     return max((read + written) / gb_s, operations / gflops) / 1e6
 
 
-def limits(predictor: Predictor) -> dict[str, Any]:
+def limits(predictor: ReducedModel) -> dict[str, Any]:
     """Rates of this machine, and the share of them at which points are decoded, a frame or `FRAMES` at once.
 
     From coordinates to points: a motion keeps the coordinates of the moments that it was asked for last.
@@ -75,16 +76,16 @@ def limits(predictor: Predictor) -> dict[str, Any]:
     }
 
 
-def scaling(predictor: Predictor, sizes: Sequence[int]) -> list[dict[str, Any]]:
+def scaling(predictor: ReducedModel, sizes: Sequence[int]) -> list[dict[str, Any]]:
     """Solve, basis, and decode of one frame from its coordinates, over the number of points."""
     window = predictor.schema.window
     moment = 0.5 * (window.start + window.stop)
     rows = []
     for points in sizes:
         shape = round_cloud(points, predictor)
-        basis = float(milliseconds(lambda _, shape=shape: predictor.solve(shape), 1, warm=0)[0])
-        solve = typical(lambda _, shape=shape: predictor.solve(shape), 20)
         motion = predictor.solve(shape)
+        basis = float(milliseconds(lambda _, on=motion: place(on.geometry, on.space, 0.0), 1, warm=0)[0])
+        solve = typical(lambda _, shape=shape: predictor.solve(shape), 20)
         decode = typical(lambda _, motion=motion: motion.vertices(moment), 30)
-        rows.append({"points": points, "solve_ms": solve, "basis_ms": basis - solve, "decode_ms": decode})
+        rows.append({"points": points, "solve_ms": solve, "basis_ms": basis, "decode_ms": decode})
     return rows

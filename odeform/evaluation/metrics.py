@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
-from odeform.predictor import Predictor
-from odeform.schema import Window
+from odeform.predictor import Predictor, observations
+from odeform.schema import Schema, Window
 from odeform.solver.integrate import Quality
-from odeform.types import Floats, Frames, Perpoint, Sequence
+from odeform.types import Floats, Frames, Perpoint, Points, Sequence
 
 __all__ = ["Scores", "evaluate"]
 
 
-def _deformation(vertices: Frames, weights: Perpoint) -> Frames:
-    """(T, N, 3) displacements that remain after the best rigid motion of each frame."""
-    rest = vertices[0].astype(float)
+def _deformation(vertices: Frames, rest: Points, weights: Perpoint) -> Frames:
+    """(T, N, 3) displacements from the rest that remain after the best rigid motion of each frame."""
+    rest = rest.astype(float)
     rotation, shift = best_rigid(rest, vertices, weights)
     centre = weights @ rest
     back = np.einsum("tji,tnj->tni", rotation, vertices - (shift + centre)[:, None])
@@ -57,10 +57,11 @@ class Scores:
         self._distance.append(np.linalg.norm(error, axis=2).mean(axis=1)[grid])
         self._between.append(squares[between])
         self._moved.append(1e6 * ((truth.vertices - truth.vertices[0]).astype(float) ** 2).mean(axis=(1, 2))[grid])
-        true_local = _deformation(truth.vertices, truth.weights)
+        rest = truth.vertices[0]
+        true_local = _deformation(truth.vertices, rest, truth.weights)
         size = (true_local**2).sum(axis=2).mean(axis=1)
         large = grid & (np.sqrt(size) > 0.1 * np.sqrt(size[grid].max(initial=0.0)))
-        difference = _deformation(predicted, truth.weights) - true_local
+        difference = _deformation(predicted, rest, truth.weights) - true_local
         self._residual += float((difference[large] ** 2).sum(axis=2).mean(axis=1).sum())
         self._reference += float(size[large].sum())
 
@@ -93,6 +94,36 @@ def _on_frames(times: Floats, window: Window) -> Mask:
     return np.abs(phase - np.round(phase)) < 1e-3
 
 
+def _spans(
+    predictor: Predictor, schema: Schema, window: tuple[int, int] | None, clock: float
+) -> dict[str, tuple[float, float]]:
+    """Half-open spans of the data's time in seconds that are scored, `whole` and perhaps `impact`.
+
+    The model's clock is ahead of the data's by `clock` seconds.
+    """
+    rate, stop, trained = schema.window.rate, schema.window.stop, predictor.schema.window
+    begin, end = (0.0, stop + 1.0 / rate) if window is None else (window[0] / rate, window[1] / rate)
+    if end <= 1.0 / rate + 1e-9:
+        raise InputError(f"window {window}: expected frames after frame 0, which is given")
+    if begin > stop + 1e-9:
+        raise InputError(f"window {window}: scene {schema.scene} has {round(stop * rate) + 1} frames")
+    if not predictor.beyond:
+        begin, end = max(begin, trained.start - clock), min(end, trained.stop - clock + 0.5 / rate)
+        if end <= begin:
+            raise InputError(f"window {window}: {predictor.model} knows {trained.start:g} to {trained.stop:g} s alone")
+    spans = {"whole": (begin, end)}
+    if schema.impact and window is None:
+        spans["impact"] = schema.impact
+    return spans
+
+
+def _within(times: Floats, *spans: tuple[float, float]) -> Mask:
+    """Frame 0 and those of half-open spans of seconds: no other is scored."""
+    kept = np.any([(times > first - 1e-6) & (times < last - 1e-6) for first, last in spans], axis=0)
+    kept[0] = True
+    return kept
+
+
 def evaluate(
     predictor: Predictor,
     dataset: Dataset,
@@ -102,29 +133,35 @@ def evaluate(
 ) -> dict[str, Any]:
     """Scores of one model on a split.
 
-    Over the data's window, or its frames `window` (half-open; frames of the scene's rate, whatever that of the file).
-    A scene with an impact gets its scores apart, as `impact`, unless a window was asked for.
+    Over the data's window, or its frames `window` (half-open; frames of the scene's rate, whatever that of the file). A
+    model that knows its trained window alone is scored on that. Where the data end before it begins, they are taken to
+    be that window cut out of longer ones, and begin where it does. A scene with an impact gets its scores apart, as
+    `impact`, unless a window was asked for.
     """
-    schema = dataset.schema
+    schema, trained = dataset.schema, predictor.schema.window
     if predictor.schema.scene != schema.scene:
         raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {schema.scene}")
-    rate, stop = schema.window.rate, schema.window.stop
-    begin, end = (0.0, stop + 1.0 / rate) if window is None else (window[0] / rate, window[1] / rate)
-    if end <= 1.0 / rate + 1e-9:
-        raise InputError(f"window {window}: expected frames after frame 0, which is given")
-    if begin > stop + 1e-9:
-        raise InputError(f"window {window}: scene {schema.scene} has {round(stop * rate) + 1} frames")
-    spans = {"whole": (begin, end)}
-    if schema.impact and window is None:
-        spans["impact"] = schema.impact
+    stop = schema.window.stop
+    clock = 0.0 if predictor.beyond or trained.start <= stop else trained.start
+    spans = _spans(predictor, schema, window, clock)
+    begin, end = spans["whole"]
     scores = {name: Scores() for name in spans}
     covered = []
     for recorded in dataset.sequences(split):
-        truth = recorded.until(stop)
-        motion = predictor.solve(truth.rest, truth.parameters, quality, until=float(truth.times[-1]))
-        predicted = motion.vertices(truth.times)
+        whole = recorded.until(stop)
+        asked = _within(whole.times, *spans.values())
+        truth = replace(whole, times=whole.times[asked], vertices=whole.vertices[asked])
+        # what the data leave fixed may be a parameter of the model
+        given = {**predictor.schema.known(dataset.fixed), **truth.parameters}
+        motion = predictor.solve(
+            predictor.seated(truth.rest, given),
+            given,
+            quality,
+            until=float(clock + truth.times[-1]),
+            observed=observations(predictor.schema, whole),
+        )
+        predicted = motion.vertices(clock + truth.times)
         on_frames = _on_frames(truth.times, schema.window)
-        trained = predictor.schema.window
         expected = predictor.expected_error(truth.parameters, truth.times)
         if expected is not None:
             rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))
@@ -133,10 +170,9 @@ def evaluate(
                     on_frames & (truth.times > max(begin - 1e-6, 0.0)) & (truth.times < end - 1e-6)
                 ]
             )
-        between = ~_on_frames(truth.times, trained) & (truth.times < trained.stop)
-        for name, (first, last) in spans.items():
-            inside = (truth.times > first - 1e-6) & (truth.times < last - 1e-6)
-            inside[0] = True
+        between = ~_on_frames(clock + truth.times, trained) & (clock + truth.times < trained.stop)
+        for name, span in spans.items():
+            inside = _within(truth.times, span)
             part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
             scores[name].add(predicted[inside], part, on_frames[inside], between[inside])
     result = scores["whole"].result()

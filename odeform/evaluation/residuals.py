@@ -3,7 +3,7 @@
 import numpy as np
 
 from odeform.dataset.index import Dataset
-from odeform.predictor import Predictor
+from odeform.predictor import Predictor, observations
 from odeform.types import Arrays
 
 __all__ = ["validation_residuals"]
@@ -13,12 +13,15 @@ def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "v
     """Arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and `val.rmse_mm` (S, T),
     the RMSE over all coordinates of each frame of each sequence."""
     window = predictor.schema.window
-    times = np.linspace(window.start, window.stop, round((window.stop - window.start) * window.rate) + 1)
+    # frames that were given tell nothing of the error between them
+    rate = dataset.schema.window.rate if predictor.schema.needs_observations else window.rate
+    times = np.linspace(window.start, window.stop, round((window.stop - window.start) * rate) + 1)
     theta, errors = [], []
     for recorded in dataset.sequences(split):
         truth = recorded.until(window.stop)
         at = np.searchsorted(truth.times, times - 1e-6)
-        predicted = predictor.solve(truth.rest, truth.parameters).vertices(times)
+        given = observations(predictor.schema, truth)
+        predicted = predictor.solve(truth.rest, truth.parameters, observed=given).vertices(times)
         off = predicted.astype(float) - truth.vertices[at]
         theta.append(predictor.schema.vector(truth.parameters))
         errors.append(1e3 * np.sqrt((off**2).mean(axis=(1, 2))))

@@ -62,7 +62,7 @@ def stability_map(
         given = {first.name: first.denormalise(float(units[j])), second.name: second.denormalise(float(units[i]))}
         motion = predictor.solve(None, given, quality, until=times[-1])
         values[:, i, j] = motion.deformation_rms(times)
-        sound[:, i, j] = schema.window.seen(times) <= motion.trajectory.last_good
+        sound[:, i, j] = schema.window.seen(times) <= motion.last_good
     return StabilityMap(
         (first.name, second.name), units, times, schema.window.stop, values / largest_deformation(predictor), sound
     )

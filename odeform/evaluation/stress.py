@@ -15,7 +15,7 @@ from odeform.evaluation.draws import Draw, draws, shapes, thinned
 from odeform.evaluation.physics import check_physics
 from odeform.evaluation.solvers import check_calibration, check_field, check_orders
 from odeform.model.odeform import ODeform
-from odeform.predictor import Predictor, load
+from odeform.predictor import Predictor, load_reduced
 from odeform.progress import Progress
 from odeform.schema import Window
 from odeform.types import Floats, Geometry
@@ -74,7 +74,7 @@ def _shown(predictor: Predictor, draw: Draw, geometry: Geometry, begin: float) -
 
 def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
     """`count` distinct draws and all checks, as JSON; the same for the same seed, but for wall times."""
-    predictor = load(checkpoint)
+    predictor = load_reduced(checkpoint)
     schema, geometries = predictor.schema, shapes(predictor.rest)
     asked = draws(schema, bool(predictor.qualities), count, seed)
     progress = Progress("stress", len(asked))

@@ -15,11 +15,20 @@ from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
 
 __all__ = ["read_geometry"]
 
+AS_WRITTEN: dict[str, Any] = {
+    ".obj": {"maintain_order": True, "skip_materials": True},
+    ".ply": {"fix_texture": False, "skip_materials": True},
+}
+"""How readers are kept from splitting vertices where texture coordinates differ."""
 MESHES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
 
 
-def read_geometry(path: str | Path) -> Geometry:
-    """A mesh (.obj .ply .stl .glb .off), points (.ply .xyz), or Gaussian splats (.ply .splat .spz)."""
+def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
+    """A mesh (.obj .ply .stl .glb .off), points (.ply .xyz), or Gaussian splats (.ply .splat .spz).
+
+    Vertices of a mesh at one place are merged, so that it is no loose triangles; without `merge` they are as in the
+    file, one by one and in its order, so that those of one frame are those of another.
+    """
     path = Path(path)
     if not path.is_file():
         raise InputError(f"geometry {path}: no such file")
@@ -31,7 +40,7 @@ def read_geometry(path: str | Path) -> Geometry:
         elif suffix == ".xyz":
             geometry = PointCloud(np.loadtxt(path, ndmin=2)[:, [0, 1, 2]])
         elif suffix in MESHES:
-            geometry = _from_trimesh(path)
+            geometry = _from_trimesh(path, merge)
         else:
             expected = ", ".join([*MESHES, ".splat", ".spz", ".xyz"])
             raise InputError(f"geometry {path}: expected one of {expected}, got {suffix or 'no ending'}")
@@ -79,14 +88,14 @@ def _broken(geometry: Geometry) -> NDArray[np.bool_]:
     return broken
 
 
-def _from_trimesh(path: Path) -> Geometry:
-    loaded: Any = trimesh.load(path, process=False)
+def _from_trimesh(path: Path, merge: bool) -> Geometry:
+    loaded: Any = trimesh.load(path, process=False, **({} if merge else AS_WRITTEN.get(path.suffix.lower(), {})))
     if isinstance(loaded, trimesh.Scene):
         if not loaded.geometry:
             raise InputError(f"geometry {path}: contains no mesh")
         loaded = loaded.to_geometry()
     if isinstance(loaded, trimesh.PointCloud):
         return PointCloud(np.asarray(loaded.vertices, dtype=np.float32))
-    if np.isfinite(loaded.vertices).all():  # else it is refused below, by number
+    if merge and np.isfinite(loaded.vertices).all():  # else it is refused below, by number
         loaded.merge_vertices(merge_tex=True, merge_norm=True)
     return Mesh(np.asarray(loaded.vertices, dtype=np.float32), np.asarray(loaded.faces, dtype=np.int32))

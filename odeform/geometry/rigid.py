@@ -3,10 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Floats, Perpoint, Points, Rotations, Vectors
+from odeform.types import Floats, Perpoint, Rotations, Vectors
 
 __all__ = [
     "best_rigid",
+    "body_spin",
     "is_rotation",
     "rotation_from_vector",
     "rotation_z",
@@ -39,6 +40,20 @@ def rotation_from_vector(vector: Vectors) -> Rotations:
     return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
 
 
+def body_spin(vector: Float[np.ndarray, "*#batch 3"], change: Float[np.ndarray, "*#batch 3"]) -> Vectors:
+    """The rotation, in the body's own axes, by which R(w) turns as w (..., 3) changes by (..., 3).
+
+    The right Jacobian of SO(3) (Chirikjian 2012, Stochastic Models, Information Theory, and Lie Groups 2, 10.86).
+    """
+    angle = np.linalg.norm(vector, axis=-1)[..., None]
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, angle)
+    one = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    two = np.where(small, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+    across = np.cross(vector, change)
+    return change - one * across + two * np.cross(vector, across)
+
+
 def vector_from_rotation(rotation: Rotations) -> Vectors:
     """(..., 3, 3) -> (..., 3) rotation vector of angle at most pi, through a unit quaternion for accuracy near pi."""
     from scipy.spatial.transform import Rotation
@@ -68,16 +83,16 @@ def unwrapped_vectors(rotations: Rotations) -> Vectors:
 
 
 def best_rigid(
-    rest: Points, moved: Float[np.ndarray, "*batch points 3"], weights: Perpoint
+    rest: Float[np.ndarray, "*#batch points 3"], moved: Float[np.ndarray, "*batch points 3"], weights: Perpoint
 ) -> tuple[Rotations, Vectors]:
-    """Weighted best-fit rigid motion of `rest` (N, 3) onto `moved` (..., N, 3) (Kabsch 1976).
+    """Weighted best-fit rigid motion of `rest` (N, 3), or one each (..., N, 3), onto `moved` (..., N, 3) (Kabsch 1976).
 
     Returns rotations R (..., 3, 3) and shifts p (..., 3) of the weighted centroid c:
     moved ~ R (rest - c) + c + p. `weights` (N,) sum to 1.
     """
     rest, moved = np.asarray(rest, dtype=float), np.asarray(moved, dtype=float)
-    centre, centres = weights @ rest, np.einsum("n,...ni->...i", weights, moved)
-    cross = np.einsum("n,...ni,nj->...ij", weights, moved - centres[..., None, :], rest - centre)
+    centre, centres = (np.einsum("n,...ni->...i", weights, points) for points in (rest, moved))
+    cross = np.einsum("n,...ni,...nj->...ij", weights, moved - centres[..., None, :], rest - centre[..., None, :])
     u, _, vt = np.linalg.svd(cross)
     sign = np.ones(u.shape[:-1])
     sign[..., 2] = np.linalg.det(u @ vt)

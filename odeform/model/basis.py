@@ -17,7 +17,7 @@ from odeform.types import Basis, Floats, Perpoint, Points
 
 __all__ = ["DisplacementBasis", "fit_basis"]
 
-CHUNK = 8192  # points evaluated at once: bounds memory at a million points
+CHUNK = 2048  # points evaluated at once: as many as stay in the cache with their distances from all centers
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,10 @@ Pairs = Float[np.ndarray, "points centers"]
 
 def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
     """Squared distances, by products: fast, and exact to rounding of the coordinates, which are of order one."""
-    squares = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2.0 * points @ centers.T
-    return np.maximum(squares, 0.0)
+    squares = -2.0 * points @ centers.T
+    squares += (points**2).sum(axis=1)[:, None]
+    squares += (centers**2).sum(axis=1)
+    return np.maximum(squares, 0.0, out=squares)
 
 
 def _cubes(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:

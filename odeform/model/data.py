@@ -5,17 +5,19 @@ import json
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.model.reduced import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
-from odeform.types import Floats, Mesh
+from odeform.types import Floats, Ints, Mesh
 
-__all__ = ["TrainingData", "prepare"]
+__all__ = ["Thinning", "TrainingData", "prepare"]
 
 TRUNCATION = 5e-3
 MOST_MODES = 64
+UNKNOWN = 1e-3  # weight of a frame that a spline through known ones fills in: it holds what nothing else does
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,35 +32,82 @@ class TrainingData:
     weights: Floats
     theta: dict[str, Floats]
     reduced: dict[str, Floats]
+    known: dict[str, Floats]
+    """(S, T) weights of the frames: 1, or `UNKNOWN` where a spline through the known frames fills in."""
     truncation_mm: dict[str, float]
     """RMS of the deformation that the modes leave out, for each split."""
     identity: str
     """SHA-256 of all that went in: the sequences, the frames, the number of modes."""
 
 
-def prepare(
-    dataset: Dataset, modes: int | None = None, window: tuple[int, int] | None = None, every: int = 1
-) -> TrainingData:
+def _largest(motions: list[Floats]) -> float:
+    """Norm of the largest of the vectors (T, n)."""
+    return max(float(np.linalg.norm(motion, axis=1).max()) for motion in motions)
+
+
+@dataclass(frozen=True)
+class Thinning:
+    """Which frames are learned from: those of `window` (half-open; default: the scene's), every k-th of them.
+
+    With `stagger` the frames of different sequences interleave: the i-th keeps frames i, i + k, i + 2 k, ... and the
+    last, as recordings do that are not triggered together. The first, at rest, is always known.
+    """
+
+    window: tuple[int, int] | None = None
+    every: int = 1
+    stagger: bool = False
+
+    def count(self, schema: Schema) -> int:
+        """Frames from the first to the last that is learned from; `InputError` where they do not start at rest, or
+        every k-th of them are too few."""
+        window, rate = self.window, schema.window.rate
+        if window is not None and window[0] != 0:
+            raise InputError(f"window {window[0]}:{window[1]}: expected to start at frame 0, where the body is at rest")
+        stop = schema.window.stop if window is None else min((window[1] - 1) / rate, schema.window.stop)
+        count = round(stop * rate) + 1
+        if self.every < 1 or len(range(0, count, self.every)) < 4:
+            raise InputError(f"every {self.every}: expected at least 4 frames to learn from among {count}")
+        return count if self.stagger else count - (count - 1) % self.every
+
+    def kept(self, count: int, sequence: int) -> Ints:
+        """Frames of so many that the sequence of that index shows."""
+        if not self.stagger:
+            return np.arange(0, count, self.every)
+        return np.unique([0, *range(sequence % self.every, count, self.every), count - 1])
+
+    def filled(self, values: Floats, count: int, sequence: int) -> Floats:
+        """(kept, ...) at the frames that the sequence shows -> (count, ...), a cubic spline between them."""
+        if self.every == 1:
+            return values
+        frames = np.arange(count)
+        return CubicSpline(self.kept(count, sequence), values, axis=0)(frames)
+
+    def weights(self, count: int, sequences: int) -> Floats:
+        """(S, count) of the frames of each sequence."""
+        weights = np.full((sequences, count), UNKNOWN)
+        for sequence, row in enumerate(weights):
+            row[self.kept(count, sequence)] = 1.0
+        return weights
+
+
+def prepare(dataset: Dataset, modes: int | None = None, thinning: Thinning | None = None) -> TrainingData:
     """Decompose all training and validation sequences; fit the deformation basis on the training ones alone.
 
     Without `modes`, as few as leave `TRUNCATION` of the RMS deformation of the validation sequences.
     """
-    schema = dataset.schema
-    if window is not None and window[0] != 0:
-        raise InputError(f"window {window[0]}:{window[1]}: expected to start at frame 0, where the body is at rest")
-    stop = schema.window.stop if window is None else min((window[1] - 1) / schema.window.rate, schema.window.stop)
-    count = round(stop * schema.window.rate) + 1
-    if every < 1 or len(range(0, count, every)) < 4:
-        raise InputError(f"every {every}: expected at least 4 frames to learn from among {count}")
+    schema, thinning = dataset.schema, thinning or Thinning()
+    count = thinning.count(schema)
     poses, locals_, theta = {}, {}, {}
     rest = weights = anchor = times = faces = None
     for split in ("train", "val"):
         poses[split], locals_[split], vectors = [], [], []
-        for recorded in dataset.sequences(split):
-            sequence = recorded.until(stop, every)
+        for index, recorded in enumerate(dataset.sequences(split)):
+            whole = recorded.frames((count - 1) / schema.window.rate, schema.window.rate)
+            kept = thinning.kept(count, index)
+            sequence = replace(whole, times=whole.times[kept], vertices=whole.vertices[kept])
             if anchor is None:
                 anchor = sequence.weights @ sequence.vertices[0].astype(float)
-                weights, times, faces = sequence.weights, sequence.times, sequence.faces
+                weights, times, faces = sequence.weights, whole.times, sequence.faces
                 rest = to_canonical(sequence.vertices[0], anchor, schema.azimuth(sequence.parameters))
             assert rest is not None
             if sequence.vertices.shape[1] != len(rest):
@@ -81,22 +130,22 @@ def prepare(
         split: [np.einsum("tni,nik->tk", local * shares, shapes) for local in locals_[split]] for split in locals_
     }
     total = {split: np.mean([(shares * x**2).sum(axis=(1, 2)).mean() for x in locals_[split]]) for split in locals_}
-    kept = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in locals_}
+    left = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in locals_}
     if modes is None:
-        enough = total["val"] - np.cumsum(kept["val"]) <= TRUNCATION**2 * total["val"]
+        enough = total["val"] - np.cumsum(left["val"]) <= TRUNCATION**2 * total["val"]
         modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
-    largest = (
-        max(float(np.linalg.norm(pose[:, :3], axis=1).max()) for pose in poses["train"]),
-        max(float(np.linalg.norm(c[:, :modes], axis=1).max()) for c in coefficients["train"]),
-    )
+    largest = _largest([p[:, :3] for p in poses["train"]]), _largest([c[:, :modes] for c in coefficients["train"]])
     space = replace(make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor), largest=largest)
-    reduced, truncation = {}, {}
+    reduced, known, truncation = {}, {}, {}
     for split in ("train", "val"):
         pairs = zip(poses[split], coefficients[split], strict=True)
-        reduced[split] = np.stack([np.concatenate([pose, c[:, :modes]], axis=1) for pose, c in pairs])
-        truncation[split] = float(1e3 * np.sqrt(max(total[split] - kept[split][:modes].sum(), 0.0)))
-    rate = 1.0 / float(times[1] - times[0])
+        both = [np.concatenate([pose, c[:, :modes]], axis=1) for pose, c in pairs]
+        reduced[split] = np.stack([thinning.filled(y, count, index) for index, y in enumerate(both)])
+        known[split] = thinning.weights(count, len(both))
+        truncation[split] = float(1e3 * np.sqrt(max(total[split] - left[split][:modes].sum(), 0.0)))
+    rate = schema.window.rate if thinning.stagger else schema.window.rate / thinning.every
     schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
     used = [[entry.name, entry.sha256] for split in ("train", "val") for entry in dataset.select(split)]
-    identity = hashlib.sha256(json.dumps([used, count, every, modes]).encode()).hexdigest()
-    return TrainingData(schema, space, times, rest, weights, theta, reduced, truncation, identity)
+    asked = [used, count, thinning.every, thinning.stagger, modes]
+    identity = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
+    return TrainingData(schema, space, times, rest, weights, theta, reduced, known, truncation, identity)

@@ -19,12 +19,14 @@ class ExpectedError:
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
     the product of a profile over time, a scale that is smooth over the parameters, and a rest whose quantiles about
-    each time, with each sequence's scale told by the others alone, make the band. Beyond the trained ranges or window
-    nothing was validated: there the band doubles with each `width` outside, and grows in proportion to the time.
+    each time, with each sequence's scale told by the others alone, make the band. Beyond the trained ranges nothing was
+    validated: there the band doubles with each `width` outside. Beyond the window it grows in proportion to the time,
+    or as the errors of a continuation did when it foretold the last third of the window, if that is more.
     """
 
     def __init__(self, arrays: Arrays) -> None:
-        """`val.theta` (S, P) in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T); KeyError without them."""
+        """`val.theta` (S, P) in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T); KeyError without them. Of a
+        continuation, `val.later_mm` (S, L) so many frames after the last that it was given."""
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
@@ -36,6 +38,8 @@ class ExpectedError:
         near, count = round(ABOUT * len(profile)), len(profile)
         quantiles = [np.quantile(rest[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
         self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
+        later = arrays.get("val.later_mm", np.zeros((1, 1)))
+        self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
 
     def _smooth(self, theta: Floats, width: float, leave_out: bool = False) -> Floats:
         """(M, P) -> (M,) the log scale there, a kernel mean over the validation sequences."""
@@ -52,5 +56,8 @@ class ExpectedError:
         level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * outside
         stop = self._times[-1]
         profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
-        grown = np.maximum(times / stop, 1.0)[:, None]
-        return np.where(times[:, None] > 0.0, grown * np.exp(profile + level), 0.0)
+        grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)
+        frames = (times - stop) / (self._times[1] - self._times[0])
+        leads = np.arange(len(self._later) + 1.0)
+        later = [np.interp(frames, leads, np.concatenate([[0.0], column])) for column in self._later.T]
+        return np.where(times[:, None] > 0.0, np.maximum(grown, np.stack(later, axis=1)), 0.0)

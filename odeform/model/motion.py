@@ -1,39 +1,21 @@
-"""A motion: any time in, poses and points out."""
+"""The motion of a reduced model: pose and coefficients at any time, and the points that they move."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
 from odeform.model.placed import PlacedBasis
+from odeform.model.predicted import PredictedMotion, SolveStats
 from odeform.model.reduced import ReducedSpace, rotation_of
 from odeform.model.triads import Axes, gradients, moved_covariances
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
-__all__ = ["Motion", "SolveStats", "Trajectory"]
+__all__ = ["Motion", "Trajectory"]
 
-BLOCK = 1 << 22  # points times frames that are worked on at once: 50 MB
-
-
-@dataclass(frozen=True)
-class SolveStats:
-    """How a trajectory came about."""
-
-    solver: str
-    steps: int
-    evaluations: int
-    rejected: int
-    status: str
-    wall_ms: float
-    estimate: Callable[[], float | None] = field(repr=False, compare=False)
-
-    @property
-    def solver_error_mm(self) -> float | None:
-        """Estimated error of the integration alone, not of the model. Made when first read: it costs about a solve."""
-        return self.estimate()
+BLOCK = 1 << 17  # points times frames that are worked on at once: they stay in the cache until they are turned
 
 
 @runtime_checkable
@@ -54,11 +36,8 @@ class Trajectory(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """P(t) = T(t) o D(t)(P0) of one geometry under one set of parameters (paper eq. 4).
-
-    `placed` is the geometry on its way into the basis; `outside` names the parameters beyond their trained range.
-    """
+class Motion(PredictedMotion):
+    """T(t) and D(t) apart: a pose, and coefficients of a basis. `placed` is the geometry on its way into the basis."""
 
     schema: Schema
     parameters: Parameters
@@ -72,19 +51,14 @@ class Motion:
         return self.trajectory.stats
 
     @property
-    def outside(self) -> tuple[str, ...]:
-        return self.schema.outside(self.parameters)
-
-    def extrapolates(self, time: float) -> bool:
-        """Whether `time` lies beyond the trained window."""
-        return not self.schema.window.start <= time <= self.schema.window.stop + 1e-9
+    def last_good(self) -> float:
+        return self.trajectory.last_good
 
     def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
         times = np.atleast_1d(np.asarray(t, dtype=float))
         return self.space.bounded(self.trajectory.reduced(self.schema.window.seen(times)))
 
     def vertices(self, t: float | Times) -> Points | Frames:
-        """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
         y = self._reduced(t)
         rotation, shift = self._rotation_shift(y)
         # deformed and shifted in the body's own axes, which is one product for all times, then turned
@@ -102,7 +76,6 @@ class Motion:
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
-        """T(t), the rigid part: (4, 4) in scene axes, metres; (T, 4, 4) for (T,) times. The identity at rest."""
         rotation, shift = self._rotation_shift(self._reduced(t))
         rotation = rotation @ self._to_canonical_axes
         out = np.zeros((len(rotation), 4, 4))
@@ -112,12 +85,10 @@ class Motion:
         return out[0] if np.ndim(t) == 0 else out
 
     def local(self, t: float | Times) -> Points | Frames:
-        """D(t) - id, the deformation alone, in the frame of the body at rest: (N, 3) or (T, N, 3) metres."""
         out = self._deformation(self._reduced(t)) @ self._to_canonical_axes.astype(np.float32)
         return out[0] if np.ndim(t) == 0 else out
 
     def deformed(self, t: float) -> Points:
-        """D(t)(P0), the deformation alone where the body rests: (N, 3) float32 metres. `pose(t)` takes it on."""
         return self.placed.points + self.local(t)
 
     def gradients(self, t: float) -> Matrices:
@@ -137,21 +108,17 @@ class Motion:
         return u @ vt
 
     def covariances(self, t: float) -> Matrices:
-        """F S F^T, the covariances of splats at time `t`: (N, 3, 3) float32 m^2."""
         y = self._reduced(t)
         return self._moved_covariances(y, self._rotation_shift(y)[0][0])
 
     def deformed_covariances(self, t: float) -> Matrices:
-        """Covariances of splats under the deformation alone, where the body rests: to `deformed` as (N, 3, 3) m^2."""
         return self._moved_covariances(self._reduced(t), self._to_scene_axes)
 
     def deformation_bound(self, time: float) -> float:
-        """No point is displaced locally by more than this at `time`, in metres."""
         y = self._reduced(time)
         return float(np.abs(y[0, 6:]) @ self.placed.reach)
 
     def deformation_rms(self, times: Times) -> Times:
-        """(T,) root-mean-square local displacement over the surface in metres."""
         y = self._reduced(times)
         return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", y[:, 6:], self.placed.gram, y[:, 6:]), 0.0))
 

@@ -15,7 +15,7 @@ from odeform.model.config import ModelConfig
 from odeform.model.reduced import POSE
 from odeform.solver.rollout import Branch, roll_out
 
-__all__ = ["ODeformNet", "ShapeEncoder"]
+__all__ = ["Decoder", "ODeformNet", "ShapeEncoder"]
 
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:

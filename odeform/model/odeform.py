@@ -1,10 +1,14 @@
 """ODeform, ready to predict."""
 
+from functools import cached_property
+
 import numpy as np
+from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.model.base import ReducedModel
 from odeform.model.config import ModelConfig
+from odeform.model.continuation import ContinuedTrajectory, Dynamics
 from odeform.model.inference import (
     Decoder,
     Field,
@@ -15,10 +19,13 @@ from odeform.model.inference import (
     make_field,
     pool_shape,
 )
+from odeform.model.motion import Trajectory
 from odeform.model.placed import PlacedBasis
+from odeform.model.reduced import POSE
+from odeform.model.sensitivity import Sensitivities, make_sensitivities
 from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
-from odeform.types import Floats
+from odeform.types import Floats, Times
 
 __all__ = ["ODeform"]
 
@@ -31,6 +38,7 @@ class ODeform(ReducedModel):
     model = "odeform"
 
     def _read(self, checkpoint: Checkpoint) -> None:
+        super()._read(checkpoint)
         network = checkpoint.config["network"]
         self.config = ModelConfig(**{**network, "decoder_widths": tuple(network["decoder_widths"])})
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
@@ -40,6 +48,8 @@ class ODeform(ReducedModel):
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
+        coordinates = POSE + self.config.modes
+        self.dynamics = Dynamics.from_arrays(checkpoint.arrays, coordinates, self.config.parameters)
         self._pooled: tuple[PlacedBasis | None, list[Floats]] = (None, [])
 
     def _pool(self, placed: PlacedBasis) -> list[Floats]:
@@ -50,11 +60,13 @@ class ODeform(ReducedModel):
             self._pooled = (placed, pooled)
         return pooled
 
-    def _trajectory(
-        self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float
-    ) -> LatentTrajectory:
+    def _trajectory(self, theta: Floats, placed: PlacedBasis, quality: Quality | None, until: float) -> Trajectory:
         assert quality is not None
-        return self.integrate(theta, placed, quality, until)
+        if self.dynamics is None:
+            return self.integrate(theta, placed, quality, until)
+        window = self.schema.window
+        known = self.integrate(theta, placed, quality, min(until, window.stop))
+        return ContinuedTrajectory(known, self.dynamics, theta, window)
 
     def problem(self, theta: Floats, placed: PlacedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
         """The initial value problem of parameters in [-1, 1]: field, state at time 0, and the decoder of states."""
@@ -65,3 +77,13 @@ class ODeform(ReducedModel):
         field, start, decode = self.problem(theta, placed, np.float32 if quality.dtype == "float32" else np.float64)
         fallback = Quality("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
         return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.arm)
+
+    def sensitivities(self, theta: Floats, times: Times, quality: Quality) -> Float[np.ndarray, "jet times y"]:
+        """(1 + P, T, 6 + K): the motion y of the trained body under theta (P,) in [-1, 1] at (T,) seconds, and its
+        derivatives by each parameter. Not of what is continued beyond the window."""
+        body = self.place(self.rest, 0.0)
+        return self._sensitivities(self._pool(body), theta, quality, self.schema.window.seen(times))
+
+    @cached_property
+    def _sensitivities(self) -> Sensitivities:
+        return make_sensitivities(self.weights, self.config)

@@ -1,7 +1,7 @@
 """A motion that was simulated or measured, shown as models' motions are."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
 from odeform.geometry.shape import surface_shares
-from odeform.model.motion import SolveStats
+from odeform.model.predicted import SolveStats
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, Mesh, Points, Pose, Sequence, Times
 
@@ -22,6 +22,8 @@ class RecordedMotion:
 
     schema: Schema
     sequence: Sequence
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    """What its data set leaves fixed: it may be a parameter of a model."""
 
     @cached_property
     def geometry(self) -> Mesh:
@@ -30,6 +32,11 @@ class RecordedMotion:
     @property
     def parameters(self) -> Parameters:
         return self.sequence.parameters
+
+    @property
+    def setting(self) -> Parameters:
+        """What was varied, and what was not."""
+        return {**self.fixed, **self.parameters}
 
     @property
     def rate(self) -> float:

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 POSE = 6  # numbers of the rigid part of y
-MARGIN = 1.25  # times the largest that was trained, up to which shifts and deformations are as predicted
+MARGIN = 1.15  # times the largest that was trained, up to which shifts and deformations are as predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +52,10 @@ class ReducedSpace:
     largest: tuple[float, float] = (float("inf"), float("inf"))
 
     def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
-        """(T, 6 + K), to the last bit as they are up to shifts and deformations a quarter larger than any trained.
+        """(T, 6 + K), to the last bit as they are up to shifts and deformations 15 % larger than any trained.
 
         Beyond, by parameters or times far from those trained or by a solver too coarse, they grow ever less, and never
-        to half as much again: a body keeps its shape and its place whatever is asked.
+        to 30 % more: a body keeps its shape and its place whatever is asked.
         """
         for part, largest in zip((slice(0, 3), slice(POSE, None)), self.largest, strict=True):
             limit = MARGIN * largest
@@ -110,7 +110,7 @@ def decompose(sequence: Sequence, anchor: Vector, azimuth: float) -> tuple[Float
     return pose, local
 
 
-def fit_modes(locals_: list[Frames], weights: Perpoint, modes: int) -> Basis:
+def fit_modes(locals_: list[Float[np.ndarray, "_ points 3"]], weights: Perpoint, modes: int) -> Basis:
     """POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the weights."""
     root = np.sqrt(weights)[:, None]
     covariance = np.zeros((3 * len(weights), 3 * len(weights)))

@@ -10,7 +10,7 @@ from odeform.errors import InputError
 from odeform.schema import Schema
 from odeform.types import Mesh, Sequence
 
-__all__ = ["Scene", "get_scene"]
+__all__ = ["Scene", "get_scene", "known_scenes"]
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,16 @@ class Scene:
         ]
 
 
-def get_scene(name: str) -> Scene:
-    """The scene of that name."""
+def known_scenes() -> dict[str, Scene]:
+    """All that can be simulated, by name."""
     from odeform.simulation import kick, mass_elastic
 
-    scenes = {scene.schema.scene: scene for scene in (mass_elastic.SCENE, kick.SCENE)}
+    return {scene.schema.scene: scene for scene in (mass_elastic.SCENE, kick.SCENE)}
+
+
+def get_scene(name: str) -> Scene:
+    """The scene of that name."""
+    scenes = known_scenes()
     if name not in scenes:
         raise InputError(f"unknown scene {name!r}: expected one of {', '.join(scenes)}")
     return scenes[name]

@@ -11,24 +11,29 @@ __all__ = ["EXACT", "FrontierPoint", "cheapest_within_error", "finest_within_bud
 
 EXACT = Quality("dopri5", tolerance=1e-10, dtype="float64")
 """What solver errors are measured against."""
+MEASURED = ("evaluations", "solver_error_mm", "deformation_error_mm")
 
 
 @dataclass(frozen=True)
 class FrontierPoint:
-    """A way to integrate, the field evaluations it takes on average, and its solver error in RMS mm."""
+    """A way to integrate, the field evaluations it takes on average, and its solver error in RMS mm.
+
+    `deformation_error_mm` is that of the deformation alone, which is small beside the way that a body goes.
+    """
 
     quality: Quality
     evaluations: float
     solver_error_mm: float
+    deformation_error_mm: float
 
     def to_json(self) -> dict[str, Any]:
-        return {**self.quality.to_json(), "evaluations": self.evaluations, "solver_error_mm": self.solver_error_mm}
+        return {**self.quality.to_json(), **{name: getattr(self, name) for name in MEASURED}}
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "FrontierPoint":
         setting = dict(data)
-        evaluations, error = setting.pop("evaluations"), setting.pop("solver_error_mm")
-        return cls(Quality(**setting), float(evaluations), float(error))
+        measured = [float(setting.pop(name)) for name in MEASURED]
+        return cls(Quality(**setting), *measured)
 
 
 def non_dominated(points: Iterable[FrontierPoint]) -> tuple[FrontierPoint, ...]:
@@ -40,9 +45,14 @@ def non_dominated(points: Iterable[FrontierPoint]) -> tuple[FrontierPoint, ...]:
     return tuple(kept)
 
 
-def cheapest_within_error(frontier: Sequence[FrontierPoint], error_mm: float) -> FrontierPoint:
-    """The cheapest point whose solver error is at most `error_mm`; the finest where none is."""
-    return next((point for point in _known(frontier) if point.solver_error_mm <= error_mm), frontier[-1])
+def cheapest_within_error(
+    frontier: Sequence[FrontierPoint], error_mm: float, deformation_mm: float = float("inf")
+) -> FrontierPoint:
+    """The cheapest point whose solver errors, of all and of the deformation, are at most these; else the finest."""
+    return next(
+        (p for p in _known(frontier) if p.solver_error_mm <= error_mm and p.deformation_error_mm <= deformation_mm),
+        frontier[-1],
+    )
 
 
 def finest_within_budget(

@@ -24,9 +24,9 @@ class Status(Enum):
 class Solution:
     """A trajectory known at the nodes of its steps and between them.
 
-    States may be numpy arrays or torch tensors of any shape. `slopes[i]` is the field at node i; `middles[i]` the
-    state half-way through step i for methods with a quartic interpolant. Grows at its end only (see `integrate`),
-    so what it says of a time never changes.
+    States are numpy arrays (n,). `slopes[i]` is the field at node i; `middles[i]` the state half-way through step i for
+    methods with a quartic interpolant. Grows at its end only (see `integrate`), so what it says of a time never
+    changes.
     """
 
     times: list[float]
@@ -37,6 +37,8 @@ class Solution:
     rejected: int = 0
     status: Status = Status.OK
     next_step: float = 0.0
+    last_ratio: float = 1.0
+    """The estimated error of the last step over the tolerance, where steps are controlled."""
 
     @property
     def steps(self) -> int:
@@ -61,7 +63,7 @@ class Solution:
         return _between(weights, y0, y1, f0, f1, middle)
 
     def sample(self, times: Floats) -> Any:
-        """(T, ...) states at `times`, numpy states only: to the last bit what `at` gives, many in one go."""
+        """(T, ...) states at `times`: to the last bit what `at` gives, many in one go."""
         if self.steps == 0 or len(times) == 1:
             return np.stack([self.at(float(time)) for time in times])
         nodes = np.asarray(self.times)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 __all__ = ["FREE", "TrainConfig"]
 
 LENGTH = ("minutes", "steps", "report", "refine")
-END = ("random_features", "components", "sharpnesses", "ridges", "between", "deformed")
+END = ("random_features", "widening", "components", "sharpnesses", "ridges", "between", "deformed")
 FREE = (*LENGTH, *END)
 """Settings that may change when a training is resumed: of its length, and of what is solved for at its end."""
 
@@ -15,7 +15,7 @@ class TrainConfig:
     """How to train."""
 
     minutes: float = 30.0
-    """Wall time, unless `steps` are given."""
+    """Of processor time, which a busy machine does not stretch, unless `steps` are given."""
     steps: int | None = None
     """So many steps, however long they take: the same result on a busy machine."""
     seed: int = 0
@@ -33,6 +33,8 @@ class TrainConfig:
     """Of random features: among these and `ridges`, validation chooses for each decoder."""
     ridges: tuple[float, ...] = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
     """Of the last solve."""
+    widening: float = 0.33
+    """Share of the minutes that goes to the random features; where it does not suffice, there are fewer."""
     between: float = 0.1
     """Weight in the last solve, relative to that of a frame, of the spline through the truth halfway between frames."""
     deformed: float = 4.0

@@ -17,14 +17,14 @@ from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
 from odeform.training.config import TrainConfig
 from odeform.training.trainer import Trainer
-from odeform.training.widening import widen
+from odeform.training.widening import affordable, widen
 from odeform.types import Arrays
 
-__all__ = ["network_weights", "train_network"]
+__all__ = ["network_weights", "small_batches", "train_network"]
 
 
 @contextmanager
-def _small_batches() -> Iterator[None]:
+def small_batches() -> Iterator[None]:
     """One thread of the processor: batches are small, and results do not depend on the number of cores.
 
     Denormal numbers slow such a run thirty-fold on some processors; elsewhere they count (SciPy's k-d tree recurses
@@ -42,8 +42,8 @@ def _small_batches() -> Iterator[None]:
 
 def _descend(trainer: Trainer, config: TrainConfig, report: Callable[[str], None], part: Path | None) -> None:
     """Take steps until the budget of `config` is spent."""
-    seconds = 60.0 * config.minutes
-    begin, printed = time.monotonic() - trainer.elapsed, trainer.elapsed
+    seconds = 60.0 * config.minutes * (1.0 - config.widening * bool(config.random_features))
+    begin, printed = time.process_time() - trainer.elapsed, trainer.elapsed
 
     def spent() -> float:
         """The share of the budget."""
@@ -53,7 +53,7 @@ def _descend(trainer: Trainer, config: TrainConfig, report: Callable[[str], None
     try:
         while (share := spent()) < 1.0:
             trainer.advance(share)
-            trainer.elapsed = time.monotonic() - begin
+            trainer.elapsed = time.process_time() - begin
             if trainer.elapsed - printed > config.report:
                 printed = trainer.elapsed
                 trainer.solve_readout(config.ridge)
@@ -81,10 +81,12 @@ def train_network(
 
     The state goes to the file `part` at every report and when interrupted; `resume` continues from there.
     """
-    with _small_batches():
+    begin = time.process_time()
+    with small_batches():
         trainer = Trainer(net, data, config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
         if resume and part is not None:
             trainer.restore(part)
+            begin -= trainer.elapsed
             report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
         elif part is not None and part.exists():
             report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
@@ -92,7 +94,10 @@ def train_network(
     if part is not None:
         trainer.save(part)
     if config.random_features:
-        widen(trainer)
+        count = config.random_features
+        if config.steps is None:
+            count = affordable(trainer, 60.0 * config.minutes * config.widening)
+        widen(trainer, count)
     else:
         trainer.solve_readout(config.ridge)
     rigid, local = trainer.errors_mm("val")
@@ -101,7 +106,7 @@ def train_network(
         "val_rigid_rmse_mm": rigid,
         "val_deformation_rmse_mm": local,
         "steps": trainer.done,
-        "seconds": trainer.elapsed,
+        "seconds": time.process_time() - begin,
     }
 
 

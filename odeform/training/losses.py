@@ -23,10 +23,13 @@ class Metric(nn.Module):
         scale[3:POSE] *= arm * (2.0 / 3.0) ** 0.5
         self.register_buffer("scale", scale)
 
-    def forward(self, predicted: torch.Tensor, truth: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """(..., 6 + K) whitened -> L_rigid and L_points, mean mm^2 a frame."""
+    def forward(
+        self, predicted: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """(..., 6 + K) whitened, weights (...) -> L_rigid and L_points, mean mm^2 a frame."""
         squared = ((predicted - truth) * self.scale) ** 2
-        return squared[..., :POSE].sum(dim=-1).mean(), squared[..., POSE:].sum(dim=-1).mean()
+        rigid, local = (part.sum(dim=-1) for part in squared.tensor_split((POSE,), dim=-1))
+        return (weights * rigid).sum() / weights.sum(), (weights * local).sum() / weights.sum()
 
 
 def balanced(*losses: torch.Tensor) -> torch.Tensor:

@@ -9,30 +9,32 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.model.data import TrainingData
 from odeform.model.odeform import ODeform
-from odeform.model.reduced import motion_rmse
+from odeform.model.reduced import POSE, motion_rmse
 from odeform.solver.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
 from odeform.solver.integrate import Quality
 from odeform.types import Floats
 
 __all__ = ["choose_qualities", "measure_frontier", "with_qualities"]
 
-SHARES = {"draft": 1.0, "balanced": 0.1}
-"""Solver error that a quality may add, as a share of the model's own. A tenth adds half a per cent to the total."""
+SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
+"""Solver error that a quality may add, as a share of the model's own: of all, and of the deformation alone. A tenth
+adds half a per cent to the total, three tenths four to the deformation."""
 
 
 def _candidates(step: float) -> list[Quality]:
-    tolerances = [float(f"{10.0**-power:.1g}") for power in np.arange(2.0, 7.25, 0.5)]
+    tolerances = [float(f"{digit}e-{power}") for power in range(2, 8) for digit in (6, 4, 3, 2, 1)]
     adaptive = [Quality(method, tolerance=t) for method in ("bosh3", "dopri5") for t in tolerances]
     fixed = [Quality("midpoint", step=step * factor) for factor in (2.0, 1.0, 0.5)]
     fixed += [Quality("rk4", step=step * factor) for factor in (4.0, 2.0, 1.0, 0.5, 0.25)]
     return [*adaptive, *fixed]
 
 
-def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], float]:
-    """The settings worth choosing from, and the model's own error in mm, over the validation sequences.
+def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
+    """The settings worth choosing from, and the model's own errors in mm, over the validation sequences.
 
     The solver's error is that against tolerance 1e-10 in double precision, the model's that of this reference against
-    the data; both are root mean squares over the body's points and coordinates, and over time.
+    the data, of all and of the deformation alone; both are root mean squares over the body's points and coordinates,
+    and over time.
     """
     placed = model.place(model.rest, 0.0)
 
@@ -43,28 +45,35 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
         reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
-    def error_mm(motion: Floats, truth: Floats) -> float:
-        return 1e3 * motion_rmse(motion[:, 1:], truth[:, 1:], data.space.arm)
+    def errors_mm(motion: Floats, truth: Floats) -> tuple[float, float]:
+        motion, truth = motion[:, 1:], truth[:, 1:]
+        stiff = np.concatenate([truth[..., :POSE], motion[..., POSE:]], axis=-1)
+        of_all, of_deformation = (motion_rmse(one, truth, data.space.arm) for one in (motion, stiff))
+        return 1e3 * of_all, 1e3 * of_deformation
 
     truth, _ = motions(EXACT)
     points = []
     for quality in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(quality)
-        points.append(FrontierPoint(quality, evaluations, error_mm(reduced, truth)))
-    return non_dominated(points), error_mm(truth, data.reduced["val"])
+        points.append(FrontierPoint(quality, evaluations, *errors_mm(reduced, truth)))
+    return non_dominated(points), errors_mm(truth, data.reduced["val"])
 
 
 def choose_qualities(
-    frontier: Sequence[FrontierPoint], model_error_mm: float, shares: Mapping[str, float] = SHARES
+    frontier: Sequence[FrontierPoint],
+    model_errors_mm: tuple[float, float],
+    shares: Mapping[str, tuple[float, float]] = SHARES,
 ) -> dict[str, Any]:
-    """Settings of each quality: the cheapest whose error keeps to its share of the model's, and the finest of all."""
-    chosen = {name: cheapest_within_error(frontier, share * model_error_mm) for name, share in shares.items()}
+    """Settings of each quality: the cheapest whose errors keep to their shares of the model's; the finest of all."""
+    chosen = {
+        name: cheapest_within_error(frontier, *np.multiply(share, model_errors_mm)) for name, share in shares.items()
+    }
     return {name: point.quality.to_json() for name, point in {**chosen, "reference": frontier[-1]}.items()}
 
 
 def with_qualities(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
     """The checkpoint of a trained model, with its frontier and the qualities on it: the solver may add to the model's
     error, not more."""
-    frontier, error_mm = measure_frontier(ODeform(checkpoint), data)
-    settings = {"qualities": choose_qualities(frontier, error_mm), "frontier": [p.to_json() for p in frontier]}
+    frontier, errors_mm = measure_frontier(ODeform(checkpoint), data)
+    settings = {"qualities": choose_qualities(frontier, errors_mm), "frontier": [p.to_json() for p in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})

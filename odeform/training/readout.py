@@ -22,10 +22,9 @@ class NormalEquations:
     def __init__(self) -> None:
         self._gram: torch.Tensor | None = None
 
-    def add(self, features: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor | None = None) -> None:
+    def add(self, features: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor) -> None:
         """(T, B, F) and (T, B, outputs), with weights (T, B) of squares; without frame 0, where both vanish."""
-        if weights is not None:
-            features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
+        features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
         x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
         gram, cross = x.T @ x, x.T @ y
         self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)

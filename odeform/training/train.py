@@ -10,22 +10,31 @@ from typing import Any
 
 import numpy as np
 
+from odeform.baselines.direct import Direct
 from odeform.baselines.nearest import fit_nearest
+from odeform.baselines.node import Node
+from odeform.baselines.occupancy_flow import OccupancyFlow
+from odeform.baselines.odeform_per_point import OdeformPerPoint
 from odeform.baselines.pod_rbf import fit_pod_rbf
+from odeform.baselines.rnn import Rnn
 from odeform.checkpoint import Checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.residuals import validation_residuals
-from odeform.model.data import TrainingData, prepare
+from odeform.model.data import Thinning, TrainingData, prepare
 from odeform.model.odeform import PREFIX
 from odeform.predictor import load
+from odeform.simulation.scene import known_scenes
+from odeform.training.continuation import with_continuation
+from odeform.training.point_data import prepare_points
 from odeform.training.qualities import with_qualities
 from odeform.types import Arrays, Mesh
 
-__all__ = ["MODELS", "TrainRequest", "train"]
+__all__ = ["MODELS", "POINTS", "TrainRequest", "rest_of", "train", "train_command"]
 
-MODELS = ("odeform", "pod-rbf", "nearest")
+POINTS = {model.model: model for model in (OdeformPerPoint, Node, Rnn, Direct, OccupancyFlow)}
+MODELS = ("odeform", *POINTS, "pod-rbf", "nearest")
 
 
 @dataclass(frozen=True)
@@ -39,7 +48,44 @@ class TrainRequest:
     """Of training, in place of minutes."""
     window: tuple[int, int] | None = None
     every: int = 1
+    stagger: bool = False
+    """Every k-th frame of each sequence, but not the same of all."""
     resume: bool = False
+
+
+def rest_of(dataset: Dataset) -> Mesh:
+    """The body as viewers show it: the scene's fine mesh, or of imported data the first training sequence's own."""
+    scene = known_scenes().get(dataset.schema.scene)
+    if scene is not None:
+        return scene.rest_mesh()
+    first = next(dataset.sequences("train"), None)
+    if first is None:
+        raise InputError(f"{dataset.root}: no sequence in split train")
+    return first.rest
+
+
+def _learn_reduced(
+    dataset: Dataset, request: TrainRequest, report: Callable[[str], None], body: Arrays, part: Path
+) -> Checkpoint:
+    """Models of pose and deformation."""
+    data = prepare(dataset, None, Thinning(request.window, request.every, request.stagger))
+    modes = data.space.basis.modes
+    report(
+        f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
+        f"{modes} modes leave {data.truncation_mm['val']:.3f} mm of the deformation (val)"
+    )
+    if request.model == "odeform":
+        arrays, settings = _fit_odeform(data, request, report, part)
+    else:
+        arrays, settings = {"pod-rbf": fit_pod_rbf, "nearest": fit_nearest}[request.model](data)
+    checkpoint = Checkpoint(
+        model=request.model,
+        schema=data.schema,
+        config={"space": data.space.to_json(), **settings},
+        arrays={**arrays, **data.space.arrays(), **body, "training.theta": data.theta["train"].astype(np.float32)},
+        provenance={"truncation_mm": data.truncation_mm},
+    )
+    return with_continuation(with_qualities(checkpoint, data), data) if request.model == "odeform" else checkpoint
 
 
 def _fit_odeform(
@@ -56,6 +102,22 @@ def _fit_odeform(
     return {PREFIX + name: value for name, value in network_weights(net).items()}, settings
 
 
+def _learn_points(dataset: Dataset, request: TrainRequest, report: Callable[[str], None], body: Arrays) -> Checkpoint:
+    """Models of where each point goes."""
+    from odeform.training.points import Budget, fit_points
+
+    between = POINTS[request.model].network.teaching == "between"
+    if between and request.every < 2:
+        raise InputError(f"{request.model}: moves between given frames, expected --every of at least 2")
+    every, given = (1, request.every) if between else (request.every, 1)
+    data = prepare_points(dataset, Thinning(request.window, every, request.stagger and not between), given)
+    report(f"{request.model} on {len(data.theta['train'])} sequences of {data.moved['train'].shape[1]} frames")
+    budget = Budget(60.0 * request.minutes, request.steps)
+    checkpoint = fit_points(request.model, POINTS[request.model].network, data, budget, request.seed, report)
+    arrays = {**checkpoint.arrays, **body, "training.theta": data.theta["train"].astype(np.float32)}
+    return replace(checkpoint, arrays=arrays)
+
+
 def train(
     dataset: Dataset, rest: Mesh, out: str | Path, request: TrainRequest, report: Callable[[str], None]
 ) -> Checkpoint:
@@ -68,44 +130,27 @@ def train(
     part = Path(f"{out}.part")
     if request.resume and (request.model != "odeform" or not part.exists()):
         raise InputError(f"--resume: expected {part}, which an interrupted training of odeform leaves")
-    begin = time.monotonic()
-    data = prepare(dataset, None, request.window, request.every)
-    modes = data.space.basis.modes
-    report(
-        f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
-        f"{modes} modes leave {data.truncation_mm['val']:.3f} mm of the deformation (val)"
-    )
-    if request.model == "odeform":
-        arrays, settings = _fit_odeform(data, request, report, part)
+    begin = time.process_time()
+    body = {
+        "rest.points": np.asarray(rest.points, dtype=np.float32),
+        "rest.faces": np.asarray(rest.faces, dtype=np.int32),
+    }
+    if request.model in POINTS:
+        learned = _learn_points(dataset, request, report, body)
     else:
-        arrays, settings = {"pod-rbf": fit_pod_rbf, "nearest": fit_nearest}[request.model](data)
+        learned = _learn_reduced(dataset, request, report, body, part)
     provenance = {
         "command": _command(dataset, request),
         "dataset": dataset.provenance,
         "fixed": dataset.fixed,
         "seed": request.seed,
         # over all sittings of a resumed training
-        "training_seconds": round(settings["val"]["seconds"] if "val" in settings else time.monotonic() - begin, 1),
+        "training_seconds": round(learned.config.get("val", {}).get("seconds", time.process_time() - begin), 1),
         "machine": platform.processor() or platform.machine(),
         "versions": {name: version(name) for name in ("odeform", "numpy", "torch")},
-        "truncation_mm": data.truncation_mm,
+        **learned.provenance,
     }
-    checkpoint = Checkpoint(
-        model=request.model,
-        schema=data.schema,
-        config={"space": data.space.to_json(), **settings},
-        arrays={
-            **arrays,
-            **data.space.arrays(),
-            # viewers show where the model was taught
-            "training.theta": data.theta["train"].astype(np.float32),
-            "rest.points": np.asarray(rest.points, dtype=np.float32),
-            "rest.faces": np.asarray(rest.faces, dtype=np.int32),
-        },
-        provenance=provenance,
-    )
-    if request.model == "odeform":
-        checkpoint = with_qualities(checkpoint, data)
+    checkpoint = replace(learned, provenance=provenance)
     write_checkpoint(out, checkpoint)
     arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
     checkpoint = replace(checkpoint, arrays=arrays)
@@ -120,12 +165,20 @@ def train(
 
 def _command(dataset: Dataset, request: TrainRequest) -> list[str]:
     made = dataset.provenance
+    if "imported" in made:
+        return [f"odeform import {made['imported']} --out DIR", train_command(request)]
     simulate = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
     simulate += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
     simulate += " --corners" if made.get("corners") else ""
+    return [simulate, train_command(request)]
+
+
+def train_command(request: TrainRequest) -> str:
+    """What it is on the command line, without the files."""
     options = f" --model {request.model} --seed {request.seed}"
-    if request.model == "odeform":
+    if request.model == "odeform" or request.model in POINTS:
         options += f" --minutes {request.minutes:g}" if request.steps is None else f" --steps {request.steps}"
     options += f" --window {request.window[0]}:{request.window[1]}" if request.window else ""
     options += f" --every {request.every}" if request.every > 1 else ""
-    return [simulate, f"odeform train DIR --out FILE{options}"]
+    options += " --stagger" if request.stagger else ""
+    return f"odeform train DIR --out FILE{options}"

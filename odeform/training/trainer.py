@@ -48,6 +48,7 @@ class Trainer:
             k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
             for k, v in data.reduced.items()
         }
+        self.known = {k: torch.as_tensor(v).float().T.contiguous().to(device) for k, v in data.known.items()}
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.times = torch.as_tensor(data.times).float().to(device)
         frame = float(data.times[1] - data.times[0])
@@ -82,6 +83,7 @@ class Trainer:
     def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
         """Of a batch, after its readout has been solved for."""
         theta, truth = self.theta["train"][rows], self.truth["train"][: frames + 1, rows]
+        known = self.known["train"][: frames + 1, rows]
         states = self.states(theta, self.draw_counts(frames))
         told = self.net.told(self.times[: frames + 1], theta)
         predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
@@ -89,10 +91,10 @@ class Trainer:
             features = decoder.features(states[..., place], told)
             readout = NormalEquations()
             # every other frame tells as much, and a solve costs as much as the roll-out
-            readout.add(features.detach()[::2], truth[::2][..., out])
+            readout.add(features.detach()[::2], truth[::2][..., out], known[::2])
             decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
             predicted.append(decoder.readout(features))
-        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:])[-len(self.outputs) :])
+        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:], known[1:])[-len(self.outputs) :])
 
     def advance(self, share: float) -> None:
         """One step of descent."""
@@ -126,21 +128,24 @@ class Trainer:
             equations = NormalEquations()
             for rows in torch.arange(states.shape[1]).split(CHUNK):
                 features = decoder.features(states[:, rows][..., place], told[:, rows])
-                equations.add(features, self.truth["train"][:, rows][..., out])
+                equations.add(features, self.truth["train"][:, rows][..., out], self.known["train"][:, rows])
             decoder.readout.weight.data = equations.solve(ridge).to(decoder.readout.weight.dtype)
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         predicted = self.net.decode(self.paths(split)[::2], self.times, self.theta[split])
-        rigid, local = (torch.stack(self.metric(predicted[1:], self.truth[split][1:])) / 3.0).sqrt().tolist()
+        missed = self.metric(predicted[1:], self.truth[split][1:], self.known[split][1:])
+        rigid, local = (torch.stack(missed) / 3.0).sqrt().tolist()
         return rigid, local
 
     def double(self) -> None:
         """Go on in double precision."""
         self.net.double()
         self.metric.double()
-        self.truth, self.theta = ({k: v.double() for k, v in x.items()} for x in (self.truth, self.theta))
+        self.truth, self.known, self.theta = (
+            {k: v.double() for k, v in x.items()} for x in (self.truth, self.known, self.theta)
+        )
         self.shape = self.shape[0].double(), self.shape[1].double()
         self.times = self.times.double()
 

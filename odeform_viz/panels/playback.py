@@ -1,5 +1,6 @@
 """Time: a slider past the trained window, play and pause, speed, steps."""
 
+import asyncio
 from collections.abc import Callable
 
 import viser
@@ -29,6 +30,7 @@ class PlaybackPanel:
         """`largest` finds the moment of the largest deformation; `say` shows a message."""
         self._say = say
         self._clock, self._wake, self._window, self._largest = clock, wake, window, largest
+        self._asked = 0  # moments that a hand has asked for: a peak takes a while to find, and may come too late
         span = window.stop - window.start
         with server.gui.add_folder("Time"):
             self._time = server.gui.add_slider(
@@ -44,7 +46,7 @@ class PlaybackPanel:
             self._play = server.gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._play.on_click(lambda _: self.toggle())
             go = server.gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
-            go.on_click(lambda event: self.step(event.target.value))
+            go.on_click(self._clicked)
             go.hint = "start, frame before, frame after, largest deformation"
             self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
             self._speed.on_update(lambda _: self._changed())
@@ -60,10 +62,15 @@ class PlaybackPanel:
                 self._say(f"time: expected seconds from {self._time.min:g} to {self._time.max:g}, got {moment:g}")
                 self.show(self._clock.time())
                 return
-            self._clock.pause()
-            self._clock.seek(moment)
-            self._refresh_button()
-            self._wake()
+            self._asked += 1
+            self.jump(moment)
+
+    async def _clicked(self, event: viser.GuiEvent) -> None:
+        which, self._asked = event.target.value, self._asked + 1
+        if which == "peak":
+            await asyncio.to_thread(self._to_peak, self._asked)
+        else:
+            self._to_frame(which)
 
     def _changed(self) -> None:
         if self._speed.value in SPEEDS:
@@ -80,15 +87,23 @@ class PlaybackPanel:
 
     def step(self, which: str) -> None:
         """To the `start`, the frame before (`◀`) or after (`▶`), or the `peak` of the deformation."""
+        self._asked += 1
+        self._to_peak(self._asked) if which == "peak" else self._to_frame(which)
+
+    def _to_frame(self, which: str) -> None:
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
-        if which == "peak":
-            try:
-                self.jump(self._largest())
-            except InputError as error:
-                self._say(str(error))
-        elif which in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
+        if which in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
             self.jump(self._window.start + max(steps[which], 0) * frame)
+
+    def _to_peak(self, asked: int) -> None:
+        try:
+            peak = self._largest()
+        except InputError as error:
+            self._say(str(error))
+            return
+        if asked == self._asked:
+            self.jump(peak)
 
     def jump(self, moment: float) -> None:
         """Pause at a moment."""

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import viser
 
+from odeform.model.predicted import PredictedMotion
 from odeform_viz.heat import BANDS
 from odeform_viz.session import ColumnFrame, Frame
 
@@ -12,27 +13,28 @@ __all__ = ["MomentPanel", "StatusPanel", "describe", "moment_in_words"]
 
 
 def moment_in_words(frame: Frame) -> str:
-    """Where the moment lies: on a trained frame, between two, or beyond; and parameters outside of what was trained."""
+    """Where the moment lies, and what is wrong: below the floor, or not to be shown."""
+    words = [_place_in_time(frame)]
+    if sunk := [shown.column.label for shown in frame.columns if shown.sunk]:
+        deepest = max(shown.depth for shown in frame.columns)
+        words.append(f"⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor")
+    return "  \n".join([*words, *(f"⚠ **{reason}**" for reason in frame.refused)])
+
+
+def _place_in_time(frame: Frame) -> str:
+    """On a trained frame, between two, or beyond; and parameters outside of what was trained."""
     models = [shown for shown in frame.columns if shown.column.predictor]
-    if not frame.columns:
-        return "nothing shown"
     if not models:
-        return "the truth alone"
+        return "the truth alone" if frame.columns else "nothing shown"
     motion, time = models[0].motion, frame.wish.time
     beyond = list(dict.fromkeys(name for shown in models for name in shown.motion.outside))
     if motion.extrapolates(time):
         beyond.insert(0, "time")
-    sunk = [shown.column.label for shown in frame.columns if shown.sunk]
-    words = f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained, where motions fade" if beyond else ""
-    if not words:
-        window = motion.schema.window
-        phase = (time - window.start) * window.rate
-        on = abs(phase - round(phase)) < 0.02
-        words = "as trained, " + ("on a trained frame" if on else "between two frames")
-    if sunk:
-        deepest = max(shown.depth for shown in frame.columns)
-        words += f"  \n⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor"
-    return words
+    if beyond:
+        return f"⚠ **extrapolated**: {', '.join(beyond)} beyond what was trained"
+    window = motion.schema.window
+    phase = (time - window.start) * window.rate
+    return "as trained, " + ("on a trained frame" if abs(phase - round(phase)) < 0.02 else "between two frames")
 
 
 def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
@@ -59,12 +61,12 @@ def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
     if expected is not None:
         half, most = expected[0]
         beyond = shown.motion.extrapolates(time) or shown.motion.outside
-        lines.append(f"model error here ≈ {half:.2g} mm, 9 in 10 below {most:.2g}{' ⚠ a guess' if beyond else ''}")
+        lines.append(f"model error here ≈ {half:.2f} mm, 9 in 10 below {most:.2f}{' ⚠ a guess' if beyond else ''}")
     score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
     if score is not None:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
-    if stats.status != "ok":
-        last = shown.motion.trajectory.last_good  # pyright: ignore[reportAttributeAccessIssue]
+    if stats.status != "ok" and isinstance(shown.motion, PredictedMotion):
+        last = shown.motion.last_good
         later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
         lines.append(f"⚠ **{stats.status}**{later}")
     return "  \n".join(lines)

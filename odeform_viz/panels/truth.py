@@ -10,7 +10,7 @@ from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.model.recorded import RecordedMotion
 from odeform.schema import Schema
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scene import known_scenes
 from odeform.types import Sequence
 from odeform_viz.columns import Column, Columns
 from odeform_viz.jobs import Job, simulate_here, simulator_installed
@@ -20,6 +20,7 @@ __all__ = ["TruthPanel", "entry_label", "other_physics"]
 NONE = "none"
 OTHER = "another"  # simulated here, or of another data set
 NEEDS = "*Simulate this* needs the simulator: `pip install 'odeform[simulate]'`."
+NO_SIMULATOR = "This scene was imported: there is no simulator of it here."
 FINER = 4  # times the frames of training: one looks between them
 
 PHYSICS = (
@@ -66,7 +67,7 @@ class TruthPanel:
         self._parameters, self._set, self._changed, self._say = parameters, set_parameters, changed, say
         self._job: Job | None = None
         self._starting = threading.Lock()
-        installed = simulator_installed()
+        installed, scene = simulator_installed(), known_scenes().get(schema.scene)
         gui = server.gui
         with gui.add_folder("Truth"):
             if dataset is not None:
@@ -75,7 +76,7 @@ class TruthPanel:
                 self._browser.on_update(self._opened)
             self._start = gui.add_button(
                 "Simulate this",
-                disabled=not installed,
+                disabled=scene is None or not installed,
                 hint="runs the simulator at the sliders' values",
             )
             self._start.on_click(lambda _: self._simulate())
@@ -84,9 +85,9 @@ class TruthPanel:
             self._cancel.on_click(lambda _: self.cancel())
             self._back = gui.add_button("Sliders to the truth's parameters", color="gray", visible=False)
             self._back.on_click(lambda _: self._return())
-            differs = other_physics(taught, get_scene(schema.scene).fixed)
+            differs = other_physics(taught, scene.fixed) if scene else ""
             self._physics = PHYSICS.format(differs) if differs else ""
-            note = self._physics if installed else NEEDS
+            note = NO_SIMULATOR if scene is None else self._physics if installed else NEEDS
             self._note = gui.add_markdown(note, visible=bool(note))
         self.refresh()
 
@@ -127,7 +128,7 @@ class TruthPanel:
     def _return(self) -> None:
         truth = next((c.truth for c in self._columns.all if c.truth), None)
         if truth is not None:
-            self._set(truth.parameters)
+            self._set(self._schema.known(truth.setting))
             self._changed()
 
     def refresh(self) -> None:

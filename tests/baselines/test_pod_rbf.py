@@ -45,7 +45,7 @@ def test_chosen_setting_is_the_best_on_val(data: TrainingData) -> None:
 
 def test_few_sequences(data: TrainingData) -> None:
     few = TrainingData(
-        **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced")}}
+        **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced", "known")}}
     )
     arrays, _ = fit_pod_rbf(few)
     assert np.isfinite(arrays["pod.coefficients"]).all()

@@ -54,6 +54,7 @@ def test_bench(
     assert {(row["at"], row["dtype"]) for row in result["work_precision"]} == {
         (place, dtype) for place in ("default", "corner") for dtype in ("float32", "float64")
     }
+    assert all(result["startup"][key] > 0.0 for key in ("import_s", "predict_s"))
     assert list(result["qualities"]) == ["draft", "balanced", "reference"]
     assert len(result["frontier"]) == len(predictors["odeform"].frontier)
     assert {"parameter_change_ms", "scrub_ms", "splats_1k_ms", "encode_ms", "solve_ms", "basis_ms"} < set(

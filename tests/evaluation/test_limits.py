@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 from odeform.evaluation.limits import least_ms, scaling
@@ -17,6 +16,4 @@ def test_the_slower_of_arithmetic_and_memory_binds() -> None:
 def test_scaling_measures_each_size(predictors: dict[str, Predictor]) -> None:
     rows = scaling(predictors["odeform"], (300, 3000))
     assert [row["points"] for row in rows] == [300, 3000]
-    # what the basis takes is a difference of two times: that of so few points may drown in noise
-    assert all(row[key] > 0.0 for row in rows for key in ("solve_ms", "decode_ms"))
-    assert all(np.isfinite(row["basis_ms"]) for row in rows)
+    assert all(row[key] > 0.0 for row in rows for key in ("solve_ms", "basis_ms", "decode_ms"))

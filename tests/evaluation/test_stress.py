@@ -89,7 +89,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
     sure = {"faults", "non_finite_frames", "start_off_m", "grid_invariance_m", "scrub_order_m", "determinism_m"}
     sure |= {"batch_invariance_m", "single_precision_mm"}
     if name == "odeform":
-        sure |= {f"order_{method}_shortfall" for method in tableau.METHODS}
+        sure |= {f"order_{method}_deviation" for method in tableau.METHODS}
         sure |= {"refining_error_ratio", "solver_error_rank_correlation"}
     assert sure <= set(result["checks"])
     assert [check for check in sure if not result["checks"][check]["holds"]] == []
@@ -101,7 +101,7 @@ def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytes
     monkeypatch.setattr(solvers, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
     monkeypatch.setitem(tableau.METHODS, "rk4", replace(tableau.METHODS["rk4"], b=(1 / 6, 1 / 3, 1 / 6, 1 / 3)))
     checks = solvers.check_orders(model)
-    assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_shortfall"]
+    assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
 
 
 def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:

@@ -4,6 +4,7 @@ from scipy.spatial.transform import Rotation
 
 from odeform.geometry.rigid import (
     best_rigid,
+    body_spin,
     rotation_from_vector,
     rotation_z,
     unwrapped_vectors,
@@ -82,3 +83,24 @@ def test_best_rigid_never_mirrors(flat: bool) -> None:
     rest = np.random.default_rng(3).normal(size=(20, 3)) * [1.0, 1.0, 0.0 if flat else 1.0]
     rotation, _ = best_rigid(rest, rest * [-1.0, 1.0, 1.0], np.full(20, 0.05))
     assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def test_the_spin_of_a_changing_rotation_vector() -> None:
+    """R(w + h dw) = R(w) R(h spin) to first order."""
+    rng = np.random.default_rng(4)
+    vectors = np.concatenate([rng.normal(size=(6, 3)) * 3.0, np.zeros((1, 3)), np.full((1, 3), 1e-6)])
+    change, h = rng.normal(size=vectors.shape), 1e-6
+    turned = rotation_from_vector(vectors + h * change)
+    relative = rotation_from_vector(vectors).swapaxes(1, 2) @ turned
+    spin = np.stack([relative[:, 2, 1], relative[:, 0, 2], relative[:, 1, 0]], axis=1) / h
+    assert np.allclose(body_spin(vectors, change), spin, atol=1e-4)
+
+
+def test_each_frame_may_have_its_own_shape() -> None:
+    rng = np.random.default_rng(5)
+    shapes, weights = rng.normal(size=(4, 9, 3)), rng.dirichlet(np.ones(9))
+    turns, shifts = rotation_from_vector(rng.normal(size=(4, 3))), rng.normal(size=(4, 3))
+    rotation, shift = best_rigid(shapes, shapes @ turns.swapaxes(1, 2) + shifts[:, None], weights)
+    assert np.allclose(rotation, turns)
+    centres = np.einsum("n,tni->ti", weights, shapes)
+    assert np.allclose(shift, np.einsum("tij,tj->ti", turns, centres) + shifts - centres)

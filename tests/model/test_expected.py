@@ -44,3 +44,15 @@ def test_nothing_is_off_at_rest_and_more_outside(expected: ExpectedError) -> Non
     assert (expected.at(np.array([1.5, 0.3]), TIMES)[1:] > inside[1:]).all()
     beyond = expected.at(theta, np.array([1.0, 1.5, 3.0]))
     assert beyond[1:] == pytest.approx(beyond[0] * np.array([[1.5], [3.0]]))
+
+
+def test_beyond_the_window_it_grows_as_the_continuation_did() -> None:
+    arrays = residuals(60, 0)
+    plain = ExpectedError(arrays)
+    later = np.linspace(0.0, 500.0, 20)[None] * np.linspace(0.5, 1.5, 60)[:, None]
+    continued = ExpectedError({**arrays, "val.later_mm": later})
+    theta, frame = np.zeros(2), TIMES[1] - TIMES[0]
+    assert np.array_equal(continued.at(theta, TIMES), plain.at(theta, TIMES))
+    beyond = continued.at(theta, TIMES[-1] + frame * np.array([10.0, 20.0, 90.0]))
+    np.testing.assert_allclose(beyond[:2], np.quantile(later[:, [9, 19]], [0.5, 0.9], axis=0).T)
+    assert (beyond[2] >= beyond[1]).all()

@@ -107,12 +107,12 @@ def test_a_vertex_without_a_face_is_inside() -> None:
     assert ReducedSpace.from_parts(old, shell.arrays(), Mesh(points[:-1], faces)).surface is not None
 
 
-def test_nothing_grows_to_half_as_much_again_as_was_trained() -> None:
-    """And what is within a quarter of that is left alone, to the last bit; directions are kept."""
+def test_nothing_grows_by_more_than_three_tenths_of_what_was_trained() -> None:
+    """And what is within half of that is left alone, to the last bit; directions are kept."""
     points, faces = np.random.default_rng(0).normal(size=(8, 3)), np.array([[0, 1, 2]])
     shapes, weights = np.random.default_rng(1).normal(size=(8, 3, 2)), np.full(8, 0.125)
     space = replace(make_space(Mesh(points, faces), shapes, weights, np.zeros(3)), largest=(0.4, 2e-3))
-    sizes = np.array([1.0, 1.2, 1.3, 1e6])
+    sizes = np.array([1.0, 1.1, 1.2, 1e6])
     y = np.zeros((4, 8))
     y[:, :3] = 0.4 * sizes[:, None] * [0.0, 0.6, -0.8]
     y[:, 3:6] = 100.0
@@ -123,8 +123,8 @@ def test_nothing_grows_to_half_as_much_again_as_was_trained() -> None:
     assert np.array_equal(bounded[:, 3:6], y[:, 3:6])
     for part, largest in ((bounded[2:, :3], 0.4), (bounded[1::-1, 6:], 2e-3)):
         size = np.linalg.norm(part, axis=1) / largest
-        assert 1.25 < size[0] < 1.3
-        assert size[1] == pytest.approx(1.5)
+        assert 1.15 < size[0] < 1.2
+        assert size[1] == pytest.approx(1.3)
         assert np.allclose(part[:, -2:] / (largest * size[:, None]), [0.6, -0.8])
     assert np.isfinite(space.bounded(np.full((1, 8), 1e300))).all()
     assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == (0.4, 2e-3)

@@ -7,8 +7,9 @@ import pytest
 import trimesh
 
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.model.motion import Motion, SolveStats
+from odeform.model.motion import Motion
 from odeform.model.placed import place
+from odeform.model.predicted import SolveStats
 from odeform.model.reduced import ReducedSpace, decompose, fit_modes, make_space
 from odeform.model.triads import BOUND, Triads, gradients, moved_covariances
 from odeform.schema import Schema, Window

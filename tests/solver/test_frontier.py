@@ -8,7 +8,7 @@ from odeform.solver.integrate import Quality
 
 
 def point(evaluations: float, error: float) -> FrontierPoint:
-    return FrontierPoint(Quality("rk4", step=1.0 / evaluations), evaluations, error)
+    return FrontierPoint(Quality("rk4", step=1.0 / evaluations), evaluations, error, 0.1 * error)
 
 
 COARSE, MIDDLE, FINE = point(10.0, 5.0), point(40.0, 0.5), point(200.0, 0.01)
@@ -34,7 +34,7 @@ def test_a_budget_picks_the_finest(budget: float, chosen: FrontierPoint) -> None
     "quality", [Quality("rk4", step=0.01), Quality("dopri5", tolerance=1e-3, dtype="float64")], ids=str
 )
 def test_points_survive_json(quality: Quality) -> None:
-    one = FrontierPoint(quality, 12.5, 0.25)
+    one = FrontierPoint(quality, 12.5, 0.25, 0.05)
     assert FrontierPoint.from_json(one.to_json()) == one
 
 

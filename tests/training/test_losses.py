@@ -22,7 +22,7 @@ def test_reads_in_millimetres_of_the_vertices(data: TrainingData, part: str) -> 
     error = truth.clone()
     error[:, where] = 1e-3 * torch.randn(error[:, where].shape, generator=torch.Generator().manual_seed(0)).double()
     gains = torch.linspace(0.5, 2.0, POSE + 8, dtype=torch.float64)
-    losses = Metric(gains, data.space.arm)(error / gains, truth)
+    losses = Metric(gains, data.space.arm)(error / gains, truth, torch.ones(40).double())
 
     y = error.numpy()
     local = data.rest + np.einsum("nik,tk->tni", data.space.basis.values(data.rest), y[:, POSE:])

@@ -11,7 +11,7 @@ from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
 from odeform.training.qualities import choose_qualities, measure_frontier
 
-Measured = tuple[tuple[FrontierPoint, ...], float]
+Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
 
 
 @pytest.fixture(scope="module")
@@ -21,30 +21,36 @@ def measured(dataset: Dataset, predictors: dict[str, Predictor]) -> Measured:
 
 
 def test_a_frontier_trades_work_for_accuracy(measured: Measured, predictors: dict[str, Predictor]) -> None:
-    frontier, error_mm = measured
+    frontier, (error_mm, deformation_mm) = measured
     work, errors = np.array([(p.evaluations, p.solver_error_mm) for p in frontier]).T
     assert (np.diff(work) > 0.0).all()
     assert (np.diff(errors) < 0.0).all()
     assert errors[-1] < 1e-2 * error_mm
+    assert frontier[-1].deformation_error_mm < 1e-2 * deformation_mm
     motion = predictors["odeform"].solve(quality=frontier[0].quality)
     assert motion.stats.evaluations == pytest.approx(work[0], rel=0.3)
 
 
 def test_qualities_are_points_of_it(measured: Measured) -> None:
-    frontier, error_mm = measured
+    frontier, errors = measured
     known = {point.quality: point for point in frontier}
     for share in (1.0, 0.01):
-        chosen = choose_qualities(frontier, share * error_mm)
-        points = {name: known[Quality(**setting)] for name, setting in chosen.items()}
-        assert points["draft"].solver_error_mm <= share * error_mm
-        assert points["balanced"].solver_error_mm <= max(0.1 * share * error_mm, frontier[-1].solver_error_mm)
+        error, deformation = (share * e for e in errors)
+        points = {
+            n: known[Quality(**setting)] for n, setting in choose_qualities(frontier, (error, deformation)).items()
+        }
+        assert points["draft"].solver_error_mm <= error
+        assert points["draft"].deformation_error_mm <= deformation
+        assert points["balanced"].solver_error_mm <= max(0.1 * error, frontier[-1].solver_error_mm)
+        assert points["balanced"].deformation_error_mm <= max(0.3 * deformation, frontier[-1].deformation_error_mm)
         assert points["draft"].evaluations <= points["balanced"].evaluations <= points["reference"].evaluations
         assert points["reference"] is frontier[-1]
 
 
-def test_nothing_is_exact_enough(measured: Measured) -> None:
+@pytest.mark.parametrize("errors", [(1e-12, 1.0), (1.0, 1e-12)])
+def test_nothing_is_exact_enough(measured: Measured, errors: tuple[float, float]) -> None:
     frontier, _ = measured
-    assert Quality(**choose_qualities(frontier, 1e-12)["balanced"]) == frontier[-1].quality
+    assert Quality(**choose_qualities(frontier, errors)["balanced"]) == frontier[-1].quality
 
 
 def test_a_checkpoint_brings_its_frontier(predictors: dict[str, Predictor]) -> None:

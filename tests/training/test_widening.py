@@ -28,7 +28,7 @@ def data(dataset: Dataset) -> TrainingData:
 
 def widened(data: TrainingData, **settings: object) -> Trainer:
     trainer = Trainer(build_network(data, 0), data, TrainConfig(random_features=300, **settings), torch.device("cpu"))  # type: ignore[arg-type]
-    widen(trainer)
+    widen(trainer, 300)
     return trainer
 
 
@@ -51,7 +51,7 @@ def test_sharp_features_keep_to_the_spline_between_frames(data: TrainingData) ->
 
 
 def test_validation_chooses(data: TrainingData) -> None:
-    """Of several settings the result is the best, for each decoder by itself."""
+    """Of several settings the result is the best, for each decoder by itself; sharpness is chosen by some moments."""
 
     def errors(**settings: object) -> tuple[float, float]:
         return widened(data, between=0.0, deformed=1.0, **settings).errors_mm("val")
@@ -59,4 +59,6 @@ def test_validation_chooses(data: TrainingData) -> None:
     each = [errors(sharpnesses=(s,), ridges=(r,)) for s in (0.5, 2.0) for r in (1e-4, 1e-8)]
     assert len(set(each)) == 4
     chosen = errors(sharpnesses=(0.5, 2.0), ridges=(1e-4, 1e-8))
-    assert chosen == pytest.approx(tuple(min(part) for part in zip(*each, strict=True)), rel=1e-6)
+    for error, part in zip(chosen, zip(*each, strict=True), strict=True):
+        assert min(part) <= error < 1.05 * min(part)
+        assert error < np.mean(part)

@@ -37,20 +37,26 @@ def main() -> None:
     app = App([Column("odeform", kick, fit.geometry, fit=fit)], port=port)
     pictures: list[Image.Image] = []
     try:
-        with LoopbackClient(port) as client, sync_playwright() as play:
-            client.set("time (s)", 0.0)
+        with sync_playwright() as play:
             browser = play.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
             page = browser.new_page(viewport={"width": 1280, "height": 720})
             page.goto(f"http://127.0.0.1:{port}")
-            time.sleep(8.0)
-            for setting, moments in FILM:
-                for label, value in setting.items():
-                    client.set(label, value)
-                for moment in moments:
-                    client.set("time (s)", round(float(moment), 3))
-                    client.collect(0.4)
-                    shot = Image.open(io.BytesIO(page.screenshot(timeout=60_000))).convert("RGB")
-                    pictures.append(shot.resize((args.width, args.width * 720 // 1280), Image.Resampling.LANCZOS))
+            page.get_by_text("mass (kg)").wait_for(timeout=60_000)
+            page.add_style_tag(
+                content=".mantine-Notifications-root { display: none }"
+            )  # it renders in software, it says
+            time.sleep(15.0)  # until the scene is there
+            with LoopbackClient(port) as client:
+                client.set("time (s)", 0.0)
+                client.collect(2.0)
+                for setting, moments in FILM:
+                    for label, value in setting.items():
+                        client.set(label, value)
+                    for moment in moments:
+                        client.set("time (s)", round(float(moment), 3))
+                        client.collect(0.4)
+                        shot = Image.open(io.BytesIO(page.screenshot(timeout=60_000))).convert("RGB")
+                        pictures.append(shot.resize((args.width, args.width * 720 // 1280), Image.Resampling.LANCZOS))
             browser.close()
     finally:
         app.close()

@@ -13,7 +13,7 @@ from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
-from odeform_viz.session import INVISIBLE, Session, Wish, deformed
+from odeform_viz.session import INVISIBLE, Session, Wish, visible_deformation
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_a_deformation_too_small_to_see_is_left_out(kick: Predictor, size: float
     reach = motion.placed.reach * (2.0 * INVISIBLE / motion.deformation_bound(0.02))
     small = replace(motion, placed=replace(motion.placed, rows=rows, reach=reach))
     assert small.deformation_bound(0.02) > INVISIBLE
-    assert (deformed(small, 0.02) is not None) == seen
+    assert (visible_deformation(small, 0.02) is not None) == seen
 
 
 def test_splats_deform_with_the_body(kick: Predictor) -> None:

@@ -1,5 +1,7 @@
 """Time: steps on frames, the peak, the start, speed, hot keys."""
 
+import threading
+
 import pytest
 
 from odeform_viz.app import App
@@ -27,6 +29,25 @@ def test_peak_is_at_the_kick_and_start_at_rest(kicked: Kicked) -> None:
     assert client.until(lambda: app.clock.time() == 0.0)
     client.press("To the peak of the deformation")
     assert client.until(lambda: 0.005 < app.clock.time() < 0.029)
+
+
+def test_a_peak_found_too_late_is_let_go(kicked: Kicked, monkeypatch: pytest.MonkeyPatch) -> None:
+    app, client = kicked
+    searching, found = threading.Event(), threading.Event()
+
+    def search() -> float:
+        searching.set()
+        assert found.wait(10.0)
+        return 0.02
+
+    monkeypatch.setattr(app._playback, "_largest", search)
+    client.set("go to", "peak")
+    assert searching.wait(10.0)
+    client.set("time (s)", 0.5)
+    assert client.until(lambda: app.clock.time() == 0.5)
+    found.set()
+    client.collect(0.5)
+    assert app.clock.time() == 0.5
 
 
 def test_play_is_a_button_and_a_key_and_says_what_it_would_do(kicked: Kicked) -> None:

@@ -13,7 +13,7 @@ from odeform_viz.session import quality_of
 
 
 def chosen(app: App) -> dict[str, object]:
-    quality = app._wish().quality
+    quality = app.wish().quality
     return json.loads(quality) if quality.startswith("{") else {}
 
 
@@ -51,9 +51,9 @@ def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: 
     assert app._quality is not None
     setting = json.dumps(kick.frontier[1].quality.to_json())
     app._quality.set(setting)
-    assert app._wish().quality == setting
+    assert app.wish().quality == setting
     app._quality.set("draft")
-    assert app._wish().quality == "draft"
+    assert app.wish().quality == "draft"
     client.set("at most (mm)", -1.0)
     client.set("quality", WITHIN_MM)
     assert client.until(lambda: "expected a positive bound" in client.text())

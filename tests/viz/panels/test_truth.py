@@ -194,6 +194,7 @@ def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:
     error = app._shown.columns[0].error
     assert error is not None
     assert 1e3 * np.median(error.distances) < app._heat
+    assert client.until(lambda: "mm from the truth" in client.text())
     client.press("Error colours on or off")
     assert client.until(lambda: "mm from the truth" not in client.text())
     view = app._scene._views[app.columns.all[0].key][1]._shape

@@ -1,0 +1,66 @@
+"""What simple methods reach that are given the truth: the last frame held, ballistic flight, a spline through frames.
+
+They tell what a table of extrapolation or interpolation is worth: a model that is given parameters alone has to beat
+what anybody could say who had seen the frames.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from odeform.dataset.index import Dataset
+from odeform.evaluation.metrics import Scores
+from odeform.model.data import Thinning
+from odeform.simulation.ball import GRAVITY
+from odeform.types import Frames, Sequence
+
+__all__ = ["ballistic", "evaluate_simple", "hold_last", "spline_through"]
+
+Guess = Callable[[Sequence, int], Frames]
+"""From a true sequence, the i-th of its split, to frames at its times, (T, N, 3) metres."""
+
+
+def hold_last(known: int) -> Guess:
+    """The last of the first `known` frames, held."""
+    return lambda truth, _: truth.vertices[np.minimum(np.arange(len(truth.times)), known - 1)]
+
+
+def ballistic(known: int) -> Guess:
+    """From the last of the first `known` frames on, its shape flies on under gravity with the centre's velocity."""
+
+    def fly(truth: Sequence, index: int) -> Frames:
+        step = float(truth.times[1] - truth.times[0])
+        before, last = truth.vertices[known - 2 : known].astype(float)
+        gravity = np.array([0.0, 0.0, -GRAVITY])
+        # the centre's mean velocity over the last interval, and what gravity adds in its second half
+        velocity = truth.weights @ (last - before) / step + 0.5 * gravity * step
+        ahead = np.maximum(truth.times - truth.times[known - 1], 0.0)[:, None]
+        shift = ahead * velocity + 0.5 * ahead**2 * gravity
+        return hold_last(known)(truth, index) + shift[:, None]
+
+    return fly
+
+
+def spline_through(thinning: Thinning) -> Guess:
+    """The cubic spline through the frames that are kept."""
+
+    def join(truth: Sequence, index: int) -> Frames:
+        count = len(truth.times)
+        return thinning.filled(truth.vertices[thinning.kept(count, index)], count, index)
+
+    return join
+
+
+def evaluate_simple(guess: Guess, dataset: Dataset, split: str, window: tuple[int, int]) -> dict[str, Any]:
+    """Scores over the frames `window` (half-open), as `evaluate` gives them for a model."""
+    schema, scores = dataset.schema, Scores()
+    for index, recorded in enumerate(dataset.sequences(split)):
+        truth = recorded.frames(schema.window.stop, schema.window.rate)
+        inside = np.zeros(len(truth.times), dtype=bool)
+        inside[[0, *range(*window)]] = True
+        part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
+        counted = np.ones(len(part.times), dtype=bool)
+        scores.add(guess(truth, index)[inside], part, counted, np.zeros_like(counted))
+    return scores.result()

@@ -1,0 +1,79 @@
+"""All tables of the paper, from what is kept of earlier runs and what is still to be run."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from odeform.checkpoint import read_checkpoint, resolve_checkpoint
+from odeform.dataset.store import open_dataset
+from odeform.evaluation.metrics import evaluate
+from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
+from odeform.files import write_aside
+from odeform.inverse.table import identify_split
+from odeform.model.data import Thinning
+from odeform.predictor import load
+from odeform.tables.cells import KEPT, run_cells
+from odeform.tables.page import page
+from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+
+__all__ = ["tables"]
+
+Found = dict[str, Any]
+
+
+def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = False) -> None:
+    """Write the page `out`; `folder` keeps checkpoints and scores, so that what was interrupted goes on.
+
+    `share` of the planned minutes. `kept_only`: train nothing, leave open what is not there.
+    """
+    planned = plan(share)
+    results = run_cells([cell for cells in planned.values() for cell in cells], folder, jobs, kept_only)
+    found = {
+        "share": share,
+        "cells": {table: {c: results[c] for c in cells if c in results} for table, cells in planned.items()},
+        "shipped": _kept(folder / "shipped.json", [_sha256(scene) for scene in FRAMES], _shipped),
+        "simple": _kept(folder / "simple.json", [UNTIL, AHEAD, INTERVALS, IMPACT], _simple),
+        "identified": _kept(folder / "identified.json", [_sha256(scene) for scene in FRAMES], _identified),
+    }
+    write_aside(out, page(found).encode())
+
+
+def _kept(file: Path, key: list[Any], make: Callable[[], Found]) -> Found:
+    """What `make` found for that key, now or earlier."""
+    key = json.loads(json.dumps(key))
+    known = json.loads(file.read_text()) if file.exists() else {}
+    if known.get("key") != key:
+        known = {"key": key, "found": make()}
+        write_aside(file, json.dumps(known, indent=1).encode())
+    return known["found"]
+
+
+def _sha256(scene: str) -> str:
+    return read_checkpoint(resolve_checkpoint(scene)).sha256
+
+
+def _shipped() -> Found:
+    """Scores of the bundled models, which were trained longer."""
+    spans = [(scene, window) for scene, window in FRAMES.items()] + [(DROP, IMPACT)]
+    scores = {(s, w): evaluate(load(s), open_dataset(s), "test", w) for s, w in spans}
+    return {f"{s} {w[0]}:{w[1]}": {name: one[name] for name in KEPT} for (s, w), one in scores.items()}
+
+
+def _simple() -> Found:
+    guesses = {}
+    for until in UNTIL:
+        window = until, until + AHEAD
+        guesses[f"hold-last {until}:{until + AHEAD}"] = hold_last(until), window
+        guesses[f"ballistic {until}:{until + AHEAD}"] = ballistic(until), window
+    for k in INTERVALS:
+        guesses[f"spline {k}"] = spline_through(Thinning(every=k)), IMPACT
+        guesses[f"spline {k} staggered"] = spline_through(Thinning(every=k, stagger=True)), IMPACT
+    dataset = open_dataset(DROP)
+    scores = {name: evaluate_simple(guess, dataset, "test", window) for name, (guess, window) in guesses.items()}
+    return {name: {metric: one[metric] for metric in KEPT} for name, one in scores.items()}
+
+
+def _identified() -> Found:
+    found = {scene: identify_split(load(scene), open_dataset(scene)) for scene in FRAMES}
+    return {scene: {key: one[key] for key in ("parameters", "seconds")} for scene, one in found.items()}

@@ -1,0 +1,116 @@
+"""What continues motions beyond the window, fitted to all training motions, and kept where it foretells."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.model.continuation import ContinuedTrajectory, Dynamics, kernel
+from odeform.model.data import TrainingData
+from odeform.model.odeform import ODeform
+from odeform.model.reduced import POSE, small_motion
+from odeform.schema import REACH
+from odeform.solver.frontier import EXACT
+from odeform.types import Floats
+
+__all__ = ["fit_dynamics", "foretold", "with_continuation"]
+
+# chosen on validation sequences of `mass-elastic`, ten frames beyond windows of 40, 45, 50, 60, 65, 70, 80 and 90
+CENTERS = 300
+RIDGE = 1e-7  # on the mean square over states
+MOTION = 0.3  # gain of changes of deformation, in largest ones; depths, velocities and deformations have 1
+PARAMETERS = 0.3  # gain of parameters, in halves of their range
+WIDTH = 0.05  # of the largest depth
+FREE = 0.01  # of the largest acceleration that is not gravity: what is less is no contact
+CANDIDATES = 20_000  # states among which centres are chosen
+TINY = 1e-9  # metres; smaller is nothing
+
+
+def _largest(vectors: Floats) -> float:
+    return max(float(np.linalg.norm(vectors, axis=1).max()), TINY)
+
+
+def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, float]:
+    """Gravity in metres per frame squared, the height of first touch, and the largest depth below it, in metres.
+
+    Where bodies are in the upper half of their heights they are taken to fly.
+    """
+    acceleration = (after - 2.0 * now + before)[:, :3]
+    height = now[:, 2]
+    gravity = np.median(acceleration[height >= 0.5 * (height.min() + height.max())], axis=0)
+    pushed = np.linalg.norm(acceleration - gravity, axis=1)
+    lowest = np.minimum(height, 2.0 * height - before[:, 2] + gravity[2])
+    touch = float(np.quantile(lowest[pushed >= FREE * pushed.max()], 0.99))
+    return gravity, touch, max(touch - float(lowest.min()), TINY)
+
+
+def _spread(features: Floats, count: int) -> Floats:
+    """(C, F) of the features (S, F), the ones that the others follow from best.
+
+    Each is the one that the kernel explains least by those before it: pivoted Cholesky (Fine and Scheinberg 2001).
+    """
+    unexplained, factor, chosen = np.ones(len(features)), np.zeros((len(features), count)), []
+    while len(chosen) < count and unexplained.max() > 1e-7:
+        pivot, rank = int(unexplained.argmax()), len(chosen)
+        column = kernel(features, features[pivot : pivot + 1])[:, 0]
+        column -= factor[:, :rank] @ factor[pivot, :rank]
+        factor[:, rank] = column / np.sqrt(unexplained[pivot])
+        unexplained -= factor[:, rank] ** 2
+        unexplained[pivot] = 0.0
+        chosen.append(pivot)
+    return features[chosen]
+
+
+def fit_dynamics(theta: Floats, reduced: Floats, arm: float, seed: int = 0) -> Dynamics:
+    """From parameters (S, P) in [-1, 1] and motions (S, T, 6 + K) of at least three frames."""
+    before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
+    told = np.repeat(theta, reduced.shape[1] - 2, axis=0)
+    gravity, touch, depth = _ground(before, now, after)
+    change = now - before
+    speed, bent, bending = (_largest(part) for part in (change[:, :3], now[:, POSE:], change[:, POSE:]))
+    modes = reduced.shape[2] - POSE
+    sizes = [(1 / depth, 2), (1 / speed, 3), (arm / speed, 3), (1 / bent, modes), (MOTION / bending, modes)]
+    sizes.append((PARAMETERS, theta.shape[1]))
+    gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
+    empty = np.zeros((0, len(gains))), np.zeros((0, reduced.shape[2]))
+    dynamics = Dynamics(gravity, touch, WIDTH * depth, gains, *empty)
+    features = dynamics.features(before, now, told)
+    drawn = np.random.default_rng(seed).permutation(len(features))[:CANDIDATES]
+    centers = _spread(features[drawn], CENTERS)
+    seen = kernel(features, centers)
+    normal = seen.T @ seen + RIDGE * len(features) * kernel(centers, centers)
+    normal[np.diag_indices_from(normal)] += 1e-10 * np.trace(normal) / len(normal)  # against rounding
+    weights = np.linalg.solve(normal, seen.T @ (after - dynamics.flight(before, now)))
+    return replace(dynamics, centers=centers, weights=weights)
+
+
+def foretold(model: ODeform, data: TrainingData) -> Floats | None:
+    """(S, L) mm RMSE of the last third of the window, kept from the fit, of the validation motions, when continued from
+    the model's own motions. None if they are nearer to motions that stop there, or where a spline filled in frames: it
+    knows no contacts."""
+    known = round(len(data.times) / (1.0 + REACH))
+    if known < 4 or (data.known["train"] < 1.0).any():
+        return None
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :known], data.space.arm)
+    window = replace(data.schema.window, stop=float(data.times[known - 1]))
+    placed, later = model.place(model.rest, 0.0), data.times[known:]
+    continued, stopped = [], []
+    for theta in data.theta["val"]:
+        motion = model.integrate(theta, placed, EXACT, window.stop)
+        continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
+        stopped.append(motion.reduced(np.full(len(later), window.stop)))
+    truth, arm = data.reduced["val"][:, known:], data.space.arm
+    moved, held = (small_motion(np.stack(guess) - truth, arm) / np.sqrt(3.0) for guess in (continued, stopped))
+    return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
+
+
+def with_continuation(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
+    """The checkpoint of a trained model with the dynamics that continue it, and their errors on validation; as it is
+    where these do not foretell."""
+    errors = foretold(ODeform(checkpoint), data)
+    if errors is None:
+        return checkpoint
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.arm)
+    schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
+    arrays = {**checkpoint.arrays, **dynamics.arrays(), "val.later_mm": errors.astype(np.float32)}
+    return replace(checkpoint, schema=schema, arrays=arrays)

@@ -1,0 +1,49 @@
+"""What simple methods reach that see the truth."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odeform.dataset.index import Dataset
+from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
+from odeform.model.data import Thinning
+from odeform.schema import Schema, Window
+from odeform.types import Sequence
+
+
+class Falling(Dataset):
+    """Three points that fall freely from different speeds, at 480 Hz; the scene has 120 Hz."""
+
+    def sequences(self, split: str) -> Iterator[Sequence]:
+        times = np.arange(241)[:, None, None] / 480.0
+        points = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
+        for speed in (0.0, 2.0):
+            fall = speed * times * [1.0, 0.0, 0.0] + 0.5 * times**2 * [0.0, 0.0, -9.81]
+            yield Sequence(times.ravel(), points + fall, np.zeros((0, 3), dtype=int), np.full(3, 1.0 / 3.0))
+
+
+@pytest.fixture
+def falling() -> Dataset:
+    return Falling(Path(), Schema("fall", (), Window(0.0, 0.5, 120.0)), (), lambda entry: pytest.fail(entry.name))
+
+
+def test_free_flight_is_ballistic(falling: Dataset) -> None:
+    scores = evaluate_simple(ballistic(20), falling, "test", (20, 30))
+    assert scores["rmse_pooled_mm"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_hold_last_misses_by_the_way_fallen(falling: Dataset) -> None:
+    scores = evaluate_simple(hold_last(20), falling, "test", (20, 21))
+    moved = [np.array([speed / 120.0, 0.0, -0.5 * 9.81 * (20**2 - 19**2) / 120.0**2]) for speed in (0.0, 2.0)]
+    assert scores["rmse_pooled_mm"] == pytest.approx(1e3 * np.sqrt(np.mean(np.square(moved))))
+
+
+@pytest.mark.parametrize("stagger", [False, True])
+def test_a_spline_is_right_where_it_sees(dataset: Dataset, stagger: bool) -> None:
+    every = evaluate_simple(spline_through(Thinning()), dataset, "test", (0, 97))
+    some = evaluate_simple(spline_through(Thinning(every=8, stagger=stagger)), dataset, "test", (0, 97))
+    assert every["rmse_pooled_mm"] == 0.0
+    assert some["rmse_pooled_mm"] > 0.1
+    assert some["per_frame_rmse_mm"][95] < 1e-9 or stagger

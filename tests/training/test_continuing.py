@@ -1,0 +1,85 @@
+"""The dynamics that continue motions, on a bouncing ball, and whether they are kept."""
+
+from typing import cast
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from odeform.dataset.index import Dataset
+from odeform.model.continuation import Dynamics
+from odeform.model.data import TrainingData, prepare
+from odeform.model.odeform import ODeform
+from odeform.predictor import Predictor
+from odeform.training import continuation
+from odeform.training.continuation import fit_dynamics, foretold, with_continuation
+from odeform.types import Floats
+
+RATE, GRAVITY, HEIGHT = 60.0, -10.0, 0.2
+
+
+def bounce(theta: float, frames: int) -> Floats:
+    """(T, 7): a ball falls from `HEIGHT` onto a damped spring, whose depth is its deformation."""
+    stiffness = 3000.0 * np.exp(0.3 * theta)
+
+    def field(_: float, state: Floats) -> list[float]:
+        depth = max(-state[0] - HEIGHT, 0.0)
+        return [state[1], GRAVITY + (stiffness * depth - 20.0 * state[1] if depth else 0.0)]
+
+    times = np.arange(frames) / RATE
+    height = solve_ivp(field, (0.0, times[-1]), [0.0, 0.0], t_eval=times, rtol=1e-8, atol=1e-10, max_step=2e-3).y[0]
+    y = np.zeros((frames, 7))
+    y[:, 2], y[:, 6] = height, np.maximum(-height - HEIGHT, 0.0)
+    return y
+
+
+def test_a_second_landing_follows_from_the_first() -> None:
+    known, later = 22, 14
+    theta, unseen = np.linspace(-1.0, 1.0, 40)[:, None], np.array([[-0.63], [0.02], [0.71]])
+    truth = np.stack([bounce(t, known + later) for t in unseen[:, 0]])
+    dynamics = fit_dynamics(theta, np.stack([bounce(t, known) for t in theta[:, 0]]), arm=0.1)
+    assert dynamics.gravity[2] == pytest.approx(GRAVITY / RATE**2, rel=1e-6)
+    before, now = truth[:, known - 2], truth[:, known - 1]
+    flown, out, fall = [before, now], [], (before, now)
+    for _ in range(later):
+        before, now = now, dynamics.next(before, now, unseen)
+        out.append(now)
+        fall = fall[1], dynamics.flight(*fall)
+        flown.append(fall[1])
+
+    def rms(y: list[Floats] | Floats) -> float:
+        return float(np.sqrt(((np.stack(y, axis=1) - truth[:, known:])[..., 2] ** 2).mean()))
+
+    held = [truth[:, known - 1]] * later
+    assert (truth[:, known + 2 :, 6] > 0.0).any()  # it lands within what is foretold
+    assert rms(out) < 0.25 * min(rms(held), rms(flown[2:]))
+
+
+@pytest.fixture(scope="module")
+def data(dataset: Dataset, predictors: dict[str, Predictor]) -> TrainingData:
+    return prepare(dataset, cast(ODeform, predictors["odeform"]).space.basis.modes)
+
+
+def test_what_does_not_foretell_is_not_kept(
+    data: TrainingData, predictors: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = cast(ODeform, predictors["odeform"])
+    counts = []
+
+    def falling(theta: Floats, reduced: Floats, arm: float) -> Dynamics:
+        counts.append(reduced.shape[1])
+        width = 2 + 6 + 2 * (reduced.shape[2] - 6) + theta.shape[1]
+        empty = np.zeros((0, width)), np.zeros((0, reduced.shape[2]))
+        return Dynamics(np.array([0.0, 0.0, -1.0]), 0.0, 1.0, np.ones(width), *empty)
+
+    monkeypatch.setattr(continuation, "fit_dynamics", falling)
+    assert foretold(model, data) is None
+    assert counts == [round(len(data.times) / 1.5)]  # fitted without what is foretold
+    assert with_continuation(model.checkpoint, data) is model.checkpoint
+    # a criterion that passes whatever is kept
+    errors = np.full((len(data.theta["val"]), 40), 3.0)
+    monkeypatch.setattr(continuation, "foretold", lambda *_: errors)
+    kept = with_continuation(model.checkpoint, data)
+    assert kept.schema.window.reach > 0.0
+    assert np.array_equal(kept.arrays["val.later_mm"], errors.astype(np.float32))
+    assert counts[-1] == len(data.times)

@@ -1,0 +1,53 @@
+"""Models of points in the viewer's session, beside the others and the truth."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odeform.dataset.index import Dataset
+from odeform.errors import InputError
+from odeform.model.point_motion import PointMotion
+from odeform.model.recorded import RecordedMotion
+from odeform.predictor import Predictor, load
+from odeform_viz.columns import Column, Columns
+from odeform_viz.panels.status import moment_in_words
+from odeform_viz.session import Session, Wish
+
+
+@pytest.fixture(scope="module")
+def models(point_models: dict[str, Path]) -> dict[str, Predictor]:
+    return {name: load(path) for name, path in point_models.items()}
+
+
+@pytest.fixture(scope="module")
+def truth(dataset: Dataset) -> RecordedMotion:
+    return RecordedMotion(dataset.schema, next(dataset.sequences("test")))
+
+
+def test_all_side_by_side_with_the_truth(models: dict[str, Predictor], truth: RecordedMotion) -> None:
+    shown = [Column("truth", truth, truth.geometry), *(Column(name, p, p.rest) for name, p in models.items())]
+    columns = Columns.of(shown).all
+    session = Session(truth.schema)
+    wish = Wish(session.schema.complete(truth.parameters), 0.4, "balanced", columns)
+    frame = session.frame(wish)
+    for column in frame.columns[1:]:
+        assert isinstance(column.motion, PointMotion)
+        assert column.error is not None
+        assert column.stats.status == "ok"
+        curves = session.curves(column, wish)
+        assert np.isfinite(curves.deformation).all()
+        assert curves.expected is not None
+        assert session.frame(wish).columns[1].motion is frame.columns[1].motion
+
+
+def test_between_frames_needs_a_truth_of_these_parameters(models: dict[str, Predictor], truth: RecordedMotion) -> None:
+    flow = Column("flow", models["occupancy-flow"], models["occupancy-flow"].rest)
+    session = Session(truth.schema)
+    with pytest.raises(InputError, match="expected the truth"):
+        session.frame(Wish(session.schema.complete({}), 0.4, "balanced", Columns.of([flow]).all))
+    both = Columns.of([Column("truth", truth, truth.geometry), flow]).all
+    frame = session.frame(Wish(session.schema.complete({"mass": 0.55}), 0.4, "balanced", both))
+    assert [shown.column.label for shown in frame.columns] == ["truth"]  # one that refuses stops no other
+    assert frame.refused == ("flow moves between observed frames: expected the truth of these parameters",)
+    assert "flow moves between observed frames" in moment_in_words(frame)
