@@ -1,8 +1,5 @@
 """The viewer: a session, its panels and its scene, held together by one worker."""
 
-import contextlib
-import io
-import socket
 import sys
 import time
 from collections.abc import Sequence
@@ -11,13 +8,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import viser
 
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.export import write_motion
 from odeform.types import Floats
+from odeform.wanted import Unwanted, as_long_as
 from odeform_viz.clock import Clock
 from odeform_viz.columns import Column, Columns
 from odeform_viz.heat import scale_for
@@ -36,6 +33,7 @@ from odeform_viz.panels.status import MomentPanel, StatusPanel
 from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recorder import Recorder
 from odeform_viz.scene import SceneView, color_of
+from odeform_viz.server import open_server
 from odeform_viz.session import Frame, Looks, Session, Wish, same_motions
 from odeform_viz.shaping import fit_from_json
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
@@ -46,7 +44,6 @@ __all__ = ["App"]
 TICK = 1.0 / 30.0  # s between frames while playing
 SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
 READ = 0.2  # s between numbers that change as something moves: nobody reads faster
-SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
 
 
 class App:
@@ -62,23 +59,15 @@ class App:
         """The first of the columns, a model, gives the scene and its sliders; a record moves them to its parameters."""
         self.columns = Columns.of(columns)
         self.session = Session(columns[0].source.schema)
-        _require_free(host, port)
-        # the worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
-        sys.setswitchinterval(SWITCH)
         share_arenas()
         self._tidy = Tidy()
-        self._recorder = Recorder(record) if record else None
+        self.server = open_server(host, port, f"ODeform · {self.session.schema.scene}")
         self._record_to = record
-        with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
-            self.server = viser.ViserServer(host=host, port=port, verbose=False)
-        self.server.gui.configure_theme(
-            titlebar_content=None,
-            control_width="medium",
-            show_logo=False,
-            show_share_button=False,
-            brand_color=(214, 96, 48),
-        )
-        self.server.gui.set_panel_label(f"ODeform · {self.session.schema.scene}")
+        try:
+            self._recorder = Recorder(record) if record else None
+        except InputError:
+            self.server.stop()
+            raise
         self._worker = Worker(self._serve)
         assert columns[0].predictor is not None
         self._body = columns[0].predictor.rest
@@ -253,20 +242,30 @@ class App:
             if self._shape.arranging:
                 # what one drags is where the first column is, which then is where all are
                 looks = replace(looks, overlay=True)
-            if self._shown is None or wish != self._shown.wish or looks != self._looks:
-                self._show(self.session.frame(wish), looks)
-            elif not self._settled:
-                self._settled = True
-                self._describe(self._shown)
-                self._tidy()
-            elif self._told is not self._shown:
-                self._describe(self._shown)
+            with as_long_as(lambda: self._worker.undisturbed):
+                self._meet(wish, looks)
+        except Unwanted:
+            return 0.0
         except InputError as error:
             self._moment.show_error(str(error))
             self._shown, self._told, self._settled = None, None, True  # what comes next is shown, even if it was before
+        if self._shown and self._shown.pending:
+            return 0.0
         if self.clock.playing:
             return TICK
         return None if self._settled and self._told is self._shown else SETTLE
+
+    def _meet(self, wish: Wish, looks: Looks) -> None:
+        """Show it if it is new, first without the columns that take long; then tell of it."""
+        shown = self._shown
+        if shown is None or wish != shown.wish or looks != self._looks or shown.pending:
+            self._show(self.session.frame(wish, whole=shown is not None and shown.follows(wish)), looks)
+        elif not self._settled:
+            self._settled = True
+            self._describe(shown)
+            self._tidy()
+        elif self._told is not shown:
+            self._describe(shown)
 
     def _show(self, frame: Frame, looks: Looks) -> None:
         # colours keep their scale over the whole motion, so it has to be known first
@@ -274,13 +273,14 @@ class App:
         self._settled = self._shown is not None and same_motions(frame, self._shown)
         self._scene.publish(frame, looks, self._heat)
         self._shown, self._looks = frame, looks
-        if time.monotonic() - self._told_at > READ:
-            self._describe(frame)
         if self._recorder:
             try:
-                self._recorder.log(frame)
+                with as_long_as(lambda: True):  # what was shown is recorded
+                    self._recorder.log(frame)
             except InputError as error:
                 self._stop_recording(error)
+        if frame.pending or time.monotonic() - self._told_at > READ:
+            self._describe(frame)
 
     def _scale(self, frame: Frame) -> float | None:
         """The end of the colour scale in mm, one for all columns; None where nothing can be compared."""
@@ -291,7 +291,6 @@ class App:
 
     def _describe(self, frame: Frame) -> None:
         """What accompanies a frame: the time, numbers, curves, marks at the sliders."""
-        self._told, self._told_at = frame, time.monotonic()
         self._playback.show(frame.wish.time)
         self._parameters.show()
         truth = frame.truth.column.truth if frame.truth else None
@@ -304,6 +303,7 @@ class App:
             for shown in frame.columns
         ]
         self._plots.show(lines, frame.wish.time)
+        self._told, self._told_at = frame, time.monotonic()
 
 
 def _training_samples(column: Column) -> dict[str, Floats]:
@@ -324,13 +324,3 @@ def _about(column: Column) -> str:
         lines.append(f"Fixed: {fixed}.")
     lines += [f"Made by `{command}`." for command in provenance.get("command", [])]
     return "\n\n".join(lines)
-
-
-def _require_free(host: str, port: int) -> None:
-    """Viser would silently take the next port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            raise InputError(f"port {port} on {host} cannot be used ({error}); choose another with --port") from None

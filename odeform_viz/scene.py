@@ -192,11 +192,12 @@ class SceneView:
         with self._server.atomic():
             self._match(frame)
             self._show_still(frame)
-            several = len(frame.columns) > 1
-            for index, shown in enumerate(frame.columns):
-                view = self._views[shown.column.key][1]
+            row = [column.key for column in frame.wish.columns if column.shown]
+            several = len(row) > 1
+            for shown in frame.columns:
+                view, index = self._views[shown.column.key][1], row.index(shown.column.key)
                 # columns stand in a row across the default heading, from left to right
-                place = 0.0 if looks.overlay else 1.6 * self._size * (0.5 * (len(frame.columns) - 1) - index)
+                place = 0.0 if looks.overlay else 1.6 * self._size * (0.5 * (len(row) - 1) - index)
                 view.show(shown, place, GHOST if looks.overlay and index else None, frame.truth, heat)
                 if self._still is not None and shown.column.fit and shown.column.fit.still is self._still[0]:
                     self._still[1].position = (0.0, place, 0.0)

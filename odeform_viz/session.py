@@ -1,9 +1,11 @@
 """What the user wishes, and what is then to be seen. Knows predictors and motions, no GUI types."""
 
 import json
+import math
 import threading
+import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +18,7 @@ from odeform.schema import REACH as CONTINUED
 from odeform.schema import Schema
 from odeform.solver.integrate import Quality
 from odeform.types import Floats, GaussianSplats, Geometry, Perpoint, Points, Sequence, Times, Vector
+from odeform.wanted import Unwanted
 from odeform_viz.columns import Column
 
 __all__ = [
@@ -35,6 +38,7 @@ __all__ = [
 INVISIBLE = 1e-4  # m; a third of a pixel of a ball of 0.1 m that is 720 pixels high
 SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
 REACH = 1.0 + CONTINUED  # trained windows that one can look at: as far as models go on
+SLOW = 0.1  # s to a motion's first moment; who takes longer does not hold up the others
 
 
 @dataclass(frozen=True)
@@ -104,11 +108,16 @@ class ColumnFrame:
 @dataclass(frozen=True, eq=False)
 class Frame:
     """All visible columns at one moment, in the order of the wish, but those that cannot meet it: these are `refused`,
-    with a reason."""
+    with a reason. `pending` are the labels of those that are still to be computed."""
 
     wish: Wish
     columns: tuple[ColumnFrame, ...]
     refused: tuple[str, ...] = ()
+    pending: tuple[str, ...] = ()
+
+    def follows(self, wish: Wish) -> bool:
+        """Whether this is of a wish that differs in time alone."""
+        return replace(wish, time=self.wish.time) == self.wish
 
     @cached_property
     def truth(self) -> ColumnFrame | None:
@@ -132,6 +141,10 @@ class Curves:
     deformation: Times
     error: Times | None
     expected: Times | None
+
+
+Asked = tuple[Mapping[str, float], str | Quality, RecordedMotion | None]
+"""Of a model: parameters, quality, and the record that it is given frames of."""
 
 
 def same_motions(one: Frame, other: Frame) -> bool:
@@ -162,8 +175,9 @@ class Session:
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._lock = threading.RLock()
-        self._solved: dict[tuple[int, int], tuple[tuple[object, ...], PredictedMotion]] = {}
+        self._solved: dict[tuple[int, int], tuple[Asked, PredictedMotion]] = {}
         self._curves: dict[int, tuple[object, object, Curves]] = {}
+        self._took: dict[int, float] = {}  # s, by column: to a moment of its last new motion
 
     def parameters(self, column: Column, wish: Wish) -> Mapping[str, float]:
         """Those that a column stands for."""
@@ -185,21 +199,27 @@ class Session:
         with self._lock:
             return source.solve(column.geometry, parameters, quality, observed=_given(source, record))
 
-    def _asked(
-        self, column: Column, source: Predictor, wish: Wish
-    ) -> tuple[Mapping[str, float], str | Quality, RecordedMotion | None]:
+    def _asked(self, column: Column, source: Predictor, wish: Wish) -> Asked:
         """Parameters and quality that a model knows, and the record that it is given frames of."""
         parameters = source.schema.known(self.parameters(column, wish))
         return parameters, quality_of(source, wish.quality), self._observed(column, source, wish)
 
     def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, wish: Wish) -> PredictedMotion:
-        parameters, quality, record = self._asked(column, source, wish)
-        wanted = (quality, record, *sorted(parameters.items()))
+        asked = self._asked(column, source, wish)
         known = self._solved.get((column.key, use))
-        if known is None or known[0] != wanted or known[1].geometry is not geometry:
+        if known is None or known[0] != asked or known[1].geometry is not geometry:
+            parameters, quality, record = asked
             motion = source.solve(geometry, parameters, quality, observed=_given(source, record))
-            known = self._solved[column.key, use] = (wanted, motion)
+            known = self._solved[column.key, use] = (asked, motion)
         return known[1]
+
+    def _waits(self, column: Column, wish: Wish) -> bool:
+        """Whether a column is to be computed after the others."""
+        if column.predictor is None or self._took.get(column.key, 0.0) < SLOW:
+            return False
+        known = self._solved.get((column.key, 0))
+        asked = self._asked(column, column.predictor, wish)
+        return known is None or known[0] != asked or known[1].geometry is not column.geometry
 
     def _observed(self, column: Column, source: Predictor, wish: Wish) -> RecordedMotion | None:
         """The record that a model moves between frames of; None for models that need none."""
@@ -222,23 +242,42 @@ class Session:
             return None
         return None if column.foreign else truth
 
-    def frame(self, wish: Wish) -> Frame:
-        """What is to be seen; only visible columns are computed. `InputError` for wishes that none of them can meet."""
+    def frame(self, wish: Wish, whole: bool = True) -> Frame:
+        """What is to be seen; only visible columns are computed. `InputError` for wishes that none of them can meet.
+
+        Unless it is to be `whole`, columns that took long when they last had a new motion to compute are left pending.
+        """
         if not np.isfinite(wish.time) or wish.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {wish.time}")
         kept = {column.key for column in wish.columns}
         with self._lock:
             self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
             self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
-            shown, refused = [], []
-            for column in wish.columns:
+            self._took = {key: took for key, took in self._took.items() if key in kept}
+            shown, refused, pending = [], [], []
+            for column in (column for column in wish.columns if column.shown):
                 try:
-                    shown += [self._column(column, wish)] if column.shown else []
+                    if whole or not self._waits(column, wish):
+                        shown.append(self._timed(column, wish))
+                    else:
+                        pending.append(column.label)
                 except InputError as error:
                     refused.append(str(error))
-            if refused and not shown:
+            if refused and not (shown or pending):
                 raise InputError(refused[0])
-            return Frame(wish, tuple(shown), tuple(refused))
+            return Frame(wish, tuple(shown), tuple(refused), tuple(pending))
+
+    def _timed(self, column: Column, wish: Wish) -> ColumnFrame:
+        before, begin = self._solved.get((column.key, 0)), time.perf_counter()
+        try:
+            frame = self._column(column, wish)
+        except Unwanted:
+            self._solved.pop((column.key, 0), None)
+            self._took[column.key] = math.inf
+            raise
+        if self._solved.get((column.key, 0)) is not before:
+            self._took[column.key] = time.perf_counter() - begin
+        return frame
 
     def _column(self, column: Column, wish: Wish) -> ColumnFrame:
         motion, time = self.motion(column, wish), wish.time

@@ -24,6 +24,7 @@ __all__ = ["Soak", "soak"]
 UNFIT = (float("nan"), float("inf"), -1e9, 1e9)
 NONSENSE = "nonsense"
 MOMENT = 0.3  # s
+CALM = 3  # s
 PATIENCE = 120.0  # s; a machine may be busy with other things
 TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 WEIGHTS = {
@@ -119,12 +120,16 @@ def _value(control: Control, rng: np.random.Generator, folder: Path) -> Any:
 
 
 def _calm(client: LoopbackClient, app: App) -> None:
-    """Back to how the page opened: one model at its defaults, of its own shape, paused, and so for a second."""
-    end = time.monotonic() + PATIENCE
+    """Back to how the page opened: one model at its defaults, of its own shape, paused, and so for some seconds, in
+    which wishes that take long come to their end."""
+    end, calm = time.monotonic() + PATIENCE, 0
     while time.monotonic() < end:
         client.collect(1.0)
-        if _is_calm(app):
+        calm = calm + 1 if _is_calm(app) else 0
+        if calm == CALM:
             return
+        if calm:
+            continue
         for label in ("Cancel", "Stop recording", "Back to the trained body"):
             if client.controls[label].visible:
                 client.click(label)
@@ -132,8 +137,8 @@ def _calm(client: LoopbackClient, app: App) -> None:
         client.set("test sequence", "none")
         first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
         boxes = {c.label: c is first for c in app.columns.all}
-        for label, shown in boxes.items():
-            client.set(label, shown)
+        for label in boxes.keys() & client.controls.keys():  # a column's box comes, and goes, a moment after it
+            client.set(label, boxes[label])
         client.collect(0.5)
         client.click("Remove hidden columns")
         client.set("quality", "balanced")
@@ -151,6 +156,7 @@ def _is_calm(app: App) -> bool:
         len(columns) == 1
         and columns[0].predictor is not None
         and columns[0].pinned is None
+        and columns[0].shown
         and columns[0].geometry is columns[0].predictor.rest
         and not app.clock.playing
         and wish.time == MOMENT

@@ -27,6 +27,11 @@ class Worker:
     def wake(self) -> None:
         self._awake.set()
 
+    @property
+    def undisturbed(self) -> bool:
+        """Whether nothing has been wished for since this round began."""
+        return not self._awake.is_set()
+
     def stop(self) -> None:
         """Finish the round under way and end the thread."""
         self._running = False

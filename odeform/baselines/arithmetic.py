@@ -7,6 +7,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from scipy.special import expit
 
+from odeform.wanted import check_wanted
+
 __all__ = ["CLOCK", "Arithmetic", "Net", "Numpy", "Sizes", "layer_shapes"]
 
 Sizes = Mapping[str, list[int]]
@@ -67,6 +69,7 @@ class Net:
 
     def layers(self, part: str, x: Any, act: str = "silu") -> Any:
         """(..., inputs) -> (..., outputs): linear layers with `act` between them."""
+        check_wanted()
         index = 0
         while True:
             x = self.arithmetic.linear(x, self.weights[f"{part}.{index}.weight"], self.weights[f"{part}.{index}.bias"])

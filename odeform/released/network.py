@@ -14,6 +14,7 @@ from jaxtyping import Float
 from odeform.released.layers import Chain, PointNet, chunks, read_chain, tanh, waves
 from odeform.solver.kutta import three_eighths
 from odeform.types import Arrays, Floats, Frames, Points, Times
+from odeform.wanted import check_wanted
 
 __all__ = ["Networks", "normalisation"]
 
@@ -36,6 +37,7 @@ def _carried(field: Field, z: Floats, times: Times) -> list[Floats]:
     """States at the (T,) times, by one step an interval."""
     states = [z]
     for begin, end in pairwise(times):
+        check_wanted()
         states.append(three_eighths(field, states[-1], begin, end))
     return states
 

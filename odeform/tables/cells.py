@@ -1,4 +1,7 @@
-"""One cell of a table: a model trained as asked, and its scores. Both are kept, so that what was done is not redone."""
+"""One cell of a table: a model trained as asked, and its scores. Both are kept, so that what was done is not redone.
+
+Where the scores suffice, the checkpoint need not be there any more.
+"""
 
 import json
 import sys
@@ -51,6 +54,10 @@ class Cell:
         return "_".join([*parts, f"s{self.seed}"])
 
     @property
+    def command(self) -> str:
+        return f"odeform train {self.scene}{train_command(self.request).removeprefix('odeform train DIR --out FILE')}"
+
+    @property
     def request(self) -> TrainRequest:
         window = (0, self.until) if self.until else None
         return TrainRequest(self.model, self.seed, self.minutes, window=window, every=self.every, stagger=self.stagger)
@@ -60,7 +67,7 @@ def run_cells(cells: Sequence[Cell], folder: Path, jobs: int, kept_only: bool = 
     """Train and score what `folder` does not hold yet, `jobs` at a time; with `kept_only` leave it out."""
     folder.mkdir(parents=True, exist_ok=True)
     if kept_only:
-        cells = [cell for cell in cells if _is_of(folder / f"{cell.name}.safetensors", cell.request)]
+        cells = [c for c in cells if _scored(c, folder) or _is_of(folder / f"{c.name}.safetensors", c.request)]
     results: dict[Cell, Result] = {}
     progress = Progress("tables", len(cells))
     work = partial(_run, folder=folder)
@@ -76,6 +83,8 @@ def run_cells(cells: Sequence[Cell], folder: Path, jobs: int, kept_only: bool = 
 
 def _run(cell: Cell, folder: Path) -> Result:
     """Of one cell, from what is kept as far as that is of this request."""
+    if found := _scored(cell, folder):
+        return found
     file, kept = folder / f"{cell.name}.safetensors", folder / f"{cell.name}.json"
     request = cell.request
     dataset = open_dataset(cell.scene)
@@ -93,7 +102,7 @@ def _run(cell: Cell, folder: Path) -> Result:
             found = evaluate(model, coarse, "test", (first, last))
             scores[key] = {name: found[name] for name in KEPT}
     result: Result = {
-        "command": f"odeform train {cell.scene}{train_command(request).removeprefix('odeform train DIR --out FILE')}",
+        "command": cell.command,
         "sha256": model.checkpoint.sha256,
         "parameters": (model.checkpoint.scores or {}).get("parameters"),
         "seconds": model.checkpoint.provenance["training_seconds"],
@@ -101,6 +110,13 @@ def _run(cell: Cell, folder: Path) -> Result:
     }
     write_aside(kept, json.dumps(result, indent=1).encode())
     return result
+
+
+def _scored(cell: Cell, folder: Path) -> Result | None:
+    """What is known of it, if that is all."""
+    known = _read(folder / f"{cell.name}.json")
+    asked = {f"{first}:{last}" for first, last in cell.scored}
+    return known if known.get("command") == cell.command and asked <= known["scores"].keys() else None
 
 
 def _is_of(file: Path, request: TrainRequest) -> bool:

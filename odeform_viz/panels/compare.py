@@ -50,6 +50,7 @@ class ComparePanel:
         self._server, self._schema, self._columns = server, schema, columns
         self._models, self._parameters, self._changed, self._say = models, parameters, changed, say
         self._boxes: dict[int, viser.GuiCheckboxHandle] = {}
+        self._known: dict[int, bool] = {}  # what each box was last told, or told itself
         self._refreshing = threading.Lock()
         gui = server.gui
         self._folder = gui.add_folder("Columns")
@@ -140,13 +141,16 @@ class ComparePanel:
             at_hand = {column.key: column for column in self._columns.all}
             for key in [key for key in self._boxes if key not in at_hand]:
                 self._boxes.pop(key).remove()
+                del self._known[key]
             with self._folder:
                 for key, column in at_hand.items():
                     if key not in self._boxes:
                         box = self._server.gui.add_checkbox(column.label, column.shown, hint="show this column")
                         box.on_update(self._ticked(key))
-                        self._boxes[key] = box
-                    self._boxes[key].value = column.shown
+                        self._boxes[key], self._known[key] = box, column.shown
+                    elif self._known[key] != column.shown:
+                        # only then: a hand may just have ticked it, and its wish is yet to be read
+                        self._boxes[key].value = self._known[key] = column.shown
             self._clear.visible = self._removable()
 
     def _removable(self) -> bool:
@@ -156,7 +160,8 @@ class ComparePanel:
         async def show(event: viser.GuiEvent) -> None:
             # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
             if event.client_id is not None:
-                self._columns.show(key, bool(event.target.value))
+                self._known[key] = bool(event.target.value)
+                self._columns.show(key, self._known[key])
                 self._clear.visible = self._removable()
                 self._changed()
 

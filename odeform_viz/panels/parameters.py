@@ -111,7 +111,7 @@ class ParameterPanel:
             self._preset = gui.add_dropdown("preset", (OWN, *self._presets), hint="corners of the trained range")
             self._preset.on_update(self._choose)
             reset = gui.add_button_group("reset", ("all", *(p.name for p in schema.parameters)))
-            reset.on_click(lambda event: self._reset(str(event.target.value)))
+            reset.on_click(self._reset)
         self.show()
 
     async def _choose(self, event: viser.GuiEvent) -> None:
@@ -119,8 +119,9 @@ class ParameterPanel:
         if event.client_id is not None and self._preset.value in self._presets:
             self.set(self._presets[self._preset.value])
 
-    def _reset(self, name: str) -> None:
-        defaults = self._presets["defaults"]
+    async def _reset(self, event: viser.GuiEvent) -> None:
+        # so does this, before a drag that follows it
+        name, defaults = event.target.value, self._presets["defaults"]
         self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
 
     def set(self, parameters: Mapping[str, float]) -> None:

@@ -67,6 +67,7 @@ class TruthPanel:
         self._parameters, self._set, self._changed, self._say = parameters, set_parameters, changed, say
         self._job: Job | None = None
         self._starting = threading.Lock()
+        self._opening = asyncio.Lock()  # fair: what was chosen last is opened last
         installed, scene = simulator_installed(), known_scenes().get(schema.scene)
         gui = server.gui
         with gui.add_folder("Truth"):
@@ -104,7 +105,9 @@ class TruthPanel:
     async def _opened(self, event: viser.GuiEvent) -> None:
         # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
         if event.client_id is not None:
-            await asyncio.to_thread(self._choose, self._browser.value)
+            chosen = self._browser.value
+            async with self._opening:
+                await asyncio.to_thread(self._choose, chosen)
 
     def _choose(self, chosen: str) -> None:
         try:

@@ -46,10 +46,23 @@ def test_what_is_kept_is_not_done_again(cell: Cell, folder: Path) -> None:
     assert len(before) == 2
 
 
+def test_scores_suffice(cell: Cell, folder: Path) -> None:
+    file = folder / f"{cell.name}.safetensors"
+    whole = file.read_bytes()
+    file.unlink()
+    found = run_cells([cell], folder, 1, kept_only=True)[cell]
+    assert found["scores"].keys() == {"0:121", "60:70"}
+    assert not file.exists()
+    # but not where others are asked for
+    assert run_cells([replace(cell, scored=((0, 60),))], folder, 1, kept_only=True) == {}
+    file.write_bytes(whole)
+
+
 def test_an_interrupted_cell_is_trained_anew(cell: Cell, folder: Path) -> None:
     file = folder / f"{cell.name}.safetensors"
     whole = read_checkpoint(file)
     write_checkpoint(file, replace(whole, scores={}))
+    file.with_suffix(".json").unlink()
     assert run_cells([cell], folder, 1, kept_only=True) == {}
     run_cells([cell], folder, 1)
     assert read_checkpoint(file).scores == whole.scores

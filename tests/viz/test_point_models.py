@@ -1,5 +1,6 @@
 """Models of points in the viewer's session, beside the others and the truth."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from odeform.errors import InputError
 from odeform.model.point_motion import PointMotion
 from odeform.model.recorded import RecordedMotion
 from odeform.predictor import Predictor, load
+from odeform.wanted import Unwanted, as_long_as
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import moment_in_words
 from odeform_viz.session import Session, Wish
@@ -51,3 +53,30 @@ def test_between_frames_needs_a_truth_of_these_parameters(models: dict[str, Pred
     assert [shown.column.label for shown in frame.columns] == ["truth"]  # one that refuses stops no other
     assert frame.refused == ("flow moves between observed frames: expected the truth of these parameters",)
     assert "flow moves between observed frames" in moment_in_words(frame)
+
+
+def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch) -> None:
+    kick = load("kick")
+    fast, slow = Column("fast", kick, kick.rest), Column("node", models["node"], models["node"].rest)
+    session = Session(kick.schema)
+    columns = Columns.of([fast, slow]).all
+    wish = Wish(session.schema.complete({"mass": 0.5}), 0.4, "balanced", columns)
+    asked = iter([True] * 10)
+    with pytest.raises(Unwanted), as_long_as(lambda: next(asked, False)):  # a newer wish comes meanwhile
+        session.frame(wish, whole=False)
+    # what was given up is left for later, and the page says so
+    first = session.frame(wish, whole=False)
+    assert [shown.column.label for shown in first.columns] == ["fast"]
+    assert first.pending == ("node",)
+    assert "node** is being computed" in moment_in_words(first)
+    assert first.follows(replace(wish, time=0.5))
+    whole = session.frame(wish)
+    assert [shown.column.label for shown in whole.columns] == ["fast", "node"]
+    assert not whole.pending
+    # once there, it is shown at any time
+    assert not session.frame(replace(wish, time=0.5), whole=False).pending
+    monkeypatch.setattr("odeform_viz.session.SLOW", 0.0)
+    moved = replace(wish, parameters={**wish.parameters, "mass": 0.6})
+    assert not first.follows(moved)
+    # the motion that took least is slow now too
+    assert session.frame(moved, whole=False).pending == ("fast", "node")
