@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
@@ -60,6 +61,8 @@ class App:
         self.columns = Columns.of(columns)
         self.session = Session(columns[0].source.schema)
         share_arenas()
+        # two threads of a product wait for each other: with a core busy elsewhere, ten times as long as one takes
+        self._threads = threadpool_limits(1, "blas")
         self._tidy = Tidy()
         self.server = open_server(host, port, f"ODeform · {self.session.schema.scene}")
         self._record_to = record
@@ -146,6 +149,7 @@ class App:
             self._stability.close()
         self._worker.stop()
         self.server.stop()
+        self._threads.restore_original_limits()
         if self._recorder:
             self._recorder.close()
 

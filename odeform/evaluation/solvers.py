@@ -1,4 +1,4 @@
-"""Whether the solvers do what they say on a model's own field, and what that field does to small differences."""
+"""What a model's own field does to small differences, and whether what is said of them is so."""
 
 import math
 
@@ -12,61 +12,14 @@ from odeform.model.odeform import ODeform
 from odeform.model.reduced import POSE, small_motion
 from odeform.schema import LATER
 from odeform.solver.integrate import Quality, integrate
-from odeform.solver.tableau import METHODS
 from odeform.types import Floats
 
-__all__ = ["check_calibration", "check_field", "check_orders", "observed_order"]
+__all__ = ["check_calibration", "check_field", "check_sensitivities"]
 
-NODES = 32  # moments at which solutions are compared; each step size divides them
-REFINED = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)  # steps between two of them
-FLOOR = 2e-14  # of the states: below, errors are rounding
 TRUTH = Quality("dopri5", tolerance=1e-11, dtype="float64")
 CALIBRATION = (40, 12)  # motions, and ways to integrate each
 DRAWS = 2
-
-
-def _errors(field: Field, start: Floats, method: str, span: float) -> tuple[list[float], list[float]]:
-    """Ever finer steps and their errors, as long as these are above rounding: norms over `NODES` moments."""
-
-    def states(name: str, pieces: int) -> Floats:
-        solution = integrate(field, start, Quality(name, step=span / pieces), span)
-        return np.stack(solution.states[:: pieces // NODES])
-
-    truth = states("dopri5", 2 * NODES * REFINED[-1])
-    steps, errors = [], []
-    for pieces in (NODES * times for times in REFINED):
-        error = float(np.linalg.norm(states(method, pieces) - truth))
-        if error < FLOOR * np.linalg.norm(truth):
-            break
-        steps.append(span / pieces)
-        errors.append(error)
-    return steps, errors
-
-
-def observed_order(steps: list[float], errors: list[float]) -> float:
-    """Slope of log error over log step, of the three finest: fifth order shows only just above rounding."""
-    return float(np.polyfit(np.log(steps[-3:]), np.log(errors[-3:]), 1)[0])
-
-
-def check_orders(model: ODeform, seed: int = 0) -> Checks:
-    """`order_METHOD_deviation`: how far the observed order is from the method's own.
-
-    Dormand and Prince made the leading term of their error so small that on a sharp field the next one rules until
-    rounding does: their method then converges faster than its order says, which counts as a deviation all the same.
-
-    `refining_error_ratio`: the largest ratio of an error to that of the next coarser step, from a thirty-second of the
-    window on.
-    """
-    placed, schema = model.place(model.rest, 0.0), model.schema
-    off, ratio = dict.fromkeys(METHODS, 0.0), 0.0
-    for parameters in inside(schema, DRAWS, seed):
-        field, start, _ = model.problem(schema.seen(parameters), placed, np.float64)
-        for name, method in METHODS.items():
-            steps, errors = _errors(field, start, name, schema.window.stop)
-            off[name] = max(off[name], abs(observed_order(steps, errors) - method.order))
-            ratio = max(ratio, float(np.max(np.divide(errors[1:], errors[:-1]))))
-    checks = {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
-    return {**checks, "refining_error_ratio": Check(ratio, 1.0)}
+HALF_STEP = 0.005  # of a half of the trained range: sliders divide the whole into two hundred steps
 
 
 def check_field(model: ODeform, seed: int = 0) -> Checks:
@@ -140,3 +93,24 @@ def check_calibration(model: ODeform, seed: int = 0) -> Checks:
         ),
         "solver_error_underestimated": Check(float(np.mean(np.array(true) > 2.0 * np.array(said))), 0.05),
     }
+
+
+def check_sensitivities(model: ODeform, seed: int = 0) -> Checks:
+    """`sensitivity_relative`: derivatives by the parameters, carried through the ODE, against central differences over
+    a step of a slider, relative to the largest over the window; the worst parameter, pose and deformation together."""
+    placed, schema = model.place(model.rest, 0.0), model.schema
+    finest = Quality("dopri5", tolerance=1e-9, dtype="float64")
+    times, worst = schema.window.times, 0.0
+
+    def ends(theta: Floats) -> Floats:
+        return model.integrate(theta, placed, finest, schema.window.stop).reduced(times)
+
+    for parameters in inside(schema, DRAWS, seed):
+        theta = schema.seen(parameters)
+        derivatives = model.sensitivities(theta, times, finest)[1:]
+        for unit, exact in zip(np.eye(len(theta)), derivatives, strict=True):
+            by = HALF_STEP * unit
+            off = (ends(theta + by) - ends(theta - by)) / (2.0 * HALF_STEP) - exact
+            largest = small_motion(exact, model.space.arm).max()
+            worst = max(worst, float(small_motion(off, model.space.arm).max() / largest))
+    return {"sensitivity_relative": Check(worst, 0.05)}

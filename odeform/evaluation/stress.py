@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.answers import check_answers
 from odeform.evaluation.check import Check, Checks
 from odeform.evaluation.draws import Draw, draws, shapes, thinned
+from odeform.evaluation.orders import check_orders, check_refining
 from odeform.evaluation.physics import check_physics
-from odeform.evaluation.solvers import check_calibration, check_field, check_orders
+from odeform.evaluation.solvers import check_calibration, check_field, check_sensitivities
 from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor, load_reduced
 from odeform.progress import Progress
@@ -86,7 +88,10 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
-        checks |= check_orders(predictor, seed) | check_field(predictor, seed) | check_calibration(predictor, seed)
+        checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
+        checks |= check_field(predictor, seed) | check_calibration(predictor, seed)
+        if schema.scene in bundled_datasets():
+            checks |= check_refining(predictor, open_dataset(schema.scene))
     return {
         "cases": len(asked),
         "non_finite_shown": sum(outcome.non_finite for outcome in outcomes),

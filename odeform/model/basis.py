@@ -17,7 +17,7 @@ from odeform.types import Basis, Floats, Perpoint, Points
 
 __all__ = ["DisplacementBasis", "fit_basis"]
 
-CHUNK = 2048  # points evaluated at once: as many as stay in the cache with their distances from all centers
+CHUNK = 512  # points evaluated at once: as many as stay in the cache with their distances from all centers
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +42,22 @@ class DisplacementBasis:
         away = np.maximum(np.linalg.norm(scaled, axis=1), np.finfo(float).tiny)
         return scaled, away, faded(away, self._far, 0.5 * self._far)
 
-    def values(self, points: Points) -> Basis:
+    def values(self, points: Points, out: Float[np.ndarray, "modes points 3"] | None = None) -> Basis:
         """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32.
 
-        A view of an array whose modes come first, so that frames are c @ values at the speed of memory or arithmetic.
+        A view of an array whose modes come first, so that frames are c @ values at the speed of memory or arithmetic:
+        of `out`, if given, which is filled.
         """
-        out = np.empty((self.modes, len(points), 3), dtype=np.float32)
+        out = np.empty((self.modes, len(points), 3), dtype=np.float32) if out is None else out
+        count = len(self.centers)
+        features = np.ones((min(CHUNK, len(points)), count + 4))
         for at in range(0, len(points), CHUNK):
             chunk, away, near = self._near(points[at : at + CHUNK])
             chunk *= (near / away)[:, None]
-            features = np.concatenate([_cubes(chunk, self.centers), np.ones((len(chunk), 1)), chunk], axis=1)
-            value = features @ self.weights
-            out[:, at : at + CHUNK] = value.reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
+            squares, seen = _squares(chunk, self.centers), features[: len(chunk)]
+            np.multiply(squares, np.sqrt(squares), out=seen[:, :count])
+            seen[:, count + 1 :] = chunk
+            out[:, at : at + CHUNK] = (seen @ self.weights).reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
         return out.transpose(1, 2, 0)
 
     def slopes(
@@ -86,22 +90,17 @@ Pairs = Float[np.ndarray, "points centers"]
 
 def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
     """Squared distances, by products: fast, and exact to rounding of the coordinates, which are of order one."""
-    squares = -2.0 * points @ centers.T
-    squares += (points**2).sum(axis=1)[:, None]
-    squares += (centers**2).sum(axis=1)
+    one = np.concatenate([-2.0 * points, (points**2).sum(axis=1)[:, None], np.ones((len(points), 1))], axis=1)
+    other = np.concatenate([centers, np.ones((len(centers), 1)), (centers**2).sum(axis=1)[:, None]], axis=1)
+    squares = one @ other.T
     return np.maximum(squares, 0.0, out=squares)
-
-
-def _cubes(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
-    squares = _squares(points, centers)
-    return squares * np.sqrt(squares)
 
 
 def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
     """The basis that takes the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
-    system = np.block([[_cubes(centers, centers), tail], [tail.T, np.zeros((4, 4))]])
+    system = np.block([[_squares(centers, centers) ** 1.5, tail], [tail.T, np.zeros((4, 4))]])
     values = np.asarray(modes, dtype=float).swapaxes(1, 2).reshape(len(centers), -1)
     # least squares rather than a solve: coplanar points leave part of the linear tail undetermined
     weights = np.linalg.lstsq(system, np.concatenate([values, np.zeros((4, values.shape[1]))]), rcond=None)[0]

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag, get_blas_funcs
+from scipy.linalg import block_diag
 
 from odeform.model.config import ModelConfig
 from odeform.model.predicted import SolveStats
 from odeform.model.reduced import POSE, small_motion
 from odeform.solver.integrate import Quality, integrate
 from odeform.solver.solution import Solution, Status
-from odeform.solver.stages import Field
+from odeform.solver.stages import Field, gemv
 from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
@@ -173,7 +173,7 @@ def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[F
 
 def _field(matrices: list[Floats], biases: list[Floats]) -> Field:
     """Layers with tanh between them."""
-    (product,) = get_blas_funcs(("gemv",), matrices)
+    product = gemv(matrices[0].dtype)
     *hidden, (last, last_bias) = zip(matrices, biases, strict=True)
 
     def field(_: float, state: Floats) -> Floats:

@@ -15,6 +15,7 @@ from odeform.types import GaussianSplats, Geometry, Perpoint, Points
 __all__ = ["STILL", "PlacedBasis", "place"]
 
 STILL = 4  # rows of `PlacedBasis` that are no modes
+CHUNK = 1 << 14  # points, or their coordinates, that are worked on at once: they stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +45,12 @@ class PlacedBasis:
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:
         """Mean products of the modes over the surface: c gram c is the mean square displacement, m^2."""
-        shares = np.repeat(self.shares, 3).astype(np.float32)
-        return (self.values * shares) @ self.values.T
+        shares, modes = np.repeat(self.shares, 3).astype(np.float32), len(self.values)
+        out = np.zeros((modes, modes))
+        for at in range(0, len(shares), CHUNK):
+            part = self.values[:, at : at + CHUNK]
+            out += (part * shares[at : at + CHUNK]) @ part.T
+        return out.astype(np.float32)
 
     @cached_property
     def triads(self) -> Triads:
@@ -64,12 +69,13 @@ class PlacedBasis:
 def place(geometry: Geometry, space: ReducedSpace, azimuth: float) -> PlacedBasis:
     """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
     rest = to_canonical(geometry.points, space.anchor, azimuth)
-    values = space.basis.values(rest).transpose(2, 0, 1)
-    points = np.asarray(geometry.points, dtype=np.float32)
-    reach = np.sqrt(np.einsum("kni,kni->kn", values, values).max(axis=1))
-    rest, count = rest.astype(np.float32), len(rest)
-    rows = np.empty((STILL + space.basis.modes, 3 * count), dtype=np.float32)
-    rows[:3] = np.tile(np.eye(3), count)
+    points, (count, modes) = np.asarray(geometry.points, dtype=np.float32), (len(rest), space.basis.modes)
+    rows = np.empty((STILL + modes, 3 * count), dtype=np.float32)
+    values = rows[STILL:].reshape(modes, count, 3)
+    space.basis.values(rest, out=values)
+    rest = rest.astype(np.float32)
+    rows[:3] = np.tile(np.eye(3, dtype=np.float32), count)
     rows[3] = rest.ravel()
-    rows[STILL:] = values.reshape(space.basis.modes, -1)
+    squares = (np.square(values[:, at : at + CHUNK]).sum(axis=2).max(axis=1) for at in range(0, count, CHUNK))
+    reach = np.sqrt(np.max(list(squares), axis=0))
     return PlacedBasis(geometry, space, azimuth, points, rest, rows, reach, surface_shares(geometry))

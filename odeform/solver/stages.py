@@ -1,6 +1,7 @@
 """The stages of a Runge-Kutta step: slopes, and weighted sums of them."""
 
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,17 @@ from scipy.linalg import get_blas_funcs
 
 from odeform.solver.tableau import Tableau
 
-__all__ = ["Field", "Stages"]
+__all__ = ["Field", "Stages", "gemv"]
 
 Field = Callable[[float, Any], Any]
+EXACT = 10**6  # denominators of tableaux are smaller
+
+
+def gemv(dtype: np.dtype) -> Callable[..., Any]:
+    """(alpha, a, x, beta=0, y=0) -> alpha a x + beta y: of BLAS, or, in precisions that it does not know, of numpy."""
+    if dtype.char in "fd":
+        return get_blas_funcs(("gemv",), dtype=dtype)[0]
+    return lambda alpha, a, x, beta=0.0, y=0.0: alpha * (a @ x) + beta * y
 
 
 class Stages:
@@ -26,14 +35,20 @@ class Stages:
         self.evaluations = len(rows)
         """What a step takes."""
         self._slopes = np.empty((len(start), self.evaluations + 1), start.dtype, order="F")
-        (self._product,) = get_blas_funcs(("gemv",), dtype=start.dtype)
+        self._product = gemv(start.dtype)
         weighed = [self._weigh(row) for row in rows]
         self._stages = list(zip(range(1, len(rows) + 1), weighed, nodes, strict=True))
         self._error = self._weigh(method.error or ())
         self._middle = self._weigh(method.middle or ())
 
     def _weigh(self, row: tuple[float, ...]) -> Any:
-        return self._slopes[:, : len(row)], np.array(row, self._slopes.dtype)
+        dtype = self._slopes.dtype
+        if dtype.char in "fd":
+            return self._slopes[:, : len(row)], np.array(row, dtype)
+        # beyond double precision the fractions that the numbers stand for
+        fractions = [Fraction(weight).limit_denominator(EXACT) for weight in row]
+        exact = [dtype.type(f.numerator) / dtype.type(f.denominator) for f in fractions]
+        return self._slopes[:, : len(row)], np.array(exact, dtype)
 
     def _ahead(self, state: Any, weighed: Any, step: float) -> Any:
         """state + step * sum_i weights[i] slopes[i]"""

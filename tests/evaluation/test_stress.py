@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from odeform.cli import main
-from odeform.evaluation import answers, physics, solvers, stress
+from odeform.dataset.store import open_dataset
+from odeform.evaluation import answers, orders, physics, solvers, stress
 from odeform.evaluation import draws as draws_module
 from odeform.evaluation.check import Check
 from odeform.evaluation.draws import draws, shapes
@@ -22,10 +23,10 @@ from odeform.geometry.rigid import rotation_from_vector
 from odeform.model.inference import LatentTrajectory
 from odeform.model.motion import Motion
 from odeform.model.odeform import ODeform
-from odeform.predictor import Predictor
+from odeform.predictor import Predictor, load
 from odeform.solver import tableau
 
-REFINED = (8, 12, 16, 48)  # within the asymptotic range of all methods
+REFINED, FINER = (12, 16, 48), (3, 4, 6)  # within the asymptotic range of all methods
 
 
 @pytest.fixture
@@ -39,10 +40,12 @@ def model(predictors: dict[str, Predictor]) -> ODeform:
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     """One motion where a full run takes many, and no million points."""
     monkeypatch.setattr(draws_module, "SHAPES", draws_module.SHAPES[:-1])
-    for module in (answers, physics, solvers):
+    for module in (answers, orders, physics, solvers):
         monkeypatch.setattr(module, "DRAWS", 1)
     monkeypatch.setattr(solvers, "CALIBRATION", (4, 6))
-    monkeypatch.setattr(solvers, "REFINED", REFINED)
+    monkeypatch.setattr(orders, "SEQUENCES", 1)
+    monkeypatch.setattr(orders, "REFINED", REFINED)
+    monkeypatch.setattr(orders, "FINER", FINER)
 
 
 def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
@@ -90,18 +93,41 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
     sure |= {"batch_invariance_m", "single_precision_mm"}
     if name == "odeform":
         sure |= {f"order_{method}_deviation" for method in tableau.METHODS}
-        sure |= {"refining_error_ratio", "solver_error_rank_correlation"}
+        sure |= {"sensitivity_relative", "solver_error_rank_correlation"}
     assert sure <= set(result["checks"])
     assert [check for check in sure if not result["checks"][check]["holds"]] == []
 
 
 def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solvers, "DRAWS", 1)
-    monkeypatch.setattr(solvers, "REFINED", REFINED)
-    monkeypatch.setattr(solvers, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
+    monkeypatch.setattr(orders, "DRAWS", 1)
+    monkeypatch.setattr(orders, "REFINED", REFINED)
+    monkeypatch.setattr(orders, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
     monkeypatch.setitem(tableau.METHODS, "rk4", replace(tableau.METHODS["rk4"], b=(1 / 6, 1 / 3, 1 / 6, 1 / 3)))
-    checks = solvers.check_orders(model)
+    checks = orders.check_orders(model)
     assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
+
+
+def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solvers, "DRAWS", 1)
+    assert solvers.check_sensitivities(model)["sensitivity_relative"].holds
+    sound = ODeform.sensitivities
+    monkeypatch.setattr(ODeform, "sensitivities", lambda *asked: 1.1 * sound(*asked))
+    assert not solvers.check_sensitivities(model)["sensitivity_relative"].holds
+
+
+def test_refining_that_leads_away_from_the_truth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(orders, "METHODS", {"rk4": tableau.METHODS["rk4"]})
+    model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
+    assert isinstance(model, ODeform)
+    assert orders.check_refining(model, dataset)["refining_error_ratio"].holds
+    sound = ODeform.solve
+
+    def drifting(self: ODeform, shape: Any, parameters: Any, quality: Any) -> Motion:
+        heavier = {**parameters, "mass": parameters["mass"] * (1.0 + 1e-5 / quality.step)}
+        return sound(self, shape, heavier, quality)
+
+    monkeypatch.setattr(ODeform, "solve", drifting)
+    assert not orders.check_refining(model, dataset)["refining_error_ratio"].holds
 
 
 def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:

@@ -52,6 +52,20 @@ def test_order_at_the_nodes(name: str) -> None:
     assert order(steps, errors) == pytest.approx(METHODS[name].order, abs=0.2)
 
 
+@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision here")
+@pytest.mark.parametrize("name", ["rk4", "bosh3", "dopri5"])
+def test_extended_precision_is_kept(name: str) -> None:
+    """Coefficients that are rounded to double would leave an error of some 1e-17 a step."""
+    first, e = np.ones(1, dtype=np.longdouble), np.exp(np.longdouble(1.0))
+    steps, errors = (400, 800), []
+    for count in steps:
+        solution = integrate(lambda _, z: z, first, Quality(name, step=1.0 / count), until=1.0)
+        assert solution.states[-1].dtype == np.longdouble
+        errors.append(float(abs(solution.states[-1][0] - e)))
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(METHODS[name].order, abs=0.1)
+    assert errors[1] < {"rk4": 1e-12, "bosh3": 1e-9, "dopri5": 3e-17}[name]
+
+
 @pytest.mark.parametrize("name", METHODS)
 def test_order_between_the_nodes(name: str) -> None:
     """The cubic between nodes is of fourth order: no method of up to that order loses by it."""
