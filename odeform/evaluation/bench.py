@@ -14,7 +14,7 @@ from odeform.evaluation.peers import peers
 from odeform.evaluation.precision import Place, find_places, measure, work_precision
 from odeform.evaluation.probes import ball, random_parameters, round_splats
 from odeform.evaluation.startup import startup
-from odeform.evaluation.timing import milliseconds, quantiles
+from odeform.evaluation.timing import as_viewed, milliseconds, quantiles
 from odeform.model.base import ReducedModel
 from odeform.model.odeform import ODeform
 from odeform.model.placed import place
@@ -88,19 +88,20 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
         "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
     }
     result = {"machine": machine, "model": predictor.model, "scene": scene, "sha256": predictor.checkpoint.sha256}
-    result |= {"data": data, "latency": _latency(predictor)}
     places: list[Place] = []
-    if isinstance(predictor, ODeform):
-        places = find_places(predictor, dataset)
-        result |= _solver(predictor, places)
-    return {
-        **result,
-        "knobs": knobs(predictor),
-        "limits": limits(predictor),
-        "startup": startup(checkpoint),
-        "scaling": scaling(predictor, SIZES),
-        "peers": peers(predictor, dataset, places),
-    }
+    with as_viewed():
+        result |= {"data": data, "latency": _latency(predictor)}
+        if isinstance(predictor, ODeform):
+            places = find_places(predictor, dataset)
+            result |= _solver(predictor, places)
+        return {
+            **result,
+            "knobs": knobs(predictor),
+            "limits": limits(predictor),
+            "startup": startup(checkpoint),
+            "scaling": scaling(predictor, SIZES),
+            "peers": peers(predictor, dataset, places),
+        }
 
 
 def _cell(value: Any) -> str:

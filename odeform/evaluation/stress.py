@@ -16,6 +16,7 @@ from odeform.evaluation.draws import Draw, draws, shapes, thinned
 from odeform.evaluation.orders import check_orders, check_refining
 from odeform.evaluation.physics import check_physics
 from odeform.evaluation.solvers import check_calibration, check_field, check_sensitivities
+from odeform.evaluation.timing import as_viewed
 from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor, load_reduced
 from odeform.progress import Progress
@@ -81,9 +82,10 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     asked = draws(schema, bool(predictor.qualities), count, seed)
     progress = Progress("stress", len(asked))
     outcomes = []
-    for draw in asked:
-        outcomes.append(show(predictor, draw, geometries))
-        progress.advance()
+    with as_viewed():
+        for draw in asked:
+            outcomes.append(show(predictor, draw, geometries))
+            progress.advance()
     progress.close()
     checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)

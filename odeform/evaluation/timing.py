@@ -4,10 +4,11 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from odeform.types import Floats
 
-__all__ = ["milliseconds", "quantiles", "typical"]
+__all__ = ["as_viewed", "milliseconds", "quantiles", "typical"]
 
 
 def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> Floats:
@@ -29,3 +30,9 @@ def quantiles(samples: Floats) -> dict[str, float]:
 def typical(work: Callable[[int], object], repeats: int, warm: int = 3) -> float:
     """The median of `milliseconds`."""
     return float(np.median(milliseconds(work, repeats, warm)))
+
+
+def as_viewed() -> threadpool_limits:
+    """Products on one thread each, as in the viewer: two that wait for each other stand still while any other program
+    has a core, and measure that."""
+    return threadpool_limits(1, "blas")

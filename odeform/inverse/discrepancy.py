@@ -1,20 +1,21 @@
 """How wrong a model is, as far as it matters to parameters that are inferred from it.
 
 A model's error is no noise: it is alike from frame to frame, so that a hundred frames may tell as little as three. It
-is measured on the validation split, at parameters that are known there, and told as a variance of each cause in each
-frame, as large as errors independent of each other would have to be in order to mislead as much
-(Kennedy & O'Hagan 2001, on calibration with model discrepancy; composite likelihoods: Varin, Reid & Firth 2011).
+is measured on the validation split, at parameters that are known there. What of it follows from the parameters, as a
+linear function of them, is taken off; the rest is told as a variance of each cause in each frame, as large as errors
+independent of each other would have to be in order to mislead as much (Kennedy & O'Hagan 2001, on calibration with
+model discrepancy; composite likelihoods: Varin, Reid & Firth 2011).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.inverse.linear import Comparison
+from odeform.inverse.linear import Comparison, Linear
 from odeform.inverse.observation import View, observe
 from odeform.model.reduced import POSE
 from odeform.predictor import Predictor
@@ -31,19 +32,35 @@ DISCOUNT = 2.0
 spans mislead alike, the late ones most. Of powers 1 and 2, the second takes a quarter off
 the errors of kicks on validation."""
 LEAST = 8  # sequences
+RIDGE = 1.0  # on the slopes of what follows from the parameters, in sequences
 
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """`variances` (T, 6 + K) mm^2 of the causes at `times` (T,) seconds."""
+    """`variances` (T, 6 + K) mm^2 of the causes at `times` (T,) seconds, and their `means` (T, 6 + K, 1 + P) mm: as
+    they are in the middle of the trained ranges, and what half of each range adds."""
 
     times: Times
     variances: Float[np.ndarray, "times causes"]
+    means: Float[np.ndarray, "times causes terms"]
 
     def at(self, times: Times) -> Floats:
-        """(T, 6 + K) mm^2 at any (T,) seconds; after the last one as there."""
-        logs = np.log(self.variances)
-        return np.exp(np.stack([np.interp(times, self.times, column) for column in logs.T], axis=1))
+        """Variances (T, 6 + K) mm^2 at any (T,) seconds; after the last one as there."""
+        return np.exp(_between(times, self.times, np.log(self.variances)))
+
+    def less_mean(self, linear: Linear, theta: Floats, times: Times) -> Linear:
+        """A comparison at theta (P,), less what is expected of the model's error there."""
+        means = _between(times, self.times, self.means)
+        expected = linear.spread @ (means @ np.concatenate([[1.0], theta]))[..., None]
+        slopes = means[..., 1 : 1 + linear.gain.shape[-1]]  # none where a comparison has none
+        return replace(linear, off=linear.off - expected[..., 0], gain=linear.gain + slopes)
+
+
+def _between(asked: Floats, times: Floats, values: Floats) -> Floats:
+    """Values (T, ...) at (T,) `times`, linear between them: (A, ...) at the (A,) moments `asked`."""
+    flat = values.reshape(len(times), -1)
+    columns = [np.interp(asked, times, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(len(asked), *values.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,24 +84,37 @@ def calibrate(
     entries = dataset.select(split)
     if len(entries) < LEAST:
         raise InputError(f"split {split}: expected at least {LEAST} sequences to calibrate on, got {len(entries)}")
-    errors, gains, times = [], [], np.zeros(0)
+    errors, gains, thetas, times = [], [], [], np.zeros(0)
     for index, entry in enumerate(entries):
         sequence = dataset.read(entry)
         observation = observe(sequence, predictor.schema, View()).thinned()
-        linear = Comparison(predictor, observation).at(predictor.schema.vector(sequence.parameters))
+        thetas.append(predictor.schema.vector(sequence.parameters))
+        linear = Comparison(predictor, observation).at(thetas[-1])
         normal = linear.spread.swapaxes(1, 2) @ linear.spread
         pulled = linear.spread.swapaxes(1, 2) @ linear.off[..., None]
         errors.append(np.linalg.solve(normal, pulled)[..., 0])
         gains.append(linear.gain)
         times = observation.times  # the frames of the window, for all
         progress((index + 1) / len(entries))
-    known = _Known(np.array(errors), np.array(gains))
+    means, rest = _expected(np.array(errors), np.array(thetas))
+    known = _Known(rest, np.array(gains) + means[..., 1:])
     table = _variances(known, times)
     # half of them say how far intervals from the other half are off
     halves = [slice(0, None, 2), slice(1, None, 2)]
     scores = [_scores(known.part(there), _variances(known.part(here), times)) for here, there in (halves, halves[::-1])]
     scale = np.quantile(np.abs(np.concatenate(scores)), NOMINAL) / TWO_SIDED
-    return Discrepancy(times, table * max(float(scale), 1.0) ** 2)
+    return Discrepancy(times, table * max(float(scale), 1.0) ** 2, means)
+
+
+def _expected(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
+    """What follows of errors (S, T, 6 + K) from theta (S, P), as (T, 6 + K, 1 + P), and what is then left of each
+    sequence by means of all the others."""
+    terms = np.concatenate([np.ones((len(thetas), 1)), thetas], axis=1)
+    ridge = RIDGE * np.diag([0.0] + [1.0] * thetas.shape[1])
+    solved = np.linalg.solve(terms.T @ terms + ridge, terms.T)
+    means = np.einsum("ps,stc->tcp", solved, errors)
+    own = np.einsum("sp,ps->s", terms, solved)  # the weight that each has in its own mean
+    return means, (errors - np.einsum("tcp,sp->stc", means, terms)) / (1.0 - own)[:, None, None]
 
 
 def _spans(times: Times) -> Ints:

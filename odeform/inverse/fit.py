@@ -60,7 +60,7 @@ def fit(comparison: Comparison, discrepancy: Discrepancy, progress: Callable[[Fl
 
     def cost(theta: Floats) -> float:
         observation = coarse.observation
-        linear = coarse.at(theta, sloped=False)
+        linear = discrepancy.less_mean(coarse.at(theta, sloped=False), theta, observation.times)
         return normal_equations(linear, discrepancy.at(observation.times), observation.noise_mm)[2]
 
     refined: list[Fit] = []
@@ -78,7 +78,8 @@ def _refined(
     variances = discrepancy.at(observation.times)
 
     def look(theta: Floats) -> tuple[Floats, Floats, float]:
-        return normal_equations(comparison.at(theta), variances, observation.noise_mm)
+        linear = discrepancy.less_mean(comparison.at(theta), theta, observation.times)
+        return normal_equations(linear, variances, observation.noise_mm)
 
     theta, damping = start, DAMPING[0]
     information, score, cost = look(theta)

@@ -18,7 +18,8 @@ FINE = Quality("dopri5", tolerance=1e-7, dtype="float64")
 def certain(predictor: Predictor) -> Discrepancy:
     """A model that is hardly wrong."""
     times = predictor.schema.window.times[1:]
-    return Discrepancy(times, np.full((len(times), 6 + predictor.solve().space.basis.modes), 1e-6))
+    causes, terms = 6 + predictor.solve().space.basis.modes, 1 + len(predictor.schema.learned)
+    return Discrepancy(times, np.full((len(times), causes), 1e-6), np.zeros((len(times), causes, terms)))
 
 
 def seen(predictor: Predictor, theta: np.ndarray, times: np.ndarray, points: int = 40) -> Observation:
@@ -83,6 +84,20 @@ def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
         assert other.reach > 10.0 * one.reach
         assert abs(other.unit - truth) < 2.0 * other.reach
         assert other.identifiable
+
+
+def test_what_is_expected_of_the_error_is_taken_off() -> None:
+    predictor, theta = load("mass-elastic"), np.array([0.3, -0.4])
+    whole = certain(predictor)
+    true = seen(predictor, theta, whole.times)
+    # a model that is off by 3 mm, and by 2 mm more for each half of the range of mass
+    means = whole.means.copy()
+    means[:, 2, :2] = 3.0, 2.0
+    biased = replace(true, positions=true.positions + np.array([0.0, 0.0, 3.0 + 2.0 * theta[0]]) / 1e3)
+    for means_known, close in ((means, True), (whole.means, False)):
+        found = identify(predictor, biased, replace(whole, means=means_known))
+        off = max(abs(one.unit - truth) for one, truth in zip(found.parameters.values(), theta, strict=True))
+        assert (off < 1e-3) == close, off
 
 
 def test_free_flight_tells_nothing() -> None:
