@@ -28,7 +28,6 @@ class MomentaryPoints:
         self._net, self._network, self._frame, self._window = net, network, frame, window
         self._x, self._theta = x, np.asarray(theta, dtype=np.float32)
 
-    @property
     def stats(self) -> SolveStats:
         return SolveStats("none: a network of the time", 0, 0, 0, "ok", 0.0, lambda: None)
 
@@ -87,7 +86,6 @@ class FramedPoints:
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         return out
 
-    @property
     def stats(self) -> SolveStats:
         steps = len(self.frames) - 1
         solver = f"{self.solver}, {1e3 / self._window.rate:.3g} ms, {self.between} between its frames"

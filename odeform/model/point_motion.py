@@ -34,8 +34,9 @@ MARGIN = 1.25  # times the largest displacement that was trained, up to which di
 class PointTrajectory(Protocol):
     """Displacements of some points from the mean motion. What it says of a time never depends on what was asked."""
 
-    @property
-    def stats(self) -> SolveStats: ...
+    def stats(self) -> SolveStats:
+        """Of the whole roll-out, which takes place if it has not yet."""
+        ...
 
     def displacements(self, times: Times) -> Frames:
         """(T,) seconds -> (T, N, 3) metres in canonical axes; zero at time 0."""
@@ -136,7 +137,7 @@ class PointMotion(PredictedMotion):
 
     @property
     def stats(self) -> SolveStats:
-        return self._shape.stats
+        return self._shape.stats()
 
     @property
     def last_good(self) -> float:

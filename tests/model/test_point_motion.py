@@ -23,10 +23,11 @@ def ball(level: int = 3) -> Mesh:
 class Rolling:
     """Turns by `t` radians about y, goes `t` metres along x, and is stretched by `t` `stretch` along z."""
 
-    stats = SolveStats("known", 0, 0, 0, "ok", 0.0, lambda: None)
-
     def __init__(self, rest: Floats, stretch: float) -> None:
         self.rest, self.stretch = rest, stretch
+
+    def stats(self) -> SolveStats:
+        return SolveStats("known", 0, 0, 0, "ok", 0.0, lambda: None)
 
     def displacements(self, times: Floats) -> Frames:
         out = []

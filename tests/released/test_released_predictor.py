@@ -13,6 +13,7 @@ from odeform.types import GaussianSplats, Mesh, PointCloud
 
 KINDS = [("mlp", 1), ("pemlp", 1), ("pointnet", 3), ("pointnet_bn", 3), ("mlp", 3), ("pointnet_bn", 1)]
 BAR = 1e-5  # m
+ROUNDING = 1e-6  # m; products of many rows round otherwise than that of one
 
 
 def body() -> Mesh:
@@ -60,13 +61,13 @@ def drop(tmp_path: Path) -> Predictor:
 def test_cubic_between_frames_whatever_is_asked(drop: Predictor) -> None:
     motion = drop.solve()
     at = np.array([2.41, 2.0, 2.333])
-    assert np.array_equal(motion.vertices(at)[0], motion.vertices(2.41))
+    assert np.abs(motion.vertices(at)[0] - motion.vertices(2.41)).max() < ROUNDING
     frames = motion.vertices(drop.schema.window.times)
     one, two = frames[8], frames[9]
     between = motion.vertices(2.425)
     assert np.abs(between - 0.5 * (one + two)).max() < 0.3 * np.abs(two - one).max()
-    assert np.array_equal(motion.vertices(9.0), frames[-1])
-    assert np.array_equal(motion.vertices(0.0), frames[0])
+    assert np.abs(motion.vertices(9.0) - frames[-1]).max() < ROUNDING
+    assert np.abs(motion.vertices(0.0) - frames[0]).max() < ROUNDING
     assert np.array_equal(drop.solve(quality="reference", until=2.1).vertices(2.7), motion.vertices(2.7))
 
 
