@@ -18,7 +18,7 @@ def moment_in_words(frame: Frame) -> str:
     if sunk := [shown.column.label for shown in frame.columns if shown.sunk]:
         deepest = max(shown.depth for shown in frame.columns)
         words.append(f"⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor")
-    words += [f"⏳ **{label}** is being computed" for label in frame.pending]
+    words += [f"… **{label}** is being computed" for label in frame.pending]
     return "  \n".join([*words, *(f"⚠ **{reason}**" for reason in frame.refused)])
 
 
