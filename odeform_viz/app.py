@@ -263,7 +263,9 @@ class App:
         """Show it if it is new, first without the columns that take long; then tell of it."""
         shown = self._shown
         if shown is None or wish != shown.wish or looks != self._looks or shown.pending:
-            self._show(self.session.frame(wish, whole=shown is not None and shown.follows(wish)), looks)
+            # who scrubs is shown the others at each moment; who plays moves on by itself, and would never see the rest
+            met = shown is not None and (wish == shown.wish or (self.clock.playing and shown.follows(wish)))
+            self._show(self.session.frame(wish, whole=met), looks)
         elif not self._settled:
             self._settled = True
             self._describe(shown)

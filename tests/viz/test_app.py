@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
 from odeform import InputError
-from odeform.predictor import Predictor
+from odeform.predictor import Predictor, load
+from odeform.wanted import check_wanted
 from odeform_viz.app import App
 from odeform_viz.checker import checker_parts
 from odeform_viz.columns import Column
@@ -125,3 +127,36 @@ def test_something_moves_from_the_start(app: App, port: int) -> None:
     assert shown[0] is not None
     assert shown[1] is not None
     assert np.abs(shown[0] - shown[1]).max() > 0.0
+
+
+def test_a_slow_column_stops_no_scrubbing(drop: Predictor, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rival = load("mass-elastic/pod-rbf")
+    sound = type(rival).solve
+
+    def slow(*asked: Any, **more: Any) -> Any:
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            check_wanted()
+            time.sleep(0.01)
+        return sound(*asked, **more)
+
+    monkeypatch.setattr(type(rival), "solve", slow)
+    app = App([Column("odeform", drop, drop.rest), Column("slow", rival, rival.rest)], port=port)
+    try:
+        with LoopbackClient(port) as client:
+            client.set("time (s)", 0.3)
+            assert client.until(lambda: app._shown is not None and len(app._shown.columns) == 2, 20.0)
+            client.set("mass (kg)", 0.8)
+            times = set()
+            for moment in np.linspace(0.27, 0.33, 40):
+                client.set("time (s)", float(moment))
+                client.collect(0.05)
+                assert app._shown is not None
+                times.add(app._shown.wish.time)
+            assert app._shown is not None
+            assert app._shown.pending == ("slow",)
+            assert len(times) > 10
+            # at rest it joins
+            assert client.until(lambda: app._shown is not None and not app._shown.pending, 20.0)
+    finally:
+        app.close()
