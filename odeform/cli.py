@@ -296,7 +296,7 @@ def _add_makers(command: Command) -> None:
     sub = command("tables", _tables, "train every model of the paper's tables and write them as a page; resumable")
     sub.add_argument("--keep", required=True, metavar="DIR", help="where checkpoints and scores are kept")
     sub.add_argument("--out", required=True, metavar="FILE.md")
-    sub.add_argument("--share", type=float, default=1.0, metavar="X", help="of the planned minutes of trainings (1)")
+    sub.add_argument("--share", type=float, default=1.0, metavar="X", help="of the planned steps of trainings (1)")
     sub.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="trainings at a time")
     sub.add_argument("--kept-only", action="store_true", help="train nothing; leave open what is not kept")
 

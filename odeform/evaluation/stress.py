@@ -1,12 +1,15 @@
 """Numerical stability at the extremes: what is shown for whatever is asked, each claim with a figure and a bound."""
 
+import os
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
@@ -28,6 +31,7 @@ __all__ = ["Outcome", "report", "show", "stress"]
 CASES = 20_000
 MOMENTS = (0.0, 0.05, 0.3, 1.0, 1.5, 3.0, 10.0)  # trained windows
 PATIENCE = 10.0  # s
+TOGETHER = 64  # draws that a process takes at a time
 
 
 @dataclass(frozen=True)
@@ -78,15 +82,9 @@ def _shown(predictor: Predictor, draw: Draw, geometry: Geometry, begin: float) -
 def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
     """`count` distinct draws and all checks, as JSON; the same for the same seed, but for wall times."""
     predictor = load_reduced(checkpoint)
-    schema, geometries = predictor.schema, shapes(predictor.rest)
+    schema = predictor.schema
     asked = draws(schema, bool(predictor.qualities), count, seed)
-    progress = Progress("stress", len(asked))
-    outcomes = []
-    with as_viewed():
-        for draw in asked:
-            outcomes.append(show(predictor, draw, geometries))
-            progress.advance()
-    progress.close()
+    outcomes = _show_all(checkpoint, asked)
     checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
@@ -100,6 +98,32 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
         "by_status": dict(Counter(outcome.status for outcome in outcomes).most_common()),
         "checks": {name: check.to_json() for name, check in checks.items()},
     }
+
+
+def _show_all(checkpoint: str, asked: Sequence[Draw]) -> list[Outcome]:
+    """Of all draws, in their order, on every core."""
+    parts = [asked[at : at + TOGETHER] for at in range(0, len(asked), TOGETHER)]
+    progress, outcomes = Progress("stress", len(asked)), []
+    workers = Parallel(min(os.cpu_count() or 1, len(parts)), return_as="generator")
+    shown: Any = workers(delayed(_show_part)(checkpoint, part) for part in parts)
+    for some in shown:
+        outcomes += some
+        progress.advance(len(some))
+    progress.close()
+    return outcomes
+
+
+def _show_part(checkpoint: str, asked: Sequence[Draw]) -> list[Outcome]:
+    predictor, geometries = _opened(checkpoint)
+    with as_viewed():
+        return [show(predictor, draw, geometries) for draw in asked]
+
+
+@cache
+def _opened(checkpoint: str) -> tuple[Predictor, dict[str, Geometry]]:
+    """Once in a process."""
+    predictor = load_reduced(checkpoint)
+    return predictor, shapes(predictor.rest)
 
 
 def _of_all(predictor: Predictor, asked: list[Draw], outcomes: list[Outcome]) -> Checks:

@@ -6,7 +6,7 @@ bending energy; Duchon 1977), with a closed-form gradient. Points farther from t
 body reaches are taken for points below them, at most nine times as far: far off, the sum would be all rounding.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +31,10 @@ class DisplacementBasis:
     @property
     def modes(self) -> int:
         return self.weights.shape[1] // 3
+
+    def first(self, count: int) -> "DisplacementBasis":
+        """Of the first so many modes."""
+        return replace(self, weights=self.weights[:, : 3 * count])
 
     @cached_property
     def _far(self) -> float:

@@ -33,13 +33,14 @@ Result = dict[str, Any]
 class Cell:
     """A model trained on frames 0 to `until` (default: all) of a data set, every k-th of them; scored on `scored`.
 
-    `scored` are half-open windows of frames of the scene's rate; `scene` is a bundled data set or a path.
+    `scored` are half-open windows of frames of the scene's rate; `scene` is a bundled data set or a path. `steps` is
+    None for models that are solved for.
     """
 
     model: str
     scene: str
     scored: tuple[tuple[int, int], ...]
-    minutes: float
+    steps: int | None = None
     seed: int = 0
     every: int = 1
     until: int | None = None
@@ -47,7 +48,7 @@ class Cell:
 
     @property
     def name(self) -> str:
-        parts = [Path(self.scene).name, self.model, f"{self.minutes:g}min"]
+        parts = [Path(self.scene).name, self.model]
         parts += [f"w{self.until}"] if self.until else []
         parts += [f"e{self.every}"] if self.every > 1 else []
         parts += ["staggered"] if self.stagger else []
@@ -60,12 +61,15 @@ class Cell:
     @property
     def request(self) -> TrainRequest:
         window = (0, self.until) if self.until else None
-        return TrainRequest(self.model, self.seed, self.minutes, window=window, every=self.every, stagger=self.stagger)
+        return TrainRequest(
+            self.model, self.seed, steps=self.steps, window=window, every=self.every, stagger=self.stagger
+        )
 
 
 def run_cells(cells: Sequence[Cell], folder: Path, jobs: int, kept_only: bool = False) -> dict[Cell, Result]:
     """Train and score what `folder` does not hold yet, `jobs` at a time; with `kept_only` leave it out."""
     folder.mkdir(parents=True, exist_ok=True)
+    cells = list(dict.fromkeys(cells))  # tables share some
     if kept_only:
         cells = [c for c in cells if _scored(c, folder) or _is_of(folder / f"{c.name}.safetensors", c.request)]
     results: dict[Cell, Result] = {}
@@ -96,10 +100,12 @@ def _run(cell: Cell, folder: Path) -> Result:
     scores = known.get("scores", {}) if known.get("sha256") == model.checkpoint.sha256 else {}
     # no table asks for what is between the frames of the scene's rate
     coarse = replace(dataset, read=lambda entry: dataset.read(entry).frames(window.stop, window.rate))
-    for first, last in cell.scored:
-        key = f"{first}:{last}"
+    everything = (0, round(window.stop * window.rate) + 1)
+    for span in cell.scored:
+        key = f"{span[0]}:{span[1]}"
         if key not in scores:
-            found = evaluate(model, coarse, "test", (first, last))
+            trained = span == everything and cell.until is None
+            found = model.checkpoint.scores if trained else evaluate(model, coarse, "test", span)
             scores[key] = {name: found[name] for name in KEPT}
     result: Result = {
         "command": cell.command,

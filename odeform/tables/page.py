@@ -48,11 +48,12 @@ def page(found: Mapping[str, Any]) -> str:
         [
             "# Tables II to V",
             "",
-            f"Written by `odeform tables{share}`. Within a table every model has the same data, the same split and the",
-            "same processor time of one core, trials of its settings on validation included. Scores are of the test",
-            "split, pooled over frames and sequences, in mm and mm². The paper's figures stand beside; its data are",
-            "others, so that only orders compare. What is open (–) was not run, or cannot be: there is no scene of",
-            "Contact-Force yet.",
+            f"Written by `odeform tables{share}`. Within a table every model has the same data, the same split and as",
+            f"many steps as take about {MINUTES} minutes of one core, trials of its settings on validation included:",
+            "steps, unlike minutes, are the same on a busy machine. Behind each command are the seconds of a core it",
+            "took, two at a time. Scores are of the test split, pooled over frames and sequences, in mm and mm². The",
+            "paper's figures stand beside; its data are others, so that only orders compare. What is open (–) was not",
+            "run, or cannot be: there is no scene of Contact-Force yet.",
             "",
             *_unseen(cells["II"], found["shipped"]),
             *_extrapolated(cells["III"], found["simple"]),
@@ -102,10 +103,6 @@ def _models(cells: Cells, **wanted: object) -> list[str]:
     return list(dict.fromkeys(c.model for c in cells if all(getattr(c, key) == v for key, v in wanted.items())))
 
 
-def _minutes(table: str, cells: Cells) -> str:
-    return f"{max((c.minutes for c in cells), default=MINUTES[table]):g} minutes a training"
-
-
 def _unseen(cells: Cells, shipped: Mapping[str, Mapping[str, float]]) -> list[str]:
     asked = [(DROP, FRAMES[DROP]), (DROP, IMPACT), ("kick", FRAMES["kick"])]
     head = ["model", "parameters"]
@@ -123,7 +120,7 @@ def _unseen(cells: Cells, shipped: Mapping[str, Mapping[str, float]]) -> list[st
         [name, *map(_number, UNSEEN.get(name, (None,) * 3)), *map(_number, UNSEEN_FORCE[name])] for name in UNSEEN_FORCE
     ]
     return [
-        f"## II. Unseen parameters ({_minutes('II', cells)})",
+        "## II. Unseen parameters",
         "",
         f"The drop (`mass-elastic`) whole, and frames {IMPACT[0]} to {IMPACT[1] - 1} with its first two contacts; the",
         "kick whole. ± is the standard deviation over seeds, where there are several; `pod-rbf`, `nearest` draw none.",
@@ -147,7 +144,7 @@ def _extrapolated(cells: Cells, simple: Mapping[str, Mapping[str, float]]) -> li
         rows.append([f"{name}, from the true last frames", *(_number(s[m]) for s in scores for m in METRICS[:2])])
     paper = [[name, *map(_number, values)] for name, values in EXTRAPOLATED.items()]
     return [
-        f"## III. Extrapolation ({_minutes('III', cells)})",
+        "## III. Extrapolation",
         "",
         f"The {AHEAD} frames after those of the training, at 120 Hz, of drops known to frame {UNTIL[0] - 1}, when the",
         f"stiffer balls have left the floor, and to {UNTIL[1] - 1}, when some have landed again. Models that know no",
@@ -174,7 +171,7 @@ def _interpolated(cells: Cells, simple: Mapping[str, Mapping[str, float]]) -> li
         tables[stagger] = _table(head, [*rows, ["cubic spline through the true kept frames", "0", *errors]])
     paper = [[name, *map(_number, values)] for name, values in INTERPOLATED.items()]
     return [
-        f"## IV. Interpolation ({_minutes('IV', cells)})",
+        "## IV. Interpolation",
         "",
         f"Drops, frames {IMPACT[0]} to {IMPACT[1] - 1}, all of them, by models taught by every 3rd, 5th or 8th frame;",
         "RMSE, then MAE. Each sequence shows its own frames (`--stagger`: the i-th keeps i, i + k, i + 2 k, ...):",

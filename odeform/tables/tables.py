@@ -25,7 +25,7 @@ Found = dict[str, Any]
 def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = False) -> None:
     """Write the page `out`; `folder` keeps checkpoints and scores, so that what was interrupted goes on.
 
-    `share` of the planned minutes. `kept_only`: train nothing, leave open what is not there.
+    `share` of the planned steps. `kept_only`: train nothing, leave open what is not there.
     """
     planned = plan(share)
     results = run_cells([cell for cells in planned.values() for cell in cells], folder, jobs, kept_only)

@@ -19,7 +19,7 @@ class TrainConfig:
     steps: int | None = None
     """So many steps, however long they take: the same result on a busy machine."""
     seed: int = 0
-    batch: int = 64
+    batch: int = 32
     """Sequences in a step."""
     rate: float = 5e-3
     """Learning rate at the start; falls by a cosine to nothing."""

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import torch
+from threadpoolctl import threadpool_limits
 
 from odeform.model.data import TrainingData
 from odeform.model.network import ODeformNet
@@ -25,7 +26,8 @@ __all__ = ["network_weights", "small_batches", "train_network"]
 
 @contextmanager
 def small_batches() -> Iterator[None]:
-    """One thread of the processor: batches are small, and results do not depend on the number of cores.
+    """One thread of the processor: batches are small, results do not depend on the number of cores, and threads of
+    products that wait for each other stand still beside any other program.
 
     Denormal numbers slow such a run thirty-fold on some processors; elsewhere they count (SciPy's k-d tree recurses
     without end where they are taken for 0).
@@ -34,7 +36,8 @@ def small_batches() -> Iterator[None]:
     torch.set_num_threads(1)
     torch.set_flush_denormal(True)
     try:
-        yield
+        with threadpool_limits(1, "blas"):
+            yield
     finally:
         torch.set_num_threads(threads)
         torch.set_flush_denormal(False)
@@ -91,16 +94,16 @@ def train_network(
         elif part is not None and part.exists():
             report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
         _descend(trainer, config, report, part)
-    if part is not None:
-        trainer.save(part)
-    if config.random_features:
-        count = config.random_features
-        if config.steps is None:
-            count = affordable(trainer, 60.0 * config.minutes * config.widening)
-        widen(trainer, count)
-    else:
-        trainer.solve_readout(config.ridge)
-    rigid, local = trainer.errors_mm("val")
+        if part is not None:
+            trainer.save(part)
+        if config.random_features:
+            count = config.random_features
+            if config.steps is None:
+                count = affordable(trainer, 60.0 * config.minutes * config.widening)
+            widen(trainer, count)
+        else:
+            trainer.solve_readout(config.ridge)
+        rigid, local = trainer.errors_mm("val")
     net.cpu()
     return {
         "val_rigid_rmse_mm": rigid,

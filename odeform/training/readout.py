@@ -16,6 +16,14 @@ where a bounce sends a body depends on the parameters more finely than the motio
 """
 
 
+def _squared(x: torch.Tensor) -> torch.Tensor:
+    """x.T x; on a processor by numpy, which computes one half of it alone."""
+    if x.device.type != "cpu":
+        return x.T @ x
+    rows = x.numpy()
+    return torch.from_numpy(rows.T @ rows)
+
+
 class NormalEquations:
     """Those of one decoder's readout, in double precision; features may come in chunks."""
 
@@ -26,7 +34,7 @@ class NormalEquations:
         """(T, B, F) and (T, B, outputs), with weights (T, B) of squares; without frame 0, where both vanish."""
         features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
         x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
-        gram, cross = x.T @ x, x.T @ y
+        gram, cross = _squared(x), x.T @ y
         self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)
 
     def solve(self, ridge: float) -> torch.Tensor:

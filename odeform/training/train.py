@@ -28,6 +28,7 @@ from odeform.predictor import load
 from odeform.simulation.scene import known_scenes
 from odeform.training.continuation import with_continuation
 from odeform.training.point_data import prepare_points
+from odeform.training.pruning import without_modes
 from odeform.training.qualities import with_qualities
 from odeform.types import Arrays, Mesh
 
@@ -85,7 +86,11 @@ def _learn_reduced(
         arrays={**arrays, **data.space.arrays(), **body, "training.theta": data.theta["train"].astype(np.float32)},
         provenance={"truncation_mm": data.truncation_mm},
     )
-    return with_continuation(with_qualities(checkpoint, data), data) if request.model == "odeform" else checkpoint
+    if request.model != "odeform":
+        return checkpoint
+    checkpoint, data = without_modes(checkpoint, data)
+    report(f"{data.space.basis.modes} of {modes} modes are needed")
+    return with_continuation(with_qualities(checkpoint, data), data)
 
 
 def _fit_odeform(

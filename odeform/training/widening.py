@@ -10,6 +10,7 @@ import math
 import time
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
 
@@ -47,9 +48,9 @@ def affordable(trainer: Trainer, seconds: float) -> int:
     config, net = trainer.config, trainer.net
     if trainer.device.type != "cpu":
         return config.random_features
-    sample, begin = torch.ones(2048, 2048, dtype=torch.float64), time.process_time()
+    sample, begin = np.ones((2048, 2048)), time.process_time()
     for _ in range(3):
-        torch.mm(sample.T, sample)
+        np.matmul(sample.T, sample)
     unit = (time.process_time() - begin) / 3 / 2048**3
     rows = (2 * trainer.frames + 1) * len(trainer.theta["train"])
     passes = (1.0 + len(config.sharpnesses) / THIN) * len(net.decoders)

@@ -17,7 +17,7 @@ from odeform.tables.plan import AHEAD, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 
 @pytest.fixture(scope="module")
 def cell(dataset: Dataset) -> Cell:
-    return Cell("nearest", str(dataset.root), ((0, 121), (60, 70)), 1.0)
+    return Cell("nearest", str(dataset.root), ((0, 121), (60, 70)))
 
 
 @pytest.fixture(scope="module")

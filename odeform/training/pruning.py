@@ -1,0 +1,43 @@
+"""Without the modes that a trained model does not need: each is read, added and sent for every point of every frame.
+
+How many modes the data need is known before training, how many of them a network knows well enough to tell, only after.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.model.data import TrainingData
+from odeform.model.odeform import PREFIX, ODeform
+from odeform.model.reduced import POSE
+from odeform.solver.integrate import Quality
+
+__all__ = ["FINE", "needed_modes", "without_modes"]
+
+FINE = Quality("dopri5", tolerance=1e-6, dtype="float64")
+WORSE = 1.01
+"""As many times the error of the deformation may be without the modes that are left out."""
+
+
+def needed_modes(model: ODeform, data: TrainingData) -> int:
+    """As few of the first modes as miss the deformation of the validation motions by hardly more than all do."""
+    placed, times = model.place(model.rest, 0.0), data.times
+    motions = [model.integrate(theta, placed, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
+    truth, weights = data.reduced["val"][..., POSE:], data.known["val"][..., None]
+    missed, still = ((weights * x**2).sum(axis=(0, 1)) for x in (np.stack(motions)[..., POSE:] - truth, truth))
+    # what is left out is missed as a whole
+    errors = [missed[:count].sum() + still[count:].sum() for count in range(1, len(missed) + 1)]
+    return 1 + int(np.argmax(np.array(errors) <= WORSE**2 * errors[-1]))
+
+
+def without_modes(checkpoint: Checkpoint, data: TrainingData) -> tuple[Checkpoint, TrainingData]:
+    """The checkpoint of a trained ODeform and its data, with the modes that it needs."""
+    count = needed_modes(ODeform(checkpoint), data)
+    space = replace(data.space, basis=data.space.basis.first(count))
+    reduced = {split: y[..., : POSE + count] for split, y in data.reduced.items()}
+    readout, gains = f"{PREFIX}local_decoder.readout.weight", f"{PREFIX}gains"
+    kept = {readout: checkpoint.arrays[readout][:count], gains: checkpoint.arrays[gains][: POSE + count]}
+    config = {**checkpoint.config, "network": {**checkpoint.config["network"], "modes": count}}
+    arrays = {**checkpoint.arrays, **kept, **space.arrays()}
+    return replace(checkpoint, config=config, arrays=arrays), replace(data, space=space, reduced=reduced)

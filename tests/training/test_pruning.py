@@ -1,0 +1,65 @@
+"""Modes that a model does not know well enough to need are left out once it is trained."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from odeform.dataset.store import open_dataset
+from odeform.model.data import TrainingData, prepare
+from odeform.model.odeform import ODeform
+from odeform.model.reduced import POSE
+from odeform.predictor import load
+from odeform.training import pruning
+from odeform.training.pruning import FINE, needed_modes, without_modes
+from odeform.types import Floats
+
+
+@pytest.fixture(scope="module")
+def model() -> ODeform:
+    return cast(ODeform, load("mass-elastic"))
+
+
+@pytest.fixture(scope="module")
+def data(model: ODeform) -> TrainingData:
+    whole = prepare(open_dataset("mass-elastic"), modes=model.space.basis.modes)
+    few = {name: {**(of := getattr(whole, name)), "val": of["val"][:4]} for name in ("theta", "reduced", "known")}
+    return replace(whole, **few)
+
+
+def _motions(model: ODeform, data: TrainingData) -> Floats:
+    placed = model.place(model.rest, 0.0)
+    solved = (model.integrate(theta, placed, FINE, float(data.times[-1])) for theta in data.theta["val"])
+    return np.stack([motion.reduced(data.times) for motion in solved])
+
+
+@pytest.mark.parametrize("worse", [1.0, 1.01, 1.2, 10.0])
+def test_as_few_as_miss_hardly_more(
+    model: ODeform, data: TrainingData, worse: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pruning, "WORSE", worse)
+    motions, truth = _motions(model, data), data.reduced["val"]
+    count, modes = needed_modes(model, data), data.space.basis.modes
+
+    def missed(first: int) -> float:
+        told = np.concatenate([motions[..., : POSE + first], np.zeros((*truth.shape[:2], modes - first))], axis=-1)
+        return float(np.linalg.norm((told - truth)[..., POSE:]))
+
+    assert missed(count) <= worse * missed(modes) * (1.0 + 1e-12)
+    assert count == 1 or missed(count - 1) > worse * missed(modes)
+    assert worse < 1.2 or count < modes
+
+
+def test_what_is_left_moves_as_before(model: ODeform, data: TrainingData, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pruning, "needed_modes", lambda *_: 3)
+    bare = {k: v for k, v in model.checkpoint.arrays.items() if not k.startswith("continuation.")}
+    checkpoint, fewer = without_modes(replace(model.checkpoint, arrays=bare), data)
+    pruned = ODeform(checkpoint)
+    assert pruned.space.basis.modes == fewer.space.basis.modes == pruned.config.modes == 3
+    assert fewer.reduced["train"].shape[-1] == POSE + 3
+    assert np.allclose(_motions(pruned, fewer), _motions(model, data)[..., : POSE + 3], rtol=0.0, atol=1e-12)
+    points = model.rest.points[:5].astype(float)
+    kept = model.space.basis.values(points)[..., :3]
+    assert np.allclose(pruned.space.basis.values(points), kept, rtol=0.0, atol=1e-6)
+    assert sum(a.size for a in checkpoint.arrays.values()) < sum(a.size for a in bare.values())
