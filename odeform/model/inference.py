@@ -172,16 +172,14 @@ def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[F
 
 
 def _field(matrices: list[Floats], biases: list[Floats]) -> Field:
-    """Layers with tanh between them."""
-    product = gemv(matrices[0].dtype)
-    *hidden, (last, last_bias) = zip(matrices, biases, strict=True)
+    """Three layers with tanh between them, spelt out: a call takes a few microseconds, and a loop a tenth of them."""
+    product, tanh = gemv(matrices[0].dtype), np.tanh
+    (first, middle, last), (first_bias, middle_bias, last_bias) = matrices, biases
 
     def field(_: float, state: Floats) -> Floats:
-        x = state
-        for matrix, bias in hidden:
-            x = product(1.0, matrix, x, 1.0, bias)
-            np.tanh(x, out=x)
-        return product(1.0, last, x, 1.0, last_bias)
+        x = product(1.0, first, state, 1.0, first_bias)
+        x = product(1.0, middle, tanh(x, x), 1.0, middle_bias)
+        return product(1.0, last, tanh(x, x), 1.0, last_bias)
 
     return field
 

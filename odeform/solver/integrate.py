@@ -59,7 +59,7 @@ def _finite(value: Any) -> bool:
 
 
 def _rms(values: Any) -> float:
-    return math.sqrt(float(values @ values) / values.size)
+    return math.sqrt(float(values.dot(values)) / values.size)
 
 
 def _first_step(method: Tableau, field: Field, time: float, state: Any, slope: Any, tolerance: float) -> float:

@@ -10,7 +10,6 @@ from odeform.model.data import TrainingData
 from odeform.model.odeform import ODeform
 from odeform.model.reduced import POSE, small_motion
 from odeform.schema import REACH
-from odeform.solver.frontier import EXACT
 from odeform.types import Floats
 
 __all__ = ["fit_dynamics", "foretold", "with_continuation"]
@@ -96,7 +95,7 @@ def foretold(model: ODeform, data: TrainingData) -> Floats | None:
     placed, later = model.place(model.rest, 0.0), data.times[known:]
     continued, stopped = [], []
     for theta in data.theta["val"]:
-        motion = model.integrate(theta, placed, EXACT, window.stop)
+        motion = model.integrate(theta, placed, model.qualities["reference"], window.stop)
         continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
     truth, arm = data.reduced["val"][:, known:], data.space.arm
