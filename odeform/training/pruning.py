@@ -13,19 +13,24 @@ from odeform.model.odeform import PREFIX, ODeform
 from odeform.model.reduced import POSE
 from odeform.solver.integrate import Quality
 
-__all__ = ["FINE", "needed_modes", "without_modes"]
+__all__ = ["FINE", "LARGE", "needed_modes", "without_modes"]
 
 FINE = Quality("dopri5", tolerance=1e-6, dtype="float64")
 WORSE = 1.01
-"""As many times the error of the deformation may be without the modes that are left out."""
+"""As many times the error of the deformation may be without the modes that are left out, where there is one to see."""
+LARGE = 0.1
+"""Of its peak in a motion: what `deformation_relative` looks at, too. Errors long after a contact would hide others."""
 
 
 def needed_modes(model: ODeform, data: TrainingData) -> int:
-    """As few of the first modes as miss the deformation of the validation motions by hardly more than all do."""
+    """As few of the first modes as miss the large deformations of the validation motions by hardly more than all do."""
     placed, times = model.place(model.rest, 0.0), data.times
     motions = [model.integrate(theta, placed, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
-    truth, weights = data.reduced["val"][..., POSE:], data.known["val"][..., None]
-    missed, still = ((weights * x**2).sum(axis=(0, 1)) for x in (np.stack(motions)[..., POSE:] - truth, truth))
+    truth = data.reduced["val"][..., POSE:]
+    size = np.linalg.norm(truth, axis=2)
+    weights = data.known["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
+    off = np.stack(motions)[..., POSE:] - truth
+    missed, still = (np.einsum("st,stk->k", weights, x**2) for x in (off, truth))
     # what is left out is missed as a whole
     errors = [missed[:count].sum() + still[count:].sum() for count in range(1, len(missed) + 1)]
     return 1 + int(np.argmax(np.array(errors) <= WORSE**2 * errors[-1]))
