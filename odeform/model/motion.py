@@ -1,5 +1,7 @@
 """The motion of a reduced model: pose and coefficients at any time, and the points that they move."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -17,6 +19,8 @@ __all__ = ["Motion", "Trajectory"]
 
 SEVERAL = 4  # points that are turned as one: products with three rows leave most of a processor's width unused
 BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are turned
+MANY = 16  # such blocks are shared among the cores
+CORES = ThreadPoolExecutor(os.cpu_count(), "decode")  # kept: a thread's first product takes longer than a frame
 
 
 @runtime_checkable
@@ -69,9 +73,13 @@ class Motion(PredictedMotion):
         count = len(self.placed.points)
         out = np.empty((len(y), 3 * count), dtype=np.float32)
         size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
-        for begin in range(0, count, size):
+
+        def fill(begin: int) -> None:
             place = slice(3 * begin, 3 * (begin + size))
             _turn(weights @ self.placed.rows[:, place], turned, out[:, place])
+
+        begins = range(0, count, size)
+        list((CORES.map if len(begins) >= MANY else map)(fill, begins))
         out = out.reshape(len(y), count, 3)
         # P(0) is P0 to the last bit
         out[~y.any(axis=1)] = self.placed.points
