@@ -4,12 +4,13 @@ import os
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
@@ -104,11 +105,10 @@ def _show_all(checkpoint: str, asked: Sequence[Draw]) -> list[Outcome]:
     """Of all draws, in their order, on every core."""
     parts = [asked[at : at + TOGETHER] for at in range(0, len(asked), TOGETHER)]
     progress, outcomes = Progress("stress", len(asked)), []
-    workers = Parallel(min(os.cpu_count() or 1, len(parts)), return_as="generator")
-    shown: Any = workers(delayed(_show_part)(checkpoint, part) for part in parts)
-    for some in shown:
-        outcomes += some
-        progress.advance(len(some))
+    with ProcessPoolExecutor(min(os.cpu_count() or 1, len(parts)), mp_context=get_context("spawn")) as pool:
+        for some in pool.map(partial(_show_part, checkpoint), parts):
+            outcomes += some
+            progress.advance(len(some))
     progress.close()
     return outcomes
 
