@@ -34,6 +34,7 @@ __all__ = [
 
 Floats = NDArray[np.floating]
 Ints = NDArray[np.integer]
+Bools = NDArray[np.bool_]
 Arrays = dict[str, NDArray[Any]]
 
 # Shapes; sizes of one name agree within a call. Checked at run time in tests only.

@@ -1,7 +1,6 @@
 """Displacements of many points over time, by a network that moves each by itself."""
 
 import time
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -49,7 +48,8 @@ class MomentaryPoints:
 class FramedPoints:
     """Displacements of a network that goes on from frame to frame, from rest to where models see no further.
 
-    Frames never depend on what is asked; between them motions are `between`.
+    Frames never depend on what is asked: those of the window are made first, and later ones if any is asked for.
+    Between frames motions are `between`.
     """
 
     solver: str
@@ -70,40 +70,45 @@ class FramedPoints:
     ) -> None:
         self._net, self._network, self._frame, self._window = net, network, frame, window
         self._x, self._theta, self._wall_ms = x, theta, 0.0
+        self._frames = np.empty((0, len(x), 3), dtype=np.float32)
 
-    @property
-    def _grid(self) -> Times:
-        """(F,) seconds."""
+    def _grid(self, beyond: float) -> Times:
+        """(F,) seconds, from rest to so many windows beyond the window."""
         window = self._window
-        span = (1.0 + window.reach + LATER) * (window.stop - window.start)
+        span = (1.0 + beyond) * (window.stop - window.start)
         return window.start + np.arange(int(np.ceil(span * window.rate - 1e-6)) + 1) / window.rate
 
-    @cached_property
-    def frames(self) -> Frames:
-        """(F, N, 3) metres, canonical."""
-        begin = time.perf_counter()
-        out = self._roll_out(self._grid)
-        self._wall_ms = 1e3 * (time.perf_counter() - begin)
-        return out
+    def _made(self, beyond: float) -> Frames:
+        """(F, N, 3) metres, canonical: the frames so far, at least to so many windows beyond the window."""
+        grid, done = self._grid(beyond), len(self._frames)
+        if done < len(grid):
+            begin = time.perf_counter()
+            self._frames = np.concatenate([self._frames, self._roll_out(grid)[done:]])
+            self._wall_ms += 1e3 * (time.perf_counter() - begin)
+        return self._frames
 
     def stats(self) -> SolveStats:
-        steps = len(self.frames) - 1
+        steps = len(self._made(LATER)) - 1
         solver = f"{self.solver}, {1e3 / self._window.rate:.3g} ms, {self.between} between its frames"
         return SolveStats(solver, steps, steps * self.stages, 0, "ok", self._wall_ms, self._error_mm)
 
     def displacements(self, times: Times) -> Frames:
-        last = len(self.frames) - 1
+        # those of the window always first: products of more rows round otherwise
+        frames = self._made(LATER)
+        if (times > self._window.stop).any():
+            frames = self._made(self._window.reach + LATER)
+        last = len(frames) - 1
         phase = np.clip((times - self._window.start) * self._window.rate, 0.0, last)
         near = np.round(phase)
         # on a frame, it is that frame to the last bit
         phase = np.where(np.abs(phase - near) < 1e-6, near, phase)
         index = np.minimum(phase.astype(int), last - 1)
         share = (phase - index).astype(np.float32)[:, None, None]
-        one, other = self.frames[index], self.frames[index + 1]
+        one, other = frames[index], frames[index + 1]
         if self.between == "linear":
             return one + share * (other - one)
         # Catmull and Rom 1974: a cubic with the slopes that the neighbours tell
-        before, after = self.frames[np.maximum(index - 1, 0)], self.frames[np.minimum(index + 2, last)]
+        before, after = frames[np.maximum(index - 1, 0)], frames[np.minimum(index + 2, last)]
         straight, left = other - one, 0.5 * (other - before)
         right = 0.5 * (after - one)
         bend = (1.0 - share) * (left - straight) - share * (right - straight)
@@ -123,7 +128,8 @@ class FramedPoints:
         these bend within a step at contacts."""
         if not self.doubled:
             return None
-        coarse, fine = self._roll_out(self._grid[::2]), self.frames[::2]
+        grid = self._grid(LATER)
+        coarse, fine = self._roll_out(grid[::2]), self._made(LATER)[: len(grid) : 2]
         return float(1e3 * np.sqrt(((coarse - fine) ** 2).mean(axis=(1, 2))).max() / 2.0)
 
 

@@ -5,6 +5,7 @@ sequences; the others average over coordinates of a frame first, then over frame
 that the mean RMSE squared lies below the mean MSE).
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -130,13 +131,14 @@ def evaluate(
     split: str = "test",
     window: tuple[int, int] | None = None,
     quality: str | Quality = "balanced",
+    parts: Iterable[tuple[int, int]] = (),
 ) -> dict[str, Any]:
     """Scores of one model on a split.
 
     Over the data's window, or its frames `window` (half-open; frames of the scene's rate, whatever that of the file). A
     model that knows its trained window alone is scored on that. Where the data end before it begins, they are taken to
     be that window cut out of longer ones, and begin where it does. A scene with an impact gets its scores apart, as
-    `impact`, unless a window was asked for.
+    `impact`, unless a window was asked for; other `parts`, half-open, theirs as `FIRST:LAST`.
     """
     schema, trained = dataset.schema, predictor.schema.window
     if predictor.schema.scene != schema.scene:
@@ -145,6 +147,7 @@ def evaluate(
     clock = 0.0 if predictor.beyond or trained.start <= stop else trained.start
     spans = _spans(predictor, schema, window, clock)
     begin, end = spans["whole"]
+    spans |= {f"{part[0]}:{part[1]}": _spans(predictor, schema, part, clock)["whole"] for part in parts}
     scores = {name: Scores() for name in spans}
     covered = []
     for recorded in dataset.sequences(split):
@@ -176,8 +179,7 @@ def evaluate(
             part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
             scores[name].add(predicted[inside], part, on_frames[inside], between[inside])
     result = scores["whole"].result()
-    if "impact" in scores:
-        result["impact"] = scores["impact"].result()
+    result |= {name: scored.result() for name, scored in scores.items() if name != "whole"}
     result["per_object"] = {}
     # of frames of sequences: errors within what nine in ten are expected to keep to
     result["coverage_90"] = float(np.concatenate(covered).mean()) if covered else None

@@ -11,13 +11,14 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.model.reduced import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
-from odeform.types import Floats, Ints, Mesh
+from odeform.types import Bools, Floats, Ints, Mesh
 
-__all__ = ["Thinning", "TrainingData", "prepare"]
+__all__ = ["UNKNOWN", "Thinning", "TrainingData", "prepare", "shown_frames"]
 
 TRUNCATION = 5e-3
 MOST_MODES = 64
-UNKNOWN = 1e-3  # weight of a frame that a spline through known ones fills in: it holds what nothing else does
+UNKNOWN = 1e-3
+"""Weight of a frame that a spline through known ones fills in, in training: it holds what nothing else does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,8 @@ class TrainingData:
     weights: Floats
     theta: dict[str, Floats]
     reduced: dict[str, Floats]
-    known: dict[str, Floats]
-    """(S, T) weights of the frames: 1, or `UNKNOWN` where a spline through the known frames fills in."""
+    known: dict[str, Bools]
+    """(S, T) whether the frame is of the data, or a spline through those that are fills it in."""
     truncation_mm: dict[str, float]
     """RMS of the deformation that the modes leave out, for each split."""
     identity: str
@@ -82,12 +83,20 @@ class Thinning:
         frames = np.arange(count)
         return CubicSpline(self.kept(count, sequence), values, axis=0)(frames)
 
-    def weights(self, count: int, sequences: int) -> Floats:
-        """(S, count) of the frames of each sequence."""
-        weights = np.full((sequences, count), UNKNOWN)
-        for sequence, row in enumerate(weights):
-            row[self.kept(count, sequence)] = 1.0
-        return weights
+    def known(self, count: int, sequences: int) -> Bools:
+        """(S, count) whether the sequence shows the frame."""
+        known = np.zeros((sequences, count), dtype=bool)
+        for sequence, row in enumerate(known):
+            row[self.kept(count, sequence)] = True
+        return known
+
+
+def shown_frames(known: Bools) -> tuple[Ints, Bools]:
+    """(S, T) whether frames are known -> (S, K) frames that the sequences show, and whether they do: where one shows
+    fewer than another, others of its frames fill up."""
+    most = int(known.sum(axis=1).max())
+    frames = np.argsort(~known, axis=1, kind="stable")[:, :most]
+    return frames, np.take_along_axis(known, frames, axis=1)
 
 
 def prepare(dataset: Dataset, modes: int | None = None, thinning: Thinning | None = None) -> TrainingData:
@@ -141,7 +150,7 @@ def prepare(dataset: Dataset, modes: int | None = None, thinning: Thinning | Non
         pairs = zip(poses[split], coefficients[split], strict=True)
         both = [np.concatenate([pose, c[:, :modes]], axis=1) for pose, c in pairs]
         reduced[split] = np.stack([thinning.filled(y, count, index) for index, y in enumerate(both)])
-        known[split] = thinning.weights(count, len(both))
+        known[split] = thinning.known(count, len(both))
         truncation[split] = float(1e3 * np.sqrt(max(total[split] - left[split][:modes].sum(), 0.0)))
     rate = schema.window.rate if thinning.stagger else schema.window.rate / thinning.every
     schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))

@@ -94,18 +94,16 @@ def _run(cell: Cell, folder: Path) -> Result:
     dataset = open_dataset(cell.scene)
     if not _is_of(file, request):
         with (folder / f"{cell.name}.log").open("w") as log:
-            train(dataset, rest_of(dataset), file, request, partial(print, file=log, flush=True))
+            train(dataset, rest_of(dataset), file, request, partial(print, file=log, flush=True), cell.scored)
     model = load(file)
     known, window = _read(kept), dataset.schema.window
     scores = known.get("scores", {}) if known.get("sha256") == model.checkpoint.sha256 else {}
     # no table asks for what is between the frames of the scene's rate
     coarse = replace(dataset, read=lambda entry: dataset.read(entry).frames(window.stop, window.rate))
-    everything = (0, round(window.stop * window.rate) + 1)
     for span in cell.scored:
         key = f"{span[0]}:{span[1]}"
         if key not in scores:
-            trained = span == everything and cell.until is None
-            found = model.checkpoint.scores if trained else evaluate(model, coarse, "test", span)
+            found = (model.checkpoint.scores or {}).get(key) or evaluate(model, coarse, "test", span)
             scores[key] = {name: found[name] for name in KEPT}
     result: Result = {
         "command": cell.command,

@@ -20,7 +20,7 @@ class TrainConfig:
     """So many steps, however long they take: the same result on a busy machine."""
     seed: int = 0
     batch: int = 32
-    """Sequences in a step."""
+    """Sequences in a step; more, where they show less than every other frame."""
     rate: float = 5e-3
     """Learning rate at the start; falls by a cosine to nothing."""
     horizon: tuple[float, float] = (0.25, 0.33)

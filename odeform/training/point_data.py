@@ -10,7 +10,7 @@ from odeform.model.data import Thinning
 from odeform.model.point_motion import MeanMotion, PointFrame
 from odeform.model.reduced import to_canonical
 from odeform.schema import Schema, Window
-from odeform.types import Floats, Vector
+from odeform.types import Bools, Floats, Vector
 
 __all__ = ["PointData", "prepare_points"]
 
@@ -29,8 +29,8 @@ class PointData:
     """(N,) share of the mass at each vertex."""
     theta: dict[str, Floats]
     moved: dict[str, Floats]
-    known: dict[str, Floats]
-    """(S, T) weights of the frames, as of `TrainingData`."""
+    known: dict[str, Bools]
+    """(S, T) whether the frame is of the data, as of `TrainingData`."""
     given: int = 1
     """Frames from one given frame to the next; 1 for models that are given none."""
 
@@ -51,7 +51,7 @@ def prepare_points(dataset: Dataset, thinning: Thinning | None = None, given: in
     theta, moved, known = {}, {}, {}
     for split in ("train", "val"):
         theta[split], moved[split] = _read(dataset, split, thinning, count, anchor, len(rest))
-        known[split] = thinning.weights(count, len(theta[split]))
+        known[split] = thinning.known(count, len(theta[split]))
     times = np.arange(count) / dataset.schema.window.rate
     largest = max(float(np.linalg.norm(motion, axis=-1).max()) for motion in moved["train"])
     shifts = np.mean([np.einsum("n,tni->ti", first.weights, motion) for motion in moved["train"]], axis=0)

@@ -20,6 +20,7 @@ from odeform.baselines.networks import PointNet, Rows, Trial, sum_of
 from odeform.baselines.occupancy_flow import told
 from odeform.baselines.points import point_checkpoint
 from odeform.checkpoint import Checkpoint
+from odeform.model.data import UNKNOWN, shown_frames
 from odeform.schema import REACH
 from odeform.training.loop import small_batches
 from odeform.training.point_data import PointData
@@ -80,7 +81,9 @@ class _Split:
     def __init__(self, data: PointData, split: str, device: torch.device) -> None:
         self.theta = torch.as_tensor(data.theta[split]).float().to(device)
         self.moved = torch.as_tensor(data.moved[split]).to(device)
-        self.known = torch.as_tensor(data.known[split]).float().to(device)
+        self.known = torch.where(torch.as_tensor(data.known[split]), 1.0, UNKNOWN).to(device)
+        frames, shows = shown_frames(data.known[split])
+        self.shown, self.counts = torch.as_tensor(frames), torch.as_tensor(shows.sum(axis=1))
         self.x = torch.as_tensor(data.x).to(device)
         weights = torch.as_tensor(data.weights).float().to(device)
         self.centre = torch.einsum("n,stni->sti", weights, self.moved)
@@ -91,6 +94,10 @@ class _Split:
         """(F, B, 1), of mean one, of frames (F, B) of sequences (B,)."""
         known = self.known[sequence.to(self.device), frames.to(self.device)][..., None]
         return known / known.mean()
+
+    def known_frames(self, sequence: torch.Tensor, frames: torch.Tensor) -> torch.Tensor:
+        """Frames that the sequences (B,) show and that are not the first, for numbers (1, B) from 1 on."""
+        return self.shown[sequence, 1 + (frames - 1) % (self.counts[sequence] - 1)]
 
     def rows(self, sequence: torch.Tensor, point: torch.Tensor, frames: torch.Tensor) -> tuple[Rows, Any, Any]:
         """Of sequences and points (B,) at frames (F, B): what is asked, and the true displacements of the points and
@@ -165,6 +172,8 @@ class _Learner:
         sequences, _, points, _ = train.moved.shape
         batch = frames.shape[1]
         sequence = self._below(sequences, batch)
+        if self.network.teaching == "moments":
+            frames = train.known_frames(sequence, frames)
         rows, truth, centre = train.rows(sequence, self._below(points, batch), frames)
         weights = train.weights(sequence, frames)
         parts = self.network.predict(self.net, rows)

@@ -2,7 +2,7 @@
 
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -124,9 +124,14 @@ def _learn_points(dataset: Dataset, request: TrainRequest, report: Callable[[str
 
 
 def train(
-    dataset: Dataset, rest: Mesh, out: str | Path, request: TrainRequest, report: Callable[[str], None]
+    dataset: Dataset,
+    rest: Mesh,
+    out: str | Path,
+    request: TrainRequest,
+    report: Callable[[str], None],
+    parts: Iterable[tuple[int, int]] = (),
 ) -> Checkpoint:
-    """Train one model, score it on the test split, write the checkpoint.
+    """Train one model, score it on the test split, also on `parts` of its frames, write the checkpoint.
 
     `rest` is the body as viewers show it, as it rests in the scene.
     """
@@ -160,7 +165,7 @@ def train(
     arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
     checkpoint = replace(checkpoint, arrays=arrays)
     write_checkpoint(out, checkpoint)
-    scores = evaluate(load(out), dataset, "test")
+    scores = evaluate(load(out), dataset, "test", parts=parts)
     scored = replace(checkpoint, scores=scores)
     write_checkpoint(out, scored)
     part.unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from torch import nn
 
 from odeform.errors import InputError
 from odeform.files import safetensors_metadata, write_aside
-from odeform.model.data import TrainingData
+from odeform.model.data import UNKNOWN, TrainingData, shown_frames
 from odeform.model.network import ODeformNet
 from odeform.model.reduced import POSE
 from odeform.training.config import FREE, TrainConfig
@@ -48,9 +48,16 @@ class Trainer:
             k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
             for k, v in data.reduced.items()
         }
-        self.known = {k: torch.as_tensor(v).float().T.contiguous().to(device) for k, v in data.known.items()}
+        train, val = (torch.as_tensor(data.known[split]).T.contiguous().to(device) for split in ("train", "val"))
+        self.known = {"train": torch.where(train, 1.0, UNKNOWN), "val": val.float()}
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.times = torch.as_tensor(data.times).float().to(device)
+        self.shown, self.counted = (torch.as_tensor(v.T.copy()).to(device) for v in shown_frames(data.known["train"]))
+        # of whole motions every other frame tells as much, and a solve costs as much as the roll-out; where fewer are
+        # known all are solved for, and a batch has more motions
+        whole, few = len(self.times), len(self.shown)
+        self.stride = 2 if 2 * few > whole else 1
+        self.batch = max(config.batch, config.batch * whole // (2 * few))
         frame = float(data.times[1] - data.times[0])
         self.frame, self.substeps = frame, max(1, math.ceil(frame / config.longest - 1e-9))
         self.identity = data.identity
@@ -82,19 +89,23 @@ class Trainer:
 
     def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
         """Of a batch, after its readout has been solved for."""
-        theta, truth = self.theta["train"][rows], self.truth["train"][: frames + 1, rows]
-        known = self.known["train"][: frames + 1, rows]
-        states = self.states(theta, self.draw_counts(frames))
-        told = self.net.told(self.times[: frames + 1], theta)
+        theta = self.theta["train"][rows]
+        early = self.shown[:, rows] <= frames
+        some = early.any(dim=1)
+        shown, weights = self.shown[some][:, rows].clamp(max=frames), (early & self.counted[:, rows])[some].float()
+        motions = torch.arange(len(rows), device=self.device)
+        truth = self.truth["train"][shown, rows]
+        states = self.states(theta, self.draw_counts(frames))[shown, motions]
+        told = self.net.told(self.times[: frames + 1], theta)[shown, motions]
         predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
         for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
             features = decoder.features(states[..., place], told)
             readout = NormalEquations()
-            # every other frame tells as much, and a solve costs as much as the roll-out
-            readout.add(features.detach()[::2], truth[::2][..., out], known[::2])
+            part = slice(None, None, self.stride)
+            readout.add(features.detach()[part], truth[part][..., out], weights[part])
             decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
             predicted.append(decoder.readout(features))
-        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:], known[1:])[-len(self.outputs) :])
+        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:])[-len(self.outputs) :])
 
     def advance(self, share: float) -> None:
         """One step of descent."""
@@ -103,7 +114,7 @@ class Trainer:
         frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
         warm = min(1.0, (self.done + 1) / 20.0)
         self.optimiser.param_groups[0]["lr"] = warm * config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
-        rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: config.batch]
+        rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.batch]
         self.optimiser.zero_grad()
         self.loss(rows.to(self.device), max(frames, 2)).backward()
         norm = nn.utils.clip_grad_norm_(self.weights, 1.0)

@@ -60,6 +60,17 @@ def test_training_brings_the_error_down(data: PointData, models: dict[str, Point
 
 
 @everywhere
+def test_frames_of_the_window_do_not_wait_for_later_ones(models: dict[str, PointModel], model: str) -> None:
+    body = PointCloud(models[model].rest.points[:40])
+    early, late = (models[model].solve(body, SETTING) for _ in range(2))
+    seen = early.vertices(TIMES)
+    later = late.vertices(1.4)  # the window ends after a second
+    assert np.array_equal(late.vertices(TIMES), seen)
+    assert np.array_equal(early.vertices(1.4), later)
+    assert not np.array_equal(later, seen[-1])
+
+
+@everywhere
 def test_starts_at_the_shape_itself(models: dict[str, PointModel], model: str) -> None:
     for shape in (models[model].rest, egg()):
         motion, start = models[model].solve(shape, SETTING), np.asarray(shape.points, dtype=np.float32)

@@ -119,6 +119,14 @@ def test_a_window_scores_its_frames(dataset: Dataset, predictors: dict[str, Pred
     assert evaluate(predictors["pod-rbf"], dataset, "test", window=(0, 500))["mse_mm2"] == whole["mse_mm2"]
 
 
+def test_parts_are_scored_in_passing(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    apart = evaluate(predictors["pod-rbf"], dataset, "test", window=(30, 60))
+    whole = evaluate(predictors["pod-rbf"], dataset, "test", parts=[(30, 60)])
+    for name in ("rmse_pooled_mm", "mae_pooled_mm", "deformation_relative"):
+        assert whole["30:60"][name] == pytest.approx(apart[name], rel=1e-5)
+    assert whole["rmse_pooled_mm"] == evaluate(predictors["pod-rbf"], dataset, "test")["rmse_pooled_mm"]
+
+
 @pytest.mark.parametrize("window", [(500, 600), (0, 1)])
 def test_a_window_without_frames(dataset: Dataset, predictors: dict[str, Predictor], window: tuple[int, int]) -> None:
     with pytest.raises(InputError):

@@ -7,14 +7,13 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.model.data import UNKNOWN, Thinning, prepare
+from odeform.model.data import Thinning, prepare, shown_frames
 
 
 @pytest.mark.parametrize("stagger", [False, True])
 def test_known_frames_are_as_they_were(dataset: Dataset, stagger: bool) -> None:
     whole, few = prepare(dataset, modes=8), prepare(dataset, 8, Thinning(every=3, stagger=stagger))
-    known = few.known["train"] == 1.0
-    assert set(np.unique(few.known["train"])) == {UNKNOWN, 1.0}
+    known = few.known["train"]
     assert known[:, 0].all()
     assert (known.sum(axis=1) <= len(few.times) // 3 + 2).all()
     # poses do not depend on the basis, which is fitted to the frames that are known
@@ -29,6 +28,15 @@ def test_the_same_frames_of_all_or_interleaved() -> None:
     assert Thinning(every=5, stagger=True).kept(21, 3).tolist() == [0, 3, 8, 13, 18, 20]
     shown = [Thinning(every=5, stagger=True).kept(21, sequence) for sequence in range(5)]
     assert set(np.concatenate(shown)) == set(range(21))
+
+
+def test_each_sequence_shows_its_frames() -> None:
+    thinning = Thinning(every=5, stagger=True)
+    frames, shows = shown_frames(thinning.known(21, 5))
+    for sequence in range(5):
+        assert frames[sequence][shows[sequence]].tolist() == thinning.kept(21, sequence).tolist()
+    assert shows[:, 0].all()
+    assert not shows.all()  # the first of them shows one frame less
 
 
 def test_a_window_ends_with_a_known_frame(dataset: Dataset) -> None:
