@@ -91,19 +91,20 @@ def _run(cell: Cell, folder: Path) -> Result:
         return found
     file, kept = folder / f"{cell.name}.safetensors", folder / f"{cell.name}.json"
     request = cell.request
-    dataset = open_dataset(cell.scene)
+    fine = open_dataset(cell.scene)
+    window = fine.schema.window
+    # no table asks for what is between the frames of the scene's rate
+    dataset = replace(fine, read=lambda entry: fine.read(entry).frames(window.stop, window.rate))
     if not _is_of(file, request):
         with (folder / f"{cell.name}.log").open("w") as log:
             train(dataset, rest_of(dataset), file, request, partial(print, file=log, flush=True), cell.scored)
     model = load(file)
-    known, window = _read(kept), dataset.schema.window
+    known = _read(kept)
     scores = known.get("scores", {}) if known.get("sha256") == model.checkpoint.sha256 else {}
-    # no table asks for what is between the frames of the scene's rate
-    coarse = replace(dataset, read=lambda entry: dataset.read(entry).frames(window.stop, window.rate))
     for span in cell.scored:
         key = f"{span[0]}:{span[1]}"
         if key not in scores:
-            found = (model.checkpoint.scores or {}).get(key) or evaluate(model, coarse, "test", span)
+            found = (model.checkpoint.scores or {}).get(key) or evaluate(model, dataset, "test", span)
             scores[key] = {name: found[name] for name in KEPT}
     result: Result = {
         "command": cell.command,
