@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.baselines.odeform_per_point import OdeformPerPoint
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
@@ -137,6 +138,9 @@ def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any
                 continue
             if other.schema.needs_observations:
                 rows[model] = {"skipped": "moves between given frames"}
+                continue
+            if isinstance(other, OdeformPerPoint):
+                rows[model] = {"skipped": "takes minutes; above is its time, by `odeform evaluate` its error"}
                 continue
             taught, physics = (c.provenance.get("fixed") for c in (other.checkpoint, predictor.checkpoint))
             if taught != physics:

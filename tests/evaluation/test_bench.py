@@ -77,6 +77,18 @@ def test_bench(
 
 
 @pytest.mark.usefixtures("small")
+def test_rivals_that_are_not_timed_are_named(
+    monkeypatch: pytest.MonkeyPatch, predictors: dict[str, Predictor], point_models: dict[str, Path]
+) -> None:
+    paths = {f"kick/{model}": point_models[model] for model in ("occupancy-flow", "odeform-per-point")}
+    monkeypatch.setattr(peers, "bundled_checkpoints", lambda: paths)
+    monkeypatch.setattr(peers, "load", lambda name: full_load(paths[name]))
+    rows = peers.peers(predictors["pod-rbf"], None, [])
+    assert "given frames" in rows["occupancy-flow"]["skipped"]
+    assert "takes minutes" in rows["odeform-per-point"]["skipped"]
+
+
+@pytest.mark.usefixtures("small")
 def test_a_model_without_a_solver_is_measured_too(
     trained: dict[str, Path], dataset: Dataset, capsys: pytest.CaptureFixture[str]
 ) -> None:
