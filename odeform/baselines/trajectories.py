@@ -1,12 +1,14 @@
 """Displacements of many points over time, by a network that moves each by itself."""
 
 import time
+from contextvars import copy_context
 from typing import Literal
 
 import numpy as np
 
 from odeform.baselines.arithmetic import Net
 from odeform.baselines.networks import PointNet, Rows, sum_of
+from odeform.model.motion import CORES
 from odeform.model.point_motion import PointFrame
 from odeform.model.predicted import SolveStats
 from odeform.schema import LATER, Window
@@ -15,7 +17,7 @@ from odeform.types import Floats, Frames, Points, Times
 __all__ = ["FramedPoints", "MomentaryPoints", "rows_of"]
 
 CHUNK = 1 << 14  # rows of points and times that a network works on at once: its activations stay in the cache
-TRAJECTORIES = 1024  # points that are rolled out at once
+TRAJECTORIES = 256  # points that are rolled out at once, on one core
 
 
 class MomentaryPoints:
@@ -117,10 +119,15 @@ class FramedPoints:
     def _roll_out(self, grid: Times) -> Frames:
         out = np.empty((len(grid), len(self._x), 3), dtype=np.float32)
         at = in_windows(grid, self._window)[:, None]
-        for begin in range(0, len(self._x), TRAJECTORIES):
+
+        def fill(begin: int) -> None:
             x = self._x[begin : begin + TRAJECTORIES]
             rows = rows_of(x, self._theta, np.broadcast_to(at, (len(grid), len(x))), self._frame)
             out[:, begin : begin + TRAJECTORIES] = sum_of(self._network.predict(self._net, rows))
+
+        begins = range(0, len(self._x), TRAJECTORIES)
+        # each is told on its thread whether it is still wanted
+        list(CORES.map(lambda context, begin: context.run(fill, begin), [copy_context() for _ in begins], begins))
         return out * np.float32(self._frame.scale)
 
     def _error_mm(self) -> float | None:
