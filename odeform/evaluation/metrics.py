@@ -125,6 +125,16 @@ def _within(times: Floats, *spans: tuple[float, float]) -> Mask:
     return kept
 
 
+def _covered(predictor: Predictor, predicted: Frames, truth: Sequence) -> Floats:
+    """(T,) 1 where the RMSE is within what nine in ten are expected to keep to, else 0; not a number where the model
+    expects none."""
+    expected = predictor.expected_error(truth.parameters, truth.times)
+    if expected is None:
+        return np.full(len(predicted), np.nan)
+    rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))
+    return (rmse <= expected[:, 1]).astype(float)
+
+
 def evaluate(
     predictor: Predictor,
     dataset: Dataset,
@@ -165,14 +175,8 @@ def evaluate(
         )
         predicted = motion.vertices(clock + truth.times)
         on_frames = _on_frames(truth.times, schema.window)
-        expected = predictor.expected_error(truth.parameters, truth.times)
-        if expected is not None:
-            rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))
-            covered.append(
-                (rmse <= expected[:, 1])[
-                    on_frames & (truth.times > max(begin - 1e-6, 0.0)) & (truth.times < end - 1e-6)
-                ]
-            )
+        scored = on_frames & (truth.times > max(begin - 1e-6, 0.0)) & (truth.times < end - 1e-6)
+        covered.append(_covered(predictor, predicted, truth)[scored])
         between = ~_on_frames(clock + truth.times, trained) & (clock + truth.times < trained.stop)
         for name, span in spans.items():
             inside = _within(truth.times, span)
@@ -182,7 +186,8 @@ def evaluate(
     result |= {name: scored.result() for name, scored in scores.items() if name != "whole"}
     result["per_object"] = {}
     # of frames of sequences: errors within what nine in ten are expected to keep to
-    result["coverage_90"] = float(np.concatenate(covered).mean()) if covered else None
+    within = np.concatenate(covered)
+    result["coverage_90"] = None if np.isnan(within).any() else float(within.mean())
     data = ("rest.", "training.", "val.")
     result["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith(data))
     return result

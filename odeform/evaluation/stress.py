@@ -1,17 +1,15 @@
 """Numerical stability at the extremes: what is shown for whatever is asked, each claim with a figure and a bound."""
 
-import os
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
 
+from odeform.cores import on_every_core
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.answers import check_answers
@@ -20,10 +18,8 @@ from odeform.evaluation.draws import Draw, draws, shapes, thinned
 from odeform.evaluation.orders import check_orders, check_refining
 from odeform.evaluation.physics import check_physics
 from odeform.evaluation.solvers import check_calibration, check_field, check_sensitivities
-from odeform.evaluation.timing import as_viewed
 from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor, load_reduced
-from odeform.progress import Progress
 from odeform.schema import Window
 from odeform.types import Floats, Geometry
 
@@ -85,7 +81,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     predictor = load_reduced(checkpoint)
     schema = predictor.schema
     asked = draws(schema, bool(predictor.qualities), count, seed)
-    outcomes = _show_all(checkpoint, asked)
+    outcomes = on_every_core("stress", partial(_show_part, checkpoint), asked, TOGETHER)
     checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
@@ -101,22 +97,9 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     }
 
 
-def _show_all(checkpoint: str, asked: Sequence[Draw]) -> list[Outcome]:
-    """Of all draws, in their order, on every core."""
-    parts = [asked[at : at + TOGETHER] for at in range(0, len(asked), TOGETHER)]
-    progress, outcomes = Progress("stress", len(asked)), []
-    with ProcessPoolExecutor(min(os.cpu_count() or 1, len(parts)), mp_context=get_context("spawn")) as pool:
-        for some in pool.map(partial(_show_part, checkpoint), parts):
-            outcomes += some
-            progress.advance(len(some))
-    progress.close()
-    return outcomes
-
-
 def _show_part(checkpoint: str, asked: Sequence[Draw]) -> list[Outcome]:
     predictor, geometries = _opened(checkpoint)
-    with as_viewed():
-        return [show(predictor, draw, geometries) for draw in asked]
+    return [show(predictor, draw, geometries) for draw in asked]
 
 
 @cache

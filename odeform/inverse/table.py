@@ -1,19 +1,16 @@
 """Identification over a split, scored where the parameters are known (as the paper's Table V, one at a time there)."""
 
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
 from functools import partial
-from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from odeform.checkpoint import Checkpoint
+from odeform.cores import on_every_core
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.inverse.discrepancy import NOMINAL, Discrepancy, calibrate
@@ -45,17 +42,11 @@ def identify_split(
     if split in (CALIBRATION, "all"):
         print(f"note: intervals are calibrated on {CALIBRATION}, which is among what is scored", file=sys.stderr)
     discrepancy = _calibrated(predictor, dataset)
-    progress, rows = Progress(f"identify {dataset.schema.scene}", len(entries)), []
     observed = [(entry, observe(dataset.read(entry), predictor.schema, seen)) for entry in entries]
-    parts = [observed[at : at + TOGETHER] for at in range(0, len(observed), TOGETHER)]
     work = partial(_rows, type(predictor), predictor.checkpoint, discrepancy)
     begin = time.perf_counter()
-    with ProcessPoolExecutor(min(os.cpu_count() or 1, len(parts)), mp_context=get_context("spawn")) as pool:
-        for some in pool.map(work, parts):
-            rows += some
-            progress.advance(len(some))
+    rows = on_every_core(f"identify {dataset.schema.scene}", work, observed, TOGETHER)
     seconds = (time.perf_counter() - begin) / len(rows)
-    progress.close()
     return {
         "model": predictor.model,
         "scene": dataset.schema.scene,
@@ -74,10 +65,8 @@ def _rows(
     discrepancy: Discrepancy,
     observed: Sequence[tuple[Entry, Observation]],
 ) -> list[dict[str, Any]]:
-    """In a process of its own, on one core."""
     predictor = model(checkpoint)
-    with threadpool_limits(1, "blas"):
-        return [_row(entry.name, entry.parameters, identify(predictor, seen, discrepancy)) for entry, seen in observed]
+    return [_row(entry.name, entry.parameters, identify(predictor, seen, discrepancy)) for entry, seen in observed]
 
 
 def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:

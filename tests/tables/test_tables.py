@@ -32,7 +32,8 @@ def test_scores_are_those_of_the_checkpoint(cell: Cell, folder: Path, dataset: D
     model = load(folder / f"{cell.name}.safetensors")
     assert result["sha256"] == model.checkpoint.sha256
     again = evaluate(model, dataset, "test", (60, 70))
-    assert result["scores"]["60:70"] == pytest.approx({name: again[name] for name in KEPT}, rel=1e-6)
+    # positions are rounded to single precision, in products of other sizes
+    assert result["scores"]["60:70"] == pytest.approx({name: again[name] for name in KEPT}, rel=1e-6, abs=1e-4)
     assert "odeform train" in result["command"]
 
 

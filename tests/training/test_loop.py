@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import torch
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
-from odeform.model.data import TrainingData, prepare
+from odeform.model.data import Thinning, TrainingData, prepare
 from odeform.model.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
@@ -43,6 +44,23 @@ def test_outputs_are_whitened(data: TrainingData) -> None:
     assert (whitened[..., :3] ** 2).mean(axis=(0, 1)).sum() == pytest.approx(1.0, rel=1e-4)
     assert (whitened[..., 3:6] ** 2).mean(axis=(0, 1)).sum() == pytest.approx(1.0, rel=1e-4)
     assert (whitened[..., 6:] ** 2).mean(axis=(0, 1)) == pytest.approx(np.ones(8), rel=1e-4)
+
+
+@pytest.mark.parametrize("stagger", [False, True])
+def test_descent_sees_as_many_frames_where_few_are_known(dataset: Dataset, stagger: bool) -> None:
+    data = prepare(dataset, 8, Thinning(every=6, stagger=stagger))
+    config = TrainConfig(batch=2)
+    trainer = Trainer(build_network(data, 0), data, config, torch.device("cpu"))
+    assert trainer.batch * len(trainer.shown) >= config.batch * len(data.times) / 2 - len(trainer.shown)
+    # what a spline filled in changes nothing
+    rows, losses = torch.arange(trainer.batch), []
+    for filled in (0.0, 1e3):
+        reduced = data.reduced["train"] + filled * ~data.known["train"][..., None]
+        other = replace(data, reduced={**data.reduced, "train": reduced})
+        trainer = Trainer(build_network(data, 0), other, config, torch.device("cpu"))
+        trainer.loss(rows, trainer.frames // 2)
+        losses.append(trainer.net.local_decoder.readout.weight.clone())
+    assert torch.equal(*losses)
 
 
 def test_descent_lowers_what_the_readout_leaves(data: TrainingData) -> None:

@@ -1,14 +1,16 @@
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
-from odeform.model.data import prepare
+from odeform.model.data import Thinning, prepare
 from odeform.model.odeform import ODeform
 from odeform.predictor import Predictor
 from odeform.solver.frontier import FrontierPoint
 from odeform.solver.integrate import Quality
+from odeform.training import qualities
 from odeform.training.qualities import choose_qualities, measure_frontier
 
 Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
@@ -58,3 +60,14 @@ def test_a_checkpoint_brings_its_frontier(predictors: dict[str, Predictor]) -> N
     assert list(model.qualities) == ["draft", "balanced", "reference"]
     assert set(model.qualities.values()) <= {point.quality for point in model.frontier}
     assert predictors["pod-rbf"].frontier == ()
+
+
+def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
+    dataset: Dataset, predictors: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = cast(ODeform, predictors["odeform"])
+    monkeypatch.setattr(qualities, "_candidates", lambda _: [Quality("rk4", step=0.01)])
+    data = prepare(dataset, model.space.basis.modes, Thinning(every=6, stagger=True))
+    unknown = ~data.known["val"][..., None]
+    wrong = replace(data, reduced={**data.reduced, "val": data.reduced["val"] + 9.0 * unknown})
+    assert measure_frontier(model, wrong) == measure_frontier(model, data)
