@@ -1,9 +1,12 @@
 """Shared fixtures: a small real data set, simulated once, and a model trained on it for seconds."""
 
 import functools
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import jaxtyping
 import pytest
 from joblib import parallel_config
 
@@ -23,6 +26,21 @@ def _coarsen(patch: pytest.MonkeyPatch) -> None:
     scene = kick_scene.SCENE
     simulate = functools.partial(kick_scene.simulate, segments=4)
     patch.setattr(kick_scene, "SCENE", replace(scene, simulate=simulate, step=2e-3))
+
+
+@contextmanager
+def _unchecked() -> Iterator[None]:
+    """Shapes and types are not checked at run time, which takes longer than the ODE does where one is solved over and
+    over. Shorter tests of the same functions check them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+        yield
+
+
+@pytest.fixture
+def unchecked() -> Iterator[None]:
+    with _unchecked():
+        yield
 
 
 @pytest.fixture
@@ -61,7 +79,7 @@ def predictors(trained: dict[str, Path]) -> dict[str, Predictor]:
 def point_models(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A checkpoint of every model that moves each point by itself: narrow, and trained for a few steps."""
     root, rest, paths = tmp_path_factory.mktemp("points"), get_scene("kick").rest_mesh(), {}
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, _unchecked():
         for name, model in POINTS.items():
             patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
             patch.setattr(model.network, "work", 512, raising=False)

@@ -161,7 +161,7 @@ def test_a_reloaded_model_predicts_the_same(
     again = load(tmp_path / "copy.safetensors")
     assert isinstance(again, Predictor)
     assert again.model == model
-    assert np.array_equal(again.solve().vertices(TIMES), models[model].solve().vertices(TIMES))
+    assert np.array_equal(again.solve(egg()).vertices(TIMES), models[model].solve(egg()).vertices(TIMES))
 
 
 @everywhere

@@ -35,7 +35,7 @@ def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
         monkeypatch.setattr(module, name, value)
 
 
-@pytest.mark.usefixtures("small")
+@pytest.mark.usefixtures("small", "unchecked")
 def test_bench(
     trained: dict[str, Path],
     dataset: Dataset,

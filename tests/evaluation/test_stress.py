@@ -74,7 +74,7 @@ def test_bounds() -> None:
     assert not Check(math.inf, 1.0, at_least=True).holds
 
 
-@pytest.mark.usefixtures("_short")
+@pytest.mark.usefixtures("_short", "unchecked")
 @pytest.mark.parametrize("name", ["odeform", "pod-rbf"])
 def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     out, cases = tmp_path / "stress.json", 30

@@ -39,6 +39,7 @@ def units(found: Identification) -> np.ndarray:
 CASES = {"kick": (0.4, -0.7, 0.3, 0.8), "mass-elastic": (-0.35, 0.6)}
 
 
+@pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("scene", CASES)
 def test_recovers_what_a_model_was_told(scene: str) -> None:
     predictor, theta = load(scene), np.array(CASES[scene])
@@ -49,6 +50,7 @@ def test_recovers_what_a_model_was_told(scene: str) -> None:
     assert all(one.identifiable and one.low <= one.value <= one.high for one in found.parameters.values())
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
     predictor, theta = load("mass-elastic"), np.array([-1.0, 1.0])
     steps: list[dict[str, float]] = []
@@ -74,6 +76,7 @@ def test_can_be_cancelled() -> None:
         identify(predictor, view, certain(predictor), cancel)
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
     clean = seen(predictor, theta, predictor.schema.window.times[2:90:3], points=5)
@@ -86,6 +89,7 @@ def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
         assert other.identifiable
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_what_is_expected_of_the_error_is_taken_off() -> None:
     predictor, theta = load("mass-elastic"), np.array([0.3, -0.4])
     whole = certain(predictor)
@@ -112,6 +116,7 @@ def test_free_flight_tells_nothing() -> None:
         assert one.high <= 1.001 * parameter.high
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_what_no_parameters_explain_widens_the_intervals() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
     view = seen(predictor, theta, predictor.schema.window.times[1:60:4], points=8)

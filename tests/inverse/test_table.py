@@ -34,6 +34,7 @@ def test_errors_that_are_alike_count_for_less(few: Dataset) -> None:
     assert np.median(discrepancy.at(np.array([0.2]))) < np.median(discrepancy.at(np.array([1.0])))
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_the_command(
     few: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
