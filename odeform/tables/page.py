@@ -81,7 +81,7 @@ def _spread(values: Sequence[float]) -> str:
     """Mean and standard deviation over seeds."""
     if not values:
         return "–"
-    return _number(float(np.mean(values))) + (f" ± {_number(float(np.std(values, ddof=1)))}" if len(values) > 1 else "")
+    return _number(float(np.mean(values))) + (f" ± {np.std(values, ddof=1):.2g}" if len(values) > 1 else "")
 
 
 def _bold(model: str) -> str:
@@ -177,9 +177,9 @@ def _interpolated(cells: Cells, simple: Mapping[str, Mapping[str, float]]) -> li
         "RMSE, then MAE. Each sequence shows its own frames (`--stagger`: the i-th keeps i, i + k, i + 2 k, ...):",
         "",
         *tables[True],
-        "All sequences show the same frames. Of the first contact, frames 33 to 40, every 8th then shows its end",
-        "alone, and nothing tells what is between. `occupancy-flow` is given the true kept frames at test time, as in",
-        "the paper:",
+        "All sequences show the same frames. Of the first contact, frames 33 to 40, every 5th then shows two and",
+        "every 8th its end alone; no other sequence tells what is between. `occupancy-flow` is given the true kept",
+        "frames of the very motion at test time, as in the paper, and the others its parameters:",
         "",
         *tables[False],
         *_table(["paper, RMSE", *(f"every {_nth(k)}" for k in INTERVALS)], paper),

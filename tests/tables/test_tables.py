@@ -100,7 +100,7 @@ def test_the_page_shows_every_model_and_leaves_open_what_is_not_there() -> None:
         part = text.split(f"## {table}. ")[1].split("\n## ")[0]
         for cell in of:
             assert f"| {cell.model} |" in part or f"| **{cell.model}** |" in part
-    spread = f"2 ± {np.std([1.0, 2.0, 3.0], ddof=1):.3g}"
+    spread = f"2 ± {np.std([1.0, 2.0, 3.0], ddof=1):.2g}"
     assert text.count(f"| **odeform** | 7 | {spread}") == 1
     assert all(row.endswith("| – | – | – |") for row in text.splitlines() if row.startswith("| **odeform** | 7"))
     assert "| mass-elastic | mass | 0.0100 | – | 1.0 s | 0.113 |" in text
