@@ -82,7 +82,7 @@ def point_models(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> 
     with pytest.MonkeyPatch.context() as patch, _unchecked():
         for name, model in POINTS.items():
             patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
-            patch.setattr(model.network, "work", 512, raising=False)
+            patch.setattr(model.network, "work", 256, raising=False)
             paths[name] = root / f"{name}.safetensors"
             steps = 210 if model.network.teaching == "moments" else 56  # which are cheap
             train(dataset, rest, paths[name], TrainRequest(name, seed=1, steps=steps, every=4), lambda _: None)
