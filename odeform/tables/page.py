@@ -48,12 +48,13 @@ def page(found: Mapping[str, Any]) -> str:
         [
             "# Tables II to V",
             "",
-            f"Written by `odeform tables{share}`. Within a table every model has the same data, the same split and as",
-            f"many steps as take about {MINUTES} minutes of one core, trials of its settings on validation included:",
-            "steps, unlike minutes, are the same on a busy machine. Behind each command are the seconds of a core it",
-            "took, two at a time. Scores are of the test split, pooled over frames and sequences, in mm and mm². The",
-            "paper's figures stand beside; its data are others, so that only orders compare. What is open (–) was not",
-            "run, or cannot be: there is no scene of Contact-Force yet.",
+            f"Written by `odeform tables{share}`. Within a table every model has the same data, the same split and a",
+            "budget of steps, trials of its settings on validation included: steps, unlike minutes, are the same on a",
+            f"busy machine. Idle, they took about {MINUTES} minutes of a core when they were set; here, two at a time,",
+            f"{_taken(cells)}.",
+            "Scores are of the test split, pooled over frames and sequences, in mm and mm². The paper's figures stand",
+            "beside; its data are others, so that only orders compare. What is open (–) was not run, or cannot be:",
+            "there is no scene of Contact-Force yet.",
             "",
             *_unseen(cells["II"], found["shipped"]),
             *_extrapolated(cells["III"], found["simple"]),
@@ -65,6 +66,16 @@ def page(found: Mapping[str, Any]) -> str:
             "",
         ]
     )
+
+
+def _taken(cells: Mapping[str, Cells]) -> str:
+    """Seconds of a core, least and most, of each model that has a budget."""
+    seconds: dict[str, list[float]] = {}
+    for of in cells.values():
+        for cell, result in of.items():
+            if cell.steps is not None:
+                seconds.setdefault(cell.model, []).append(result["seconds"])
+    return ", ".join(f"`{model}` {min(some):.0f} to {max(some):.0f} s" for model, some in seconds.items())
 
 
 def _table(head: Row, rows: Iterable[Row]) -> list[str]:
@@ -177,9 +188,9 @@ def _interpolated(cells: Cells, simple: Mapping[str, Mapping[str, float]]) -> li
         "RMSE, then MAE. Each sequence shows its own frames (`--stagger`: the i-th keeps i, i + k, i + 2 k, ...):",
         "",
         *tables[True],
-        "All sequences show the same frames. Of the first contact, frames 33 to 40, every 5th then shows two and",
-        "every 8th its end alone; no other sequence tells what is between. `occupancy-flow` is given the true kept",
-        "frames of the very motion at test time, as in the paper, and the others its parameters:",
+        "All sequences show the same frames. A contact lasts a few, and none tells what is between those that are",
+        "shown. `occupancy-flow` is given the true kept frames of the very motion at test time, as in the paper, and",
+        "the others its parameters:",
         "",
         *tables[False],
         *_table(["paper, RMSE", *(f"every {_nth(k)}" for k in INTERVALS)], paper),

@@ -11,6 +11,7 @@ from odeform.predictor import Predictor
 from odeform.types import Sequence
 
 ALL = np.ones(3, dtype=bool)
+ROUNDING = 1e-5  # of a score: positions are in single precision, and products of other sizes round otherwise
 
 
 def score(*pairs: tuple[np.ndarray, Sequence, np.ndarray]) -> dict:
@@ -115,7 +116,7 @@ def test_a_window_scores_its_frames(dataset: Dataset, predictors: dict[str, Pred
     # frame 0 is given and has no score, so frame k is number k - 1
     squares = np.square(whole["per_frame_rmse_mm"])
     assert len(squares) == 120
-    assert part["mse_pooled_mm2"] == pytest.approx(squares[29:59].mean(), rel=1e-5)
+    assert part["mse_pooled_mm2"] == pytest.approx(squares[29:59].mean(), rel=1e-6)
     assert evaluate(predictors["pod-rbf"], dataset, "test", window=(0, 500))["mse_mm2"] == whole["mse_mm2"]
 
 
@@ -138,9 +139,8 @@ def test_the_impact_is_scored_as_a_window_of_its_span(dataset: Dataset, predicto
     whole = evaluate(predictors["pod-rbf"], with_impact, "test")
     part = evaluate(predictors["pod-rbf"], dataset, "test", window=(30, 90))
     assert len(part["per_frame_rmse_mm"]) == 60
-    # products of other sizes round otherwise
     for name, value in whole["impact"].items():
-        assert part[name] == (pytest.approx(value, rel=1e-6, abs=1e-4) if value else value)
+        assert part[name] == (pytest.approx(value, rel=ROUNDING) if value else value), name
     assert {name: whole[name] for name in part} == evaluate(predictors["pod-rbf"], dataset, "test")
     # neither a scene without an impact has it, nor a window that was asked for
     assert "impact" not in part
@@ -154,15 +154,15 @@ def test_frames_between_the_learned_ones_count_apart(dataset: Dataset, predictor
     coarse = evaluate(predictors["pod-rbf"], every_fourth, "test")
     assert coarse.pop("off_grid_rmse_mm") is None
     for name, value in coarse.items():
-        # rounding alone differs: 1 / 120 is not quite four times 1 / 480, and products are of other sizes
-        assert fine[name] == (pytest.approx(value, rel=1e-6, abs=1e-4) if value else value), name
+        # nor is 1 / 120 quite four times 1 / 480
+        assert fine[name] == (pytest.approx(value, rel=ROUNDING) if value else value), name
     squares = []
     for sequence in dataset.sequences("test"):
         motion = predictors["pod-rbf"].solve(sequence.rest, sequence.parameters)
         between = np.arange(481) % 4 != 0
         error = motion.vertices(sequence.times[between]) - sequence.vertices[between].astype(float)
         squares.append(1e6 * (error**2).mean())
-    assert fine["off_grid_rmse_mm"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-5)
+    assert fine["off_grid_rmse_mm"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
 
 
 def test_a_sequence_that_ended_is_scored_where_it_lies(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
@@ -177,7 +177,7 @@ def test_a_sequence_that_ended_is_scored_where_it_lies(dataset: Dataset, predict
         motion = predictors["nearest"].solve(sequence.rest, sequence.parameters)
         squares.append(1e6 * ((motion.vertices(0.9) - sequence.vertices[60].astype(float)) ** 2).mean())
     # frame 0 has no score, so frame 108 is number 107
-    assert by_frame[107] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-5)
+    assert by_frame[107] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
     assert by_frame[107] > 10.0
 
 
