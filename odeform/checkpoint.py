@@ -11,7 +11,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from odeform.errors import InputError
-from odeform.files import bundled, safetensors_metadata, write_aside
+from odeform.io import atomic_write, bundled, safetensors_metadata
 from odeform.schema import Schema
 from odeform.types import Arrays
 
@@ -56,7 +56,7 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     }
     metadata = {"odeform": json.dumps(meta)}  # one key: safetensors writes several in no fixed order
     data = save({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}, metadata)
-    write_aside(Path(path), data)
+    atomic_write(Path(path), data)
 
 
 def checkpoint_bytes(path: Path) -> bytes:

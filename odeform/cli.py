@@ -51,10 +51,10 @@ def parse_window(text: str | None) -> tuple[int, int] | None:
 
 
 def _emit(result: dict[str, Any], path: str | None) -> None:
-    from odeform.files import write_aside
+    from odeform.io import atomic_write
 
     if path:
-        write_aside(Path(path), json.dumps(result, indent=1).encode())
+        atomic_write(Path(path), json.dumps(result, indent=1).encode())
     else:
         print(json.dumps(result, indent=1))
 
@@ -75,7 +75,7 @@ def _simulate(args: argparse.Namespace) -> None:
 
 
 def _import(args: argparse.Namespace) -> None:
-    from odeform.dataset.importing import import_dataset
+    from odeform.dataset.importers.importing import import_dataset
 
     dataset = import_dataset(args.source, args.out, args.rate, args.seed)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
@@ -142,8 +142,8 @@ def _evaluate(args: argparse.Namespace) -> None:
 
 def _identify(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
-    from odeform.inverse.observation import View
-    from odeform.inverse.table import identify_split, report
+    from odeform.identification.observation import View
+    from odeform.identification.table import identify_split, report
     from odeform.predictor import load
 
     if args.limit is not None and args.limit < 1:
@@ -156,8 +156,8 @@ def _identify(args: argparse.Namespace) -> None:
 
 
 def _predict(args: argparse.Namespace) -> None:
-    from odeform.export import parse_times, write_motion
-    from odeform.geometry.bundled import read_shape
+    from odeform.formats.bundled import read_shape
+    from odeform.formats.motion_files import parse_times, write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import Similarity
     from odeform.predictor import load
@@ -166,11 +166,11 @@ def _predict(args: argparse.Namespace) -> None:
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
     fit = None
-    if args.geometry is None and not predictor.fits:
+    if args.geometry is None and not predictor.rescales_input:
         print(f"note: {args.checkpoint}: {predictor.schema.notes[-1]}", file=sys.stderr)
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
-        fit = fit_to(shape, predictor.rest, region, place=None if predictor.fits else Similarity())
+        fit = fit_to(shape, predictor.rest, region, place=None if predictor.rescales_input else Similarity())
     geometry = fit.geometry if fit else None
     for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
         print(f"note: {args.geometry}: {note}", file=sys.stderr)
@@ -200,7 +200,7 @@ def _info(args: argparse.Namespace) -> None:
 
 
 def _bench(args: argparse.Namespace) -> None:
-    from odeform.evaluation.bench import bench, report
+    from odeform.benchmark.bench import bench, report
 
     result = bench(args.checkpoint, args.data)
     if args.json:
@@ -209,18 +209,18 @@ def _bench(args: argparse.Namespace) -> None:
 
 
 def _stress(args: argparse.Namespace) -> None:
-    from odeform.evaluation.stress import report, stress
+    from odeform.stress.stress import report, stress
 
     if args.cases < 1:
         raise InputError(f"--cases: expected a positive number, got {args.cases}")
     if args.map:
-        from odeform.evaluation.stability import map_image, stability_map
-        from odeform.files import write_aside
+        from odeform.io import atomic_write
         from odeform.predictor import load_continuous
+        from odeform.stress.stability import map_image, stability_map
 
         picture = io.BytesIO()
         map_image(stability_map(load_continuous(args.checkpoint))).save(picture, format="PNG", optimize=True)
-        write_aside(Path(args.map), picture.getvalue())
+        atomic_write(Path(args.map), picture.getvalue())
     result = stress(args.checkpoint, args.cases)
     if args.json:
         _emit(result, args.json)
@@ -332,7 +332,7 @@ def _add_askers(command: Command) -> None:
     sub.add_argument("--seed", type=int, default=0, metavar="S", help="of what is drawn (0)")
     sub.add_argument("--json", metavar="FILE")
 
-    sub = command("bench", _bench, "measure work, precision and latency on this machine, and those of peers")
+    sub = command("bench", _bench, "measure speed against accuracy on this machine, beside other models and solvers")
     sub.add_argument("checkpoint", nargs="?", default="kick", metavar="CKPT")
     sub.add_argument("--data", metavar="DATASET", help="the truth (default: the scene's bundled data set, if any)")
     sub.add_argument("--json", metavar="FILE")

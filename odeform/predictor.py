@@ -6,13 +6,13 @@ from typing import Any, Protocol, runtime_checkable
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
-from odeform.model.base import ReducedModel
-from odeform.model.predicted import PredictedMotion
-from odeform.released.file import ENDING, read_released
+from odeform.models.authors.file import ENDING, read_authors_checkpoint
+from odeform.models.frontier import FrontierPoint
+from odeform.models.reduced_model import ReducedModel
+from odeform.motion.base import Motion
 from odeform.schema import Parameters, Schema
-from odeform.solver.frontier import FrontierPoint
-from odeform.solver.integrate import Quality
-from odeform.types import Floats, Geometry, Mesh, Sequence, Times
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
 
 __all__ = ["Predictor", "load", "load_continuous", "load_reduced", "observations", "open_checkpoint"]
 
@@ -25,23 +25,23 @@ class Predictor(Protocol):
     checkpoint: Checkpoint
     rest: Mesh
     """The body as viewers show it, where it lies at rest."""
-    fits: bool
+    rescales_input: bool
     """Whether foreign shapes are brought to the size and place of `rest`, or else taken as they are, in metres."""
 
-    beyond: bool
+    extrapolates: bool
     """Whether motions go on beyond the trained window; else it alone can be scored."""
 
     @property
     def model(self) -> str: ...
 
     @property
-    def qualities(self) -> Mapping[str, Quality]: ...
+    def qualities(self) -> Mapping[str, SolverSettings]: ...
 
-    def expected_error(self, parameters: Parameters, times: Times) -> Floats | None: ...
+    def error_band(self, parameters: Parameters, times: Times) -> Floats | None: ...
     @property
     def frontier(self) -> tuple[FrontierPoint, ...]: ...
 
-    def seated(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
+    def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         """A body that lies in the scene at rest under `parameters`, in the frame in which `solve` expects it."""
         ...
 
@@ -49,34 +49,34 @@ class Predictor(Protocol):
         self,
         geometry: Geometry | None = None,
         parameters: Mapping[str, Any] | None = None,
-        quality: str | Quality = "balanced",
+        quality: str | SolverSettings = "balanced",
         until: float | None = None,
-        observed: Sequence | None = None,
-    ) -> PredictedMotion: ...
+        observed: MotionSequence | None = None,
+    ) -> Motion: ...
 
 
 def open_checkpoint(name: str | Path) -> Checkpoint:
     """By path, ours or a `.pth` of the authors, or by a bundled one's name (SCENE or SCENE/MODEL)."""
     path = resolve_checkpoint(str(name))
     if path.suffix.lower() == ENDING:
-        return read_released(path)
+        return read_authors_checkpoint(path)
     return read_checkpoint(path)
 
 
 def load(name: str | Path) -> Predictor:
     """A predictor from a checkpoint's path, or a bundled one's name (SCENE or SCENE/MODEL)."""
-    from odeform.baselines.direct import Direct
-    from odeform.baselines.nearest import Nearest
-    from odeform.baselines.node import Node
-    from odeform.baselines.occupancy_flow import OccupancyFlow
-    from odeform.baselines.odeform_per_point import OdeformPerPoint
-    from odeform.baselines.pod_rbf import PodRbf
-    from odeform.baselines.rnn import Rnn
-    from odeform.model.odeform import ODeform
-    from odeform.released.predictor import Released
+    from odeform.models.authors.predictor import AuthorsModel
+    from odeform.models.baselines.direct import Direct
+    from odeform.models.baselines.nearest import Nearest
+    from odeform.models.baselines.node import Node
+    from odeform.models.baselines.occupancy_flow import OccupancyFlow
+    from odeform.models.baselines.odeform_per_point import OdeformPerPoint
+    from odeform.models.baselines.pod_rbf import PodRbf
+    from odeform.models.baselines.rnn import Rnn
+    from odeform.models.odeform.model import ODeform
 
     checkpoint = open_checkpoint(name)
-    kinds = (ODeform, OdeformPerPoint, Node, Rnn, Direct, OccupancyFlow, PodRbf, Nearest, Released)
+    kinds = (ODeform, OdeformPerPoint, Node, Rnn, Direct, OccupancyFlow, PodRbf, Nearest, AuthorsModel)
     models = {model.model: model for model in kinds}
     if checkpoint.model not in models:
         raise InputError(f"checkpoint {name}: unknown model {checkpoint.model!r}; expected one of {', '.join(models)}")
@@ -86,7 +86,7 @@ def load(name: str | Path) -> Predictor:
 def load_continuous(name: str | Path) -> Predictor:
     """As `load`; `InputError` for a network that is tied to the frames it was trained on."""
     predictor = load(name)
-    if not predictor.beyond:
+    if not predictor.extrapolates:
         raise InputError(f"checkpoint {name}: tied to its trained frames, nothing to measure off them; expected ours")
     return predictor
 
@@ -99,7 +99,7 @@ def load_reduced(name: str | Path) -> ReducedModel:
     return predictor
 
 
-def observations(schema: Schema, record: Sequence) -> Sequence | None:
+def observations(schema: Schema, record: MotionSequence) -> MotionSequence | None:
     """What a model of this schema is given of a record: the frames of its window's rate; None for most models."""
     if not schema.needs_observations:
         return None

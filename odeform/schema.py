@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "faded"]
+__all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
 
 Parameters = Mapping[str, float]
 
@@ -26,7 +26,7 @@ REACH = 0.5
 """Windows beyond the trained one over which models that go on do so before their clock stops."""
 
 
-def faded(values: Floats, limit: float, margin: float) -> Floats:
+def soft_clip(values: Floats, limit: float, margin: float) -> Floats:
     """Magnitudes up to `limit` to the last bit as they are; beyond, smoothly, ever less, and never by over `margin`.
 
     What models are asked for passes through here, so that they are continuous functions of a bounded set: whatever is
@@ -112,10 +112,10 @@ class Window:
         count = round((self.stop - self.start) * self.rate)
         return self.start + np.arange(count + 1) / self.rate
 
-    def seen(self, times: Floats) -> Floats:
+    def soft_clamped(self, times: Floats) -> Floats:
         """(T,) times as models see them: clocks run ever slower after the trained span and its reach, and soon stop."""
         span = self.stop - self.start
-        return faded(times, self.stop + self.reach * span, LATER * span)
+        return soft_clip(times, self.stop + self.reach * span, LATER * span)
 
 
 @dataclass(frozen=True)
@@ -168,9 +168,9 @@ class Schema:
         """(P,) the learned parameters, each with its trained range mapped to [-1, 1]."""
         return np.array([p.normalise(parameters[p.name]) for p in self.learned])
 
-    def seen(self, parameters: Parameters) -> Floats:
+    def inputs(self, parameters: Parameters) -> Floats:
         """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.15."""
-        return faded(self.vector(parameters), 1.0, BEYOND)
+        return soft_clip(self.vector(parameters), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:
         """Those of the trained box, `reach` times as large about its middle; symmetries stay at their default."""

@@ -21,12 +21,12 @@ __all__ = [
     "Ints",
     "Matrices",
     "Mesh",
+    "MotionSequence",
     "Perpoint",
     "PointCloud",
     "Points",
     "Pose",
     "Rotations",
-    "Sequence",
     "Times",
     "Vector",
     "Vectors",
@@ -94,7 +94,7 @@ Geometry = Mesh | PointCloud | GaussianSplats
 
 
 @dataclass(frozen=True, eq=False)
-class Sequence:
+class MotionSequence:
     """One observed or simulated motion.
 
     `times` (T,) s; `vertices` (T, N, 3) m, frame 0 is the rest state; `faces` (F, 3); `weights` (N,) share of the
@@ -112,12 +112,12 @@ class Sequence:
     def rest(self) -> Mesh:
         return Mesh(self.vertices[0], self.faces)
 
-    def frames(self, stop: float, rate: float) -> "Sequence":
+    def frames(self, stop: float, rate: float) -> "MotionSequence":
         """Those of a rate in Hz, which the sequence may be a multiple of, up to `stop` seconds."""
         step = float(self.times[1] - self.times[0])
         return self.until(stop, max(round(1.0 / (rate * step)), 1))
 
-    def until(self, stop: float, every: int = 1) -> "Sequence":
+    def until(self, stop: float, every: int = 1) -> "MotionSequence":
         """Every k-th frame up to `stop` seconds. A sequence that ended before, at rest, stays as it was."""
         step = float(self.times[1] - self.times[0])
         times = np.arange(round(stop / step) + 1)[::every] * step

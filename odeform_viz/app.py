@@ -10,17 +10,14 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from odeform.cancellation import Cancelled, cancel_unless
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
-from odeform.export import write_motion
+from odeform.formats.motion_files import write_motion
 from odeform.types import Floats
-from odeform.wanted import Unwanted, as_long_as
-from odeform_viz.clock import Clock
 from odeform_viz.columns import Column, Columns
-from odeform_viz.heat import scale_for
-from odeform_viz.memory import Tidy, share_arenas
-from odeform_viz.notices import Notices
+from odeform_viz.fitting import fit_from_json
 from odeform_viz.panels.compare import ComparePanel
 from odeform_viz.panels.help import HelpPanel
 from odeform_viz.panels.parameters import ParameterPanel
@@ -32,23 +29,26 @@ from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.stability import StabilityPanel
 from odeform_viz.panels.status import MomentPanel, StatusPanel
 from odeform_viz.panels.truth import TruthPanel
-from odeform_viz.recorder import Recorder
-from odeform_viz.scene import SceneView, color_of
-from odeform_viz.server import open_server
-from odeform_viz.session import Frame, Looks, Session, Wish, same_motions
-from odeform_viz.shaping import fit_from_json
+from odeform_viz.recording.writer import Recorder
+from odeform_viz.rendering.error_colors import scale_for
+from odeform_viz.rendering.scene import SceneView, color_of
+from odeform_viz.runtime.clock import Clock
+from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
+from odeform_viz.runtime.notices import Notices
+from odeform_viz.runtime.server import open_server
+from odeform_viz.runtime.worker import Worker
+from odeform_viz.session import DisplayOptions, Frame, Session, ViewRequest, same_motions
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
-from odeform_viz.worker import Worker
 
 __all__ = ["App"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
-SETTLE = 0.15  # s without a new wish after which the hand is taken to rest
+SETTLE = 0.15  # s without a new request after which the hand is taken to rest
 READ = 0.2  # s between numbers that change as something moves: nobody reads faster
 
 
 class App:
-    """Serves a page in which the user's wishes are met, the newest first and only."""
+    """Serves a page in which the user's requests are met, the newest first and only."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class App:
         share_arenas()
         # two threads of a product wait for each other: with a core busy elsewhere, ten times as long as one takes
         self._threads = threadpool_limits(1, "blas")
-        self._tidy = Tidy()
+        self._tidy = MallocTrimmer()
         self.server = open_server(host, port, f"ODeform · {self.session.schema.scene}")
         self._record_to = record
         try:
@@ -76,7 +76,7 @@ class App:
         self._body = columns[0].predictor.rest
         self._build(columns)
         self._shown: Frame | None = None
-        self._looks = Looks()
+        self._looks = DisplayOptions()
         self._heat: float | None = None
         self._settled = False
         self._told: Frame | None = None  # the frame that numbers and curves are of, and since when
@@ -153,17 +153,17 @@ class App:
         if self._recorder:
             self._recorder.close()
 
-    def wish(self) -> Wish:
+    def request(self) -> ViewRequest:
         """What the page asks for now."""
         parameters = self.session.schema.complete(self._parameters.parameters())
-        quality = self._quality.wish() if self._quality else "balanced"
-        return Wish(parameters, self.clock.time(), quality, self.columns.all)
+        quality = self._quality.request() if self._quality else "balanced"
+        return ViewRequest(parameters, self.clock.time(), quality, self.columns.all)
 
-    def _read_looks(self) -> Looks:
-        return Looks(self._compare.overlay, self._compare.heat, bool(self._follow.value))
+    def _read_looks(self) -> DisplayOptions:
+        return DisplayOptions(self._compare.overlay, self._compare.heat, bool(self._follow.value))
 
     def _largest(self) -> float:
-        return self.session.largest_deformation(self.wish())
+        return self.session.largest_deformation(self.request())
 
     def _changed(self) -> None:
         self._truth.refresh()
@@ -171,7 +171,7 @@ class App:
         self._worker.wake()
 
     def _record(self, path: str | None) -> None:
-        """Wish for a recording, or for its end; the worker sees to it, on whose thread everything is logged.
+        """ViewRequest for a recording, or for its end; the worker sees to it, on whose thread everything is logged.
 
         Who types a name in the page may have forgotten what bears it: nothing is overwritten.
         """
@@ -182,21 +182,21 @@ class App:
         self._worker.wake()
 
     def _keep_recording(self) -> None:
-        """Start or end the recording as wished. One that fails ends; the page goes on."""
-        wished, recorder = self._record_to, self._recorder
+        """Start or end the recording as requested. One that fails ends; the page goes on."""
+        requested, recorder = self._record_to, self._recorder
         try:
-            if recorder is not None and wished is None:
+            if recorder is not None and requested is None:
                 self._recorder = None
                 recorder.close()
                 self._take.show(None, 0)
                 self._take.finished(str(recorder.path), recorder.frames)
-            elif recorder is None and wished is not None:
-                self._recorder = Recorder(wished)
+            elif recorder is None and requested is not None:
+                self._recorder = Recorder(requested)
                 self._shown = None  # the frame at hand belongs in it
         except InputError as error:
             self._stop_recording(error)
         if self._recorder is not None:
-            self._take.show(wished, self._recorder.frames)
+            self._take.show(requested, self._recorder.frames)
 
     def _stop_recording(self, error: InputError) -> None:
         """It cannot go on; who asked for it on the command line may not have that tab open."""
@@ -205,7 +205,7 @@ class App:
         print(f"error: {error}", file=sys.stderr)
 
     def _save(self) -> bytes:
-        return state_to_json(capture(self.session.schema.scene, self.wish(), self._read_looks()))
+        return state_to_json(capture(self.session.schema.scene, self.request(), self._read_looks()))
 
     def _restore(self, data: bytes) -> None:
         """`InputError` if the state is none, or a checkpoint of it is not at hand; the page then stays as it was."""
@@ -226,29 +226,29 @@ class App:
 
     def _export(self, path: Path) -> Path:
         """The motion of the first model that is shown: a `.ply` of this moment, or all frames as `.npz`."""
-        wish = self.wish()
-        column = next((c for c in wish.columns if c.shown and c.predictor), None)
+        request = self.request()
+        column = next((c for c in request.columns if c.shown and c.predictor), None)
         if column is None:
             raise InputError("export: no model is shown")
-        motion = self.session.own_motion(column, wish)
+        motion = self.session.own_motion(column, request)
         if path.suffix == ".ply":
-            write_motion(motion, np.array([wish.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
+            write_motion(motion, np.array([request.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
             return path.with_name(f"{path.stem}_{0:05d}.ply")
         write_motion(motion, self.session.schema.window.times, path, column.fit)
         return path
 
     def _serve(self) -> float | None:
-        """One round of the worker: read the newest wish, show it; once nothing has changed for a while, complete it."""
+        """One round of the worker: read the newest request and show it; complete it once nothing changes any more."""
         try:
             self._keep_recording()
-            wish = self.wish()
+            request = self.request()
             looks = self._read_looks()
             if self._shape.arranging:
                 # what one drags is where the first column is, which then is where all are
                 looks = replace(looks, overlay=True)
-            with as_long_as(lambda: self._worker.undisturbed):
-                self._meet(wish, looks)
-        except Unwanted:
+            with cancel_unless(lambda: self._worker.undisturbed):
+                self._meet(request, looks)
+        except Cancelled:
             return 0.0
         except InputError as error:
             self._moment.show_error(str(error))
@@ -259,13 +259,13 @@ class App:
             return TICK
         return None if self._settled and self._told is self._shown else SETTLE
 
-    def _meet(self, wish: Wish, looks: Looks) -> None:
+    def _meet(self, request: ViewRequest, looks: DisplayOptions) -> None:
         """Show it if it is new, first without the columns that take long; then tell of it."""
         shown = self._shown
-        if shown is None or wish != shown.wish or looks != self._looks or shown.pending:
+        if shown is None or request != shown.request or looks != self._looks or shown.pending:
             # who scrubs is shown the others at each moment; who plays moves on by itself, and would never see the rest
-            met = shown is not None and (wish == shown.wish or (self.clock.playing and shown.follows(wish)))
-            self._show(self.session.frame(wish, whole=met), looks)
+            met = shown is not None and (request == shown.request or (self.clock.playing and shown.follows(request)))
+            self._show(self.session.frame(request, whole=met), looks)
         elif not self._settled:
             self._settled = True
             self._describe(shown)
@@ -273,7 +273,7 @@ class App:
         elif self._told is not shown:
             self._describe(shown)
 
-    def _show(self, frame: Frame, looks: Looks) -> None:
+    def _show(self, frame: Frame, looks: DisplayOptions) -> None:
         # colours keep their scale over the whole motion, so it has to be known first
         self._heat = self._scale(frame) if looks.heat else None
         self._settled = self._shown is not None and same_motions(frame, self._shown)
@@ -281,7 +281,7 @@ class App:
         self._shown, self._looks = frame, looks
         if self._recorder:
             try:
-                with as_long_as(lambda: True):  # what was shown is recorded
+                with cancel_unless(lambda: True):  # what was shown is recorded
                     self._recorder.log(frame)
             except InputError as error:
                 self._stop_recording(error)
@@ -290,25 +290,25 @@ class App:
 
     def _scale(self, frame: Frame) -> float | None:
         """The end of the colour scale in mm, one for all columns; None where nothing can be compared."""
-        curves = [self.session.curves(shown, frame.wish) for shown in frame.columns if shown.error]
+        curves = [self.session.curves(shown, frame.request) for shown in frame.columns if shown.error]
         stop = self.session.schema.window.stop
         errors = [c.error[c.times <= stop] for c in curves if c.error is not None]
         return scale_for(np.concatenate(errors)) if errors else None
 
     def _describe(self, frame: Frame) -> None:
         """What accompanies a frame: the time, numbers, curves, marks at the sliders."""
-        self._playback.show(frame.wish.time)
+        self._playback.show(frame.request.time)
         self._parameters.show()
         truth = frame.truth.column.truth if frame.truth else None
-        away = truth is not None and not truth.of(frame.wish.parameters)
+        away = truth is not None and not truth.of(frame.request.parameters)
         self._truth.show(away)
         self._moment.show(frame, self._heat, away)
         self._status.show(frame, self._settled)
         lines = [
-            (shown.column.label, color_of(shown.column), self.session.curves(shown, frame.wish))
+            (shown.column.label, color_of(shown.column), self.session.curves(shown, frame.request))
             for shown in frame.columns
         ]
-        self._plots.show(lines, frame.wish.time)
+        self._plots.show(lines, frame.request.time)
         self._told, self._told_at = frame, time.monotonic()
 
 

@@ -12,8 +12,8 @@ from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
 from odeform.predictor import Predictor
 from odeform_viz.columns import Column, truth_column
-from odeform_viz.replay import TOLERANCE, replay
-from odeform_viz.shaping import describe_fit, shape_from
+from odeform_viz.fitting import describe_fit, shape_from
+from odeform_viz.recording.replay import TOLERANCE, replay
 
 __all__ = ["main", "make_columns"]
 
@@ -23,7 +23,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
-        fit = shape_from(geometry, body, None if models[checkpoint].fits else Similarity())
+        fit = shape_from(geometry, body, None if models[checkpoint].rescales_input else Similarity())
         print(describe_fit(fit, geometry, body))
     return [
         Column(_label(model, fit), model, fit.geometry if fit else model.rest, origin=name, fit=fit)
@@ -32,7 +32,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
 
 
 def _label(model: Predictor, fit: Fit | None) -> str:
-    return model.model if fit or model.fits else f"{model.model}, on a ball that stands in"
+    return model.model if fit or model.rescales_input else f"{model.model}, on a ball that stands in"
 
 
 def _serve(args: argparse.Namespace) -> None:

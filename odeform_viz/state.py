@@ -11,9 +11,9 @@ from odeform.errors import InputError
 from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform_viz.columns import Column, truth_column
-from odeform_viz.provenance import origin_of
-from odeform_viz.session import Looks, Wish
-from odeform_viz.shaping import fit_to_json
+from odeform_viz.fitting import fit_to_json
+from odeform_viz.recording.provenance import origin_of
+from odeform_viz.session import DisplayOptions, ViewRequest
 
 __all__ = ["PageState", "capture", "columns_of", "state_from_json", "state_to_json"]
 
@@ -41,19 +41,19 @@ class PageState:
     """What the file could not hold."""
 
 
-def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
-    """What a wish says, in plain values. What is in no file here cannot be kept, and the notes say so."""
-    truth = next((c for c in wish.columns if c.truth), None)
-    fit = next((c.fit for c in wish.columns if c.fit), None)
+def capture(scene: str, request: ViewRequest, looks: DisplayOptions) -> PageState:
+    """What a request says, in plain values. What is in no file here cannot be kept, and the notes say so."""
+    truth = next((c for c in request.columns if c.truth), None)
+    fit = next((c.fit for c in request.columns if c.fit), None)
     lost = {
         "the truth was simulated on the spot and is not kept": truth and not truth.origin,
         "the shape was uploaded and is not kept": fit and not fit.origin,
     }
     return PageState(
         scene,
-        wish.parameters,
-        wish.time,
-        wish.quality,
+        request.parameters,
+        request.time,
+        request.quality,
         tuple(
             {
                 "origin": origin_of(c),
@@ -62,7 +62,7 @@ def capture(scene: str, wish: Wish, looks: Looks) -> PageState:
                 "shown": c.shown,
                 "truth": c.truth is not None,
             }
-            for c in wish.columns
+            for c in request.columns
             if c.predictor or c.origin
         ),
         fit_to_json(fit) if fit and fit.origin else None,

@@ -11,12 +11,12 @@ import pytest
 from joblib import parallel_config
 
 import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
-from odeform.baselines.networks import Trial
 from odeform.dataset.index import Dataset
+from odeform.models.baselines.point_network import Trial
 from odeform.predictor import Predictor, load
-from odeform.simulation import kick as kick_scene
 from odeform.simulation.runner import simulate_dataset
 from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
 from odeform.training.train import POINTS, TrainRequest, train
 

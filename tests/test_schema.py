@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
-from odeform.schema import Schema, Window, faded
+from odeform.schema import Schema, Window, soft_clip
 from odeform.simulation.scene import get_scene
 
 SCHEMA = get_scene("kick").schema
@@ -53,29 +53,29 @@ def test_outside_is_told_and_the_edge_is_inside() -> None:
 
 def test_what_is_beyond_fades() -> None:
     inside, beyond = np.linspace(-1.0, 1.0, 41), np.array([1.0, 1.01, 1.1, 2.0, 10.0, np.inf])
-    assert np.array_equal(faded(inside, 1.0, 0.25), inside)
-    seen = faded(beyond, 1.0, 0.25)
+    assert np.array_equal(soft_clip(inside, 1.0, 0.25), inside)
+    seen = soft_clip(beyond, 1.0, 0.25)
     assert (np.diff(seen[:4]) > 0.0).all()
     assert np.allclose(seen[:3], beyond[:3], atol=6e-3), "it begins smoothly"
     assert seen[-1] == 1.25
-    assert np.array_equal(faded(-beyond, 1.0, 0.25), -seen)
+    assert np.array_equal(soft_clip(-beyond, 1.0, 0.25), -seen)
 
 
 def test_models_see_little_beyond_the_trained_box() -> None:
     inside = {p.name: p.denormalise(0.7) for p in SCHEMA.parameters}
     exact = [p.normalise(inside[p.name]) for p in SCHEMA.learned]
-    assert np.array_equal(SCHEMA.seen(SCHEMA.complete(inside)), exact)
-    enormous = SCHEMA.seen(SCHEMA.complete({**inside, "force": -1e308, "mass": 1e308}))
+    assert np.array_equal(SCHEMA.inputs(SCHEMA.complete(inside)), exact)
+    enormous = SCHEMA.inputs(SCHEMA.complete({**inside, "force": -1e308, "mass": 1e308}))
     assert enormous.tolist() == [1.15, exact[1], -1.15, exact[3]]
 
 
 def test_clocks_stop_after_the_trained_window() -> None:
     window = Window(0.0, 2.0, 20.0)
-    assert np.array_equal(window.seen(window.times), window.times)
-    assert 2.04 < window.seen(np.array([2.05]))[0] < 2.05
-    assert np.array_equal(window.seen(np.array([40.0, 1e300])), [2.1, 2.1])
+    assert np.array_equal(window.soft_clamped(window.times), window.times)
+    assert 2.04 < window.soft_clamped(np.array([2.05]))[0] < 2.05
+    assert np.array_equal(window.soft_clamped(np.array([40.0, 1e300])), [2.1, 2.1])
     continued = replace(window, reach=0.5)
-    assert np.array_equal(continued.seen(np.array([2.5, 3.0, 1e300])), [2.5, 3.0, 3.1])
+    assert np.array_equal(continued.soft_clamped(np.array([2.5, 3.0, 1e300])), [2.5, 3.0, 3.1])
 
 
 @pytest.mark.parametrize(

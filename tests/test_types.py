@@ -2,17 +2,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 
-def counting(frames: int = 6, rate: float = 10.0) -> Sequence:
+def counting(frames: int = 6, rate: float = 10.0) -> MotionSequence:
     """Four points whose coordinates are the number of the frame."""
     vertices = np.repeat(np.arange(float(frames)), 12).reshape(frames, 4, 3)
     faces = np.array([[0, 1, 2]])
-    return Sequence(np.arange(frames) / rate, vertices, faces, np.full(4, 0.25), {"mass": 0.5}, "s")
+    return MotionSequence(np.arange(frames) / rate, vertices, faces, np.full(4, 0.25), {"mass": 0.5}, "s")
 
 
-def shown(sequence: Sequence) -> list[float]:
+def shown(sequence: MotionSequence) -> list[float]:
     assert np.ptp(sequence.vertices, axis=(1, 2)).max() == 0.0
     return sequence.vertices[:, 0, 0].tolist()
 

@@ -1,8 +1,8 @@
 """Sequences in a folder, as the simulator writes them: an index `dataset.json`, one `.npz` a sequence.
 
 The index holds the schema, what is fixed, and for each sequence its SHA-256, split, parameters and status; arrays are
-`times (T,)`, `vertices (T, N, 3)` float32, `faces (F, 3)`, `weights (N,)`. Everything is written aside and renamed, so
-an interrupted run leaves valid files.
+`times (T,)`, `vertices (T, N, 3)` float32, `faces (F, 3)`, `weights (N,)`. Every file is written under a temporary
+name and renamed, so an interrupted run leaves valid files.
 """
 
 import hashlib
@@ -13,8 +13,8 @@ import numpy as np
 
 from odeform.dataset.index import Dataset, Entry, Reader, index_from_json, index_to_json
 from odeform.errors import InputError
-from odeform.files import write_aside
-from odeform.types import Sequence
+from odeform.io import atomic_write
+from odeform.types import MotionSequence
 
 __all__ = ["INDEX", "folder_reader", "open_folder", "save_sequence", "write_index"]
 
@@ -22,7 +22,7 @@ INDEX = "dataset.json"
 
 
 def folder_reader(root: Path) -> Reader:
-    def read(entry: Entry) -> Sequence:
+    def read(entry: Entry) -> MotionSequence:
         path = root / f"{entry.name}.npz"
         try:
             data = path.read_bytes()
@@ -31,7 +31,7 @@ def folder_reader(root: Path) -> Reader:
         if hashlib.sha256(data).hexdigest() != entry.sha256:
             raise InputError(f"{path}: checksum does not match {INDEX}; the file is damaged or was changed")
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return Sequence(
+            return MotionSequence(
                 arrays["times"],
                 arrays["vertices"],
                 arrays["faces"],
@@ -43,7 +43,7 @@ def folder_reader(root: Path) -> Reader:
     return read
 
 
-def save_sequence(root: Path, name: str, sequence: Sequence) -> str:
+def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
     """Store one sequence; returns its SHA-256."""
     buffer = io.BytesIO()
     np.savez(
@@ -54,12 +54,12 @@ def save_sequence(root: Path, name: str, sequence: Sequence) -> str:
         weights=sequence.weights,
     )
     data = buffer.getvalue()
-    write_aside(root / f"{name}.npz", data)
+    atomic_write(root / f"{name}.npz", data)
     return hashlib.sha256(data).hexdigest()
 
 
 def write_index(dataset: Dataset) -> None:
-    write_aside(dataset.root / INDEX, index_to_json(dataset))
+    atomic_write(dataset.root / INDEX, index_to_json(dataset))
 
 
 def open_folder(root: Path) -> Dataset:

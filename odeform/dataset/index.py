@@ -10,7 +10,7 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.schema import Schema
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 __all__ = ["Dataset", "Entry", "Reader", "assign_splits", "index_from_json", "index_to_json"]
 
@@ -32,7 +32,7 @@ class Entry:
 class Reader(Protocol):
     """Reads one sequence of a data set; checks its SHA-256."""
 
-    def __call__(self, entry: Entry) -> Sequence: ...
+    def __call__(self, entry: Entry) -> MotionSequence: ...
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Dataset:
             raise InputError(f"split: expected train, val, test or all, got {split!r}")
         return [e for e in self.entries if e.status == "ok" and split in ("all", e.split)]
 
-    def sequences(self, split: str) -> Iterator[Sequence]:
+    def sequences(self, split: str) -> Iterator[MotionSequence]:
         return (self.read(entry) for entry in self.select(split))
 
 

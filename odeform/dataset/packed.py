@@ -22,10 +22,10 @@ from safetensors.numpy import load, save
 
 from odeform.dataset.index import Dataset, Entry, Reader, index_from_json, index_to_json
 from odeform.errors import InputError
-from odeform.files import write_aside
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
+from odeform.io import atomic_write
 from odeform.progress import Progress
-from odeform.types import Arrays, Floats, Sequence
+from odeform.types import Arrays, Floats, MotionSequence
 
 __all__ = ["SUFFIX", "open_packed", "pack"]
 
@@ -73,7 +73,7 @@ def _expand(data: bytes) -> tuple[NDArray[np.int64], float]:
     return values.T, rate
 
 
-def _moving(sequence: Sequence, reference: Floats) -> tuple[Floats, Floats]:
+def _moving(sequence: MotionSequence, reference: Floats) -> tuple[Floats, Floats]:
     """Pose (T, 6) of the reference in each frame, and what remains, (T, 3 N) in its own axes."""
     even = np.full(len(reference), 1.0 / len(reference))
     rotation, shift = best_rigid(reference, sequence.vertices, even)
@@ -164,7 +164,7 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
         for name, data in ((INDEX, index), (COMMON, save(common)), *blobs.items()):
             # a fixed date: the same data give the same file
             file.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
-    write_aside(out, archive.getvalue())
+    atomic_write(out, archive.getvalue())
     return codec
 
 
@@ -226,7 +226,7 @@ def open_packed(path: Path) -> Dataset:
         if shapes != {**wanted, "weights": (count,)} or not 0.0 < quantum < 1.0:
             raise ValueError(f"arrays of shapes {shapes}, quantum {quantum}")
 
-        def read(entry: Entry) -> Sequence:
+        def read(entry: Entry) -> MotionSequence:
             data = member(entry.name)
             if hashlib.sha256(data).hexdigest() != entry.sha256:
                 raise InputError(f"{path}: checksum of {entry.name} does not match; the file is damaged")
@@ -235,7 +235,7 @@ def open_packed(path: Path) -> Dataset:
             except (lzma.LZMAError, struct.error, ValueError) as error:
                 raise InputError(f"{path}: {entry.name} cannot be decoded: {error}") from None
             parameters = dict(entry.parameters)
-            return Sequence(times, vertices, common["faces"], common["weights"], parameters, entry.name)
+            return MotionSequence(times, vertices, common["faces"], common["weights"], parameters, entry.name)
 
         return read
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from odeform.dataset.folder import INDEX, open_folder
 from odeform.dataset.index import Dataset
 from odeform.dataset.packed import SUFFIX, open_packed
-from odeform.files import bundled
+from odeform.io import bundled
 
 __all__ = ["bundled_datasets", "open_dataset"]
 

@@ -17,8 +17,8 @@ from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
 from odeform.predictor import Predictor, observations
 from odeform.schema import Schema, Window
-from odeform.solver.integrate import Quality
-from odeform.types import Floats, Frames, Perpoint, Points, Sequence
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Floats, Frames, MotionSequence, Perpoint, Points
 
 __all__ = ["Scores", "evaluate"]
 
@@ -46,7 +46,7 @@ class Scores:
         self._moved: list[Floats] = []
         self._residual = self._reference = 0.0
 
-    def add(self, predicted: Frames, truth: Sequence, counted: Mask, between: Mask) -> None:
+    def add(self, predicted: Frames, truth: MotionSequence, counted: Mask, between: Mask) -> None:
         """`counted` (T,) are the frames that scores average over, without frame 0, which is given; `between` those
         off the frames that the model was trained on."""
         error = 1e3 * (predicted.astype(float) - truth.vertices)
@@ -108,7 +108,7 @@ def _spans(
         raise InputError(f"window {window}: expected frames after frame 0, which is given")
     if begin > stop + 1e-9:
         raise InputError(f"window {window}: scene {schema.scene} has {round(stop * rate) + 1} frames")
-    if not predictor.beyond:
+    if not predictor.extrapolates:
         begin, end = max(begin, trained.start - clock), min(end, trained.stop - clock + 0.5 / rate)
         if end <= begin:
             raise InputError(f"window {window}: {predictor.model} knows {trained.start:g} to {trained.stop:g} s alone")
@@ -125,10 +125,10 @@ def _within(times: Floats, *spans: tuple[float, float]) -> Mask:
     return kept
 
 
-def _covered(predictor: Predictor, predicted: Frames, truth: Sequence) -> Floats:
+def _covered(predictor: Predictor, predicted: Frames, truth: MotionSequence) -> Floats:
     """(T,) 1 where the RMSE is within what nine in ten are expected to keep to, else 0; not a number where the model
     expects none."""
-    expected = predictor.expected_error(truth.parameters, truth.times)
+    expected = predictor.error_band(truth.parameters, truth.times)
     if expected is None:
         return np.full(len(predicted), np.nan)
     rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))
@@ -140,7 +140,7 @@ def evaluate(
     dataset: Dataset,
     split: str = "test",
     window: tuple[int, int] | None = None,
-    quality: str | Quality = "balanced",
+    quality: str | SolverSettings = "balanced",
     parts: Iterable[tuple[int, int]] = (),
 ) -> dict[str, Any]:
     """Scores of one model on a split.
@@ -154,7 +154,7 @@ def evaluate(
     if predictor.schema.scene != schema.scene:
         raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {schema.scene}")
     stop = schema.window.stop
-    clock = 0.0 if predictor.beyond or trained.start <= stop else trained.start
+    clock = 0.0 if predictor.extrapolates or trained.start <= stop else trained.start
     spans = _spans(predictor, schema, window, clock)
     begin, end = spans["whole"]
     spans |= {f"{part[0]}:{part[1]}": _spans(predictor, schema, part, clock)["whole"] for part in parts}
@@ -167,7 +167,7 @@ def evaluate(
         # what the data leave fixed may be a parameter of the model
         given = {**predictor.schema.known(dataset.fixed), **truth.parameters}
         motion = predictor.solve(
-            predictor.seated(truth.rest, given),
+            predictor.to_body_frame(truth.rest, given),
             given,
             quality,
             until=float(clock + truth.times[-1]),

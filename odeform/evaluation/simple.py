@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
 from odeform.evaluation.metrics import Scores
-from odeform.model.data import Thinning
-from odeform.simulation.ball import GRAVITY
-from odeform.types import Frames, Sequence
+from odeform.simulation.objects.ball import GRAVITY
+from odeform.types import Frames, MotionSequence
 
 __all__ = ["ballistic", "evaluate_simple", "hold_last", "spline_through"]
 
-Guess = Callable[[Sequence, int], Frames]
+Guess = Callable[[MotionSequence, int], Frames]
 """From a true sequence, the i-th of its split, to frames at its times, (T, N, 3) metres."""
 
 
@@ -30,7 +30,7 @@ def hold_last(known: int) -> Guess:
 def ballistic(known: int) -> Guess:
     """From the last of the first `known` frames on, its shape flies on under gravity with the centre's velocity."""
 
-    def fly(truth: Sequence, index: int) -> Frames:
+    def fly(truth: MotionSequence, index: int) -> Frames:
         step = float(truth.times[1] - truth.times[0])
         before, last = truth.vertices[known - 2 : known].astype(float)
         gravity = np.array([0.0, 0.0, -GRAVITY])
@@ -43,12 +43,12 @@ def ballistic(known: int) -> Guess:
     return fly
 
 
-def spline_through(thinning: Thinning) -> Guess:
+def spline_through(subsampling: FrameSubsampling) -> Guess:
     """The cubic spline through the frames that are kept."""
 
-    def join(truth: Sequence, index: int) -> Frames:
+    def join(truth: MotionSequence, index: int) -> Frames:
         count = len(truth.times)
-        return thinning.filled(truth.vertices[thinning.kept(count, index)], count, index)
+        return subsampling.filled(truth.vertices[subsampling.kept(count, index)], count, index)
 
     return join
 

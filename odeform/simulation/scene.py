@@ -8,7 +8,7 @@ from scipy.stats import qmc
 
 from odeform.errors import InputError
 from odeform.schema import Schema
-from odeform.types import Mesh, Sequence
+from odeform.types import Mesh, MotionSequence
 
 __all__ = ["Scene", "get_scene", "known_scenes"]
 
@@ -23,7 +23,7 @@ class Scene:
     """
 
     schema: Schema
-    simulate: Callable[..., Sequence]
+    simulate: Callable[..., MotionSequence]
     rest_mesh: Callable[[], Mesh]
     step: float
     """The simulator's time step in seconds that this scene calls its truth."""
@@ -47,7 +47,7 @@ class Scene:
 
 def known_scenes() -> dict[str, Scene]:
     """All that can be simulated, by name."""
-    from odeform.simulation import kick, mass_elastic
+    from odeform.simulation.scenes import kick, mass_elastic
 
     return {scene.schema.scene: scene for scene in (mass_elastic.SCENE, kick.SCENE)}
 

@@ -15,10 +15,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from odeform.errors import InputError
-from odeform.files import write_aside
+from odeform.io import atomic_write
 from odeform.schema import Parameter
 from odeform.simulation.scene import Scene, get_scene
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 __all__ = ["main", "study"]
 
@@ -29,29 +29,29 @@ CONTACT = 2e-3  # m; a vertex lower than this touches the floor
 LOW = 1e-2  # m; a lower rebound is a roll, and its change means nothing
 
 
-def _contacts(sequence: Sequence) -> list[slice]:
+def _contacts(sequence: MotionSequence) -> list[slice]:
     """Frames during which any vertex touches the floor, one slice a contact."""
     touching = sequence.vertices[..., 2].min(axis=1) < CONTACT
     edges = np.flatnonzero(np.diff(np.concatenate([[False], touching, [False]])))
     return [slice(begin, end) for begin, end in edges.reshape(-1, 2)]
 
 
-def _rebound(sequence: Sequence) -> float | None:
+def _rebound(sequence: MotionSequence) -> float | None:
     """Metres that the centre of mass rises above its rest position after the first landing; None without one."""
     height = np.einsum("n,tn->t", sequence.weights, sequence.vertices[..., 2].astype(float))
     landing = next((contact.start for contact in _contacts(sequence) if contact.start > 0), None)
     return None if landing is None else float(height[landing:].max() - min(height[0], height[-1]))
 
 
-def _rmse(a: Sequence, b: Sequence) -> float:
+def _rmse(a: MotionSequence, b: MotionSequence) -> float:
     return float(np.sqrt(np.mean((a.vertices.astype(float) - b.until(a.times[-1]).vertices) ** 2)))
 
 
-def _run(scene: Scene, parameters: dict[str, float], step: float) -> Sequence:
+def _run(scene: Scene, parameters: dict[str, float], step: float) -> MotionSequence:
     return scene.simulate(parameters, rate=RATE, step=step)
 
 
-def _condition(frames: slice, nudged: list[Sequence]) -> float:
+def _condition(frames: slice, nudged: list[MotionSequence]) -> float:
     """Condition number of the sensitivities to the normalised parameters over some frames, by central differences."""
     moved = [s.until(frames.stop / RATE).vertices[frames].astype(float).ravel() for s in nudged]
     return float(np.linalg.cond(np.stack([b - a for a, b in zip(moved[::2], moved[1::2], strict=True)], axis=1)))
@@ -77,7 +77,7 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
     hidden = [p for p in learned if p.name in HIDDEN]
     jobs += [(nudge(p, q, by), scene.step) for p in settings for q in hidden for by in (-NUDGE, NUDGE)]
     parallel: Any = Parallel(n_jobs=workers, verbose=5)
-    motions: list[Sequence] = parallel(delayed(_run)(scene, *job) for job in jobs)
+    motions: list[MotionSequence] = parallel(delayed(_run)(scene, *job) for job in jobs)
     coarse, fine = motions[:count], motions[count : 2 * count]
     width = 2 * len(hidden)
     nudged = [motions[at : at + width] for at in range(2 * count, len(motions), width)]
@@ -127,7 +127,7 @@ def main() -> None:
     except InputError as error:
         parser.error(str(error))
     if args.json:
-        write_aside(Path(args.json), text.encode())
+        atomic_write(Path(args.json), text.encode())
     else:
         print(text)
 

@@ -15,7 +15,7 @@ from odeform.solver.solution import Solution, Status
 from odeform.solver.stages import Field, Stages
 from odeform.solver.tableau import Tableau, get_method
 
-__all__ = ["Quality", "integrate"]
+__all__ = ["SolverSettings", "integrate"]
 
 MAX_STEPS = 20_000
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
@@ -25,7 +25,7 @@ steps into a landing were rejected where the last one did not count."""
 
 
 @dataclass(frozen=True)
-class Quality:
+class SolverSettings:
     """A way to integrate: a method with a fixed `step` in seconds, or with a `tolerance`, in a precision.
 
     The tolerance bounds the estimated error of a step: the root mean square over the entries of the state, whatever
@@ -49,7 +49,7 @@ class Quality:
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
 
     def to_json(self) -> dict[str, Any]:
-        """What differs from the defaults: `Quality(**q.to_json()) == q`."""
+        """What differs from the defaults: `SolverSettings(**q.to_json()) == q`."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
 
@@ -73,7 +73,9 @@ def _first_step(method: Tableau, field: Field, time: float, state: Any, slope: A
     return min(100.0 * h0, h1)
 
 
-def integrate(field: Field, start: Any, quality: Quality, until: float, begin: float | Solution = 0.0) -> Solution:
+def integrate(
+    field: Field, start: Any, quality: SolverSettings, until: float, begin: float | Solution = 0.0
+) -> Solution:
     """Integrate dz/dt = field(t, z) at least to `until` seconds.
 
     The precision is that of `start`, the state at time `begin`; given a Solution as `begin`, that one is continued in

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from odeform.tables.cells import Cell, Result
 from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, MINUTES, UNTIL
+from odeform.tables.runs import Cell, Result
 
 __all__ = ["page"]
 

@@ -6,7 +6,7 @@ Budgets are steps, so that a busy machine, or another one, makes the same models
 from collections.abc import Iterable
 from dataclasses import replace
 
-from odeform.tables.cells import Cell
+from odeform.tables.runs import Cell
 
 __all__ = ["AHEAD", "DROP", "FRAMES", "IMPACT", "INTERVALS", "MINUTES", "UNTIL", "plan"]
 

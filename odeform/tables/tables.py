@@ -7,15 +7,15 @@ from typing import Any
 
 from odeform.checkpoint import read_checkpoint, resolve_checkpoint
 from odeform.dataset.store import open_dataset
+from odeform.dataset.subsampling import FrameSubsampling
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
-from odeform.files import write_aside
-from odeform.inverse.table import identify_split
-from odeform.model.data import Thinning
+from odeform.identification.table import identify_split
+from odeform.io import atomic_write
 from odeform.predictor import load
-from odeform.tables.cells import KEPT, run_cells
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform.tables.runs import KEPT, run_cells
 
 __all__ = ["tables"]
 
@@ -36,7 +36,7 @@ def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = F
         "simple": _kept(folder / "simple.json", [UNTIL, AHEAD, INTERVALS, IMPACT], _simple),
         "identified": _kept(folder / "identified.json", [_sha256(scene) for scene in FRAMES], _identified),
     }
-    write_aside(out, page(found).encode())
+    atomic_write(out, page(found).encode())
 
 
 def _kept(file: Path, key: list[Any], make: Callable[[], Found]) -> Found:
@@ -45,7 +45,7 @@ def _kept(file: Path, key: list[Any], make: Callable[[], Found]) -> Found:
     known = json.loads(file.read_text()) if file.exists() else {}
     if known.get("key") != key:
         known = {"key": key, "found": make()}
-        write_aside(file, json.dumps(known, indent=1).encode())
+        atomic_write(file, json.dumps(known, indent=1).encode())
     return known["found"]
 
 
@@ -67,8 +67,8 @@ def _simple() -> Found:
         guesses[f"hold-last {until}:{until + AHEAD}"] = hold_last(until), window
         guesses[f"ballistic {until}:{until + AHEAD}"] = ballistic(until), window
     for k in INTERVALS:
-        guesses[f"spline {k}"] = spline_through(Thinning(every=k)), IMPACT
-        guesses[f"spline {k} staggered"] = spline_through(Thinning(every=k, stagger=True)), IMPACT
+        guesses[f"spline {k}"] = spline_through(FrameSubsampling(every=k)), IMPACT
+        guesses[f"spline {k} staggered"] = spline_through(FrameSubsampling(every=k, stagger=True)), IMPACT
     dataset = open_dataset(DROP)
     scores = {name: evaluate_simple(guess, dataset, "test", window) for name, (guess, window) in guesses.items()}
     return {name: {metric: one[metric] for metric in KEPT} for name, one in scores.items()}

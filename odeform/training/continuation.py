@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.model.continuation import ContinuedTrajectory, Dynamics, kernel
-from odeform.model.data import TrainingData
-from odeform.model.odeform import ODeform
-from odeform.model.reduced import POSE, small_motion
+from odeform.dataset.training_data import TrainingData
+from odeform.models.continuation import ContinuedTrajectory, Dynamics, kernel
+from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
 
@@ -60,7 +60,7 @@ def _spread(features: Floats, count: int) -> Floats:
     return features[chosen]
 
 
-def fit_dynamics(theta: Floats, reduced: Floats, arm: float, seed: int = 0) -> Dynamics:
+def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: int = 0) -> Dynamics:
     """From parameters (S, P) in [-1, 1] and motions (S, T, 6 + K) of at least three frames."""
     before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
     told = np.repeat(theta, reduced.shape[1] - 2, axis=0)
@@ -68,7 +68,7 @@ def fit_dynamics(theta: Floats, reduced: Floats, arm: float, seed: int = 0) -> D
     change = now - before
     speed, bent, bending = (_largest(part) for part in (change[:, :3], now[:, POSE:], change[:, POSE:]))
     modes = reduced.shape[2] - POSE
-    sizes = [(1 / depth, 2), (1 / speed, 3), (arm / speed, 3), (1 / bent, modes), (MOTION / bending, modes)]
+    sizes = [(1 / depth, 2), (1 / speed, 3), (gyration_radius / speed, 3), (1 / bent, modes), (MOTION / bending, modes)]
     sizes.append((PARAMETERS, theta.shape[1]))
     gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
     empty = np.zeros((0, len(gains))), np.zeros((0, reduced.shape[2]))
@@ -90,16 +90,18 @@ def foretold(model: ODeform, data: TrainingData) -> Floats | None:
     known = round(len(data.times) / (1.0 + REACH))
     if known < 4 or not data.known["train"].all():
         return None
-    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :known], data.space.arm)
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :known], data.space.gyration_radius)
     window = replace(data.schema.window, stop=float(data.times[known - 1]))
-    placed, later = model.place(model.rest, 0.0), data.times[known:]
+    evaluated, later = model.evaluate_basis(model.rest, 0.0), data.times[known:]
     continued, stopped = [], []
     for theta in data.theta["val"]:
-        motion = model.integrate(theta, placed, model.qualities["reference"], window.stop)
+        motion = model.integrate(theta, evaluated, model.qualities["reference"], window.stop)
         continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
-    truth, arm = data.reduced["val"][:, known:], data.space.arm
-    moved, held = (small_motion(np.stack(guess) - truth, arm) / np.sqrt(3.0) for guess in (continued, stopped))
+    truth, gyration_radius = data.reduced["val"][:, known:], data.space.gyration_radius
+    moved, held = (
+        small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (continued, stopped)
+    )
     return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
 
 
@@ -109,7 +111,7 @@ def with_continuation(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
     errors = foretold(ODeform(checkpoint), data)
     if errors is None:
         return checkpoint
-    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.arm)
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.gyration_radius)
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     arrays = {**checkpoint.arrays, **dynamics.arrays(), "val.later_mm": errors.astype(np.float32)}
     return replace(checkpoint, schema=schema, arrays=arrays)

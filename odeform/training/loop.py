@@ -14,11 +14,11 @@ from pathlib import Path
 import torch
 from threadpoolctl import threadpool_limits
 
-from odeform.model.data import TrainingData
-from odeform.model.network import ODeformNet
+from odeform.dataset.training_data import TrainingData
+from odeform.models.odeform.network import ODeformNet
 from odeform.training.config import TrainConfig
+from odeform.training.random_features import affordable, widen
 from odeform.training.trainer import Trainer
-from odeform.training.widening import affordable, widen
 from odeform.types import Arrays
 
 __all__ = ["network_weights", "small_batches", "train_network"]

@@ -3,7 +3,7 @@
 import torch
 from torch import nn
 
-from odeform.model.reduced import POSE
+from odeform.motion.reduced_space import POSE
 
 __all__ = ["Metric", "balanced"]
 
@@ -17,10 +17,10 @@ class Metric(nn.Module):
 
     scale: torch.Tensor
 
-    def __init__(self, gains: torch.Tensor, arm: float) -> None:
+    def __init__(self, gains: torch.Tensor, gyration_radius: float) -> None:
         super().__init__()
         scale = 1e3 * gains.clone()
-        scale[3:POSE] *= arm * (2.0 / 3.0) ** 0.5
+        scale[3:POSE] *= gyration_radius * (2.0 / 3.0) ** 0.5
         self.register_buffer("scale", scale)
 
     def forward(

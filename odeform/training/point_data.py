@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
-from odeform.model.data import Thinning
-from odeform.model.point_motion import MeanMotion, PointFrame
-from odeform.model.reduced import to_canonical
+from odeform.motion.point_motion import MeanMotion, PointFrame
+from odeform.motion.reduced_space import to_canonical
 from odeform.schema import Schema, Window
 from odeform.types import Bools, Floats, Vector
 
@@ -35,14 +35,14 @@ class PointData:
     """Frames from one given frame to the next; 1 for models that are given none."""
 
 
-def prepare_points(dataset: Dataset, thinning: Thinning | None = None, given: int = 1) -> PointData:
+def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None, given: int = 1) -> PointData:
     """Displacements in canonical axes of all training and validation sequences; between frames that are known by a
     cubic spline.
 
     For models that are `given` every k-th frame, the window ends with a given frame, and has their rate.
     """
-    thinning = thinning or Thinning()
-    count = thinning.count(dataset.schema) if given == 1 else replace(thinning, every=given).count(dataset.schema)
+    subsampling = subsampling or FrameSubsampling()
+    count = subsampling.count(dataset.schema) if given == 1 else replace(subsampling, every=given).count(dataset.schema)
     first = next(dataset.sequences("train"), None)
     if first is None:
         raise InputError(f"{dataset.root}: no sequence in split train")
@@ -50,8 +50,8 @@ def prepare_points(dataset: Dataset, thinning: Thinning | None = None, given: in
     rest = to_canonical(first.vertices[0], anchor, dataset.schema.azimuth(first.parameters))
     theta, moved, known = {}, {}, {}
     for split in ("train", "val"):
-        theta[split], moved[split] = _read(dataset, split, thinning, count, anchor, len(rest))
-        known[split] = thinning.known(count, len(theta[split]))
+        theta[split], moved[split] = _read(dataset, split, subsampling, count, anchor, len(rest))
+        known[split] = subsampling.known(count, len(theta[split]))
     times = np.arange(count) / dataset.schema.window.rate
     largest = max(float(np.linalg.norm(motion, axis=-1).max()) for motion in moved["train"])
     shifts = np.mean([np.einsum("n,tni->ti", first.weights, motion) for motion in moved["train"]], axis=0)
@@ -69,7 +69,7 @@ def prepare_points(dataset: Dataset, thinning: Thinning | None = None, given: in
 
 
 def _read(
-    dataset: Dataset, split: str, thinning: Thinning, count: int, anchor: Vector, points: int
+    dataset: Dataset, split: str, subsampling: FrameSubsampling, count: int, anchor: Vector, points: int
 ) -> tuple[Floats, Floats]:
     rate = dataset.schema.window.rate
     theta, moved = [], []
@@ -78,8 +78,8 @@ def _read(
         if sequence.vertices.shape[1] != points:
             raise InputError(f"{sequence.name}: expected {points} vertices as in the others, got another mesh")
         turned = to_canonical(sequence.vertices, anchor, dataset.schema.azimuth(sequence.parameters))
-        shown = (turned - turned[0])[thinning.kept(count, index)]
-        moved.append(thinning.filled(shown, count, index).astype(np.float32))
+        shown = (turned - turned[0])[subsampling.kept(count, index)]
+        moved.append(subsampling.filled(shown, count, index).astype(np.float32))
         theta.append(dataset.schema.vector(sequence.parameters))
     if not theta:
         raise InputError(f"{dataset.root}: no sequence in split {split}")
@@ -94,6 +94,6 @@ def _frame(rest: Floats, weights: Floats, anchor: Vector, moved: Floats, largest
         centre = np.einsum("n,tni->ti", weights, motion)[:, None]
         within += ((motion - centre) ** 2).mean() / len(moved)
     x, y, z = (float(value) for value in anchor)
-    arm = float(np.sqrt((weights[:, None] * rest**2).sum()))
+    gyration_radius = float(np.sqrt((weights[:, None] * rest**2).sum()))
     reach = float(np.linalg.norm(rest, axis=1).max())
-    return PointFrame((x, y, z), arm, reach, largest, float(np.sqrt(squares)), float(np.sqrt(within)))
+    return PointFrame((x, y, z), gyration_radius, reach, largest, float(np.sqrt(squares)), float(np.sqrt(within)))

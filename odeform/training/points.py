@@ -15,12 +15,13 @@ import numpy as np
 import torch
 from torch.nn.functional import linear, silu
 
-from odeform.baselines.arithmetic import Net, layer_shapes
-from odeform.baselines.networks import PointNet, Rows, Trial, sum_of
-from odeform.baselines.occupancy_flow import told
-from odeform.baselines.points import point_checkpoint
 from odeform.checkpoint import Checkpoint
-from odeform.model.data import UNKNOWN, shown_frames
+from odeform.dataset.subsampling import observed_frames
+from odeform.dataset.training_data import UNKNOWN
+from odeform.models.baselines.arithmetic import Net, layer_shapes
+from odeform.models.baselines.occupancy_flow import told
+from odeform.models.baselines.point_model import point_checkpoint
+from odeform.models.baselines.point_network import PointNet, Rows, Trial, sum_of
 from odeform.schema import REACH
 from odeform.training.loop import small_batches
 from odeform.training.point_data import PointData
@@ -82,7 +83,7 @@ class _Split:
         self.theta = torch.as_tensor(data.theta[split]).float().to(device)
         self.moved = torch.as_tensor(data.moved[split]).to(device)
         self.known = torch.where(torch.as_tensor(data.known[split]), 1.0, UNKNOWN).to(device)
-        frames, shows = shown_frames(data.known[split])
+        frames, shows = observed_frames(data.known[split])
         self.shown, self.counts = torch.as_tensor(frames), torch.as_tensor(shows.sum(axis=1))
         self.x = torch.as_tensor(data.x).to(device)
         weights = torch.as_tensor(data.weights).float().to(device)

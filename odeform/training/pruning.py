@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.model.data import TrainingData
-from odeform.model.odeform import PREFIX, ODeform
-from odeform.model.reduced import POSE
-from odeform.solver.integrate import Quality
+from odeform.dataset.training_data import TrainingData
+from odeform.models.odeform.model import PREFIX, ODeform
+from odeform.motion.reduced_space import POSE
+from odeform.solver.integrate import SolverSettings
 
 __all__ = ["FINE", "LARGE", "needed_modes", "without_modes"]
 
-FINE = Quality("dopri5", tolerance=1e-6, dtype="float64")
+FINE = SolverSettings("dopri5", tolerance=1e-6, dtype="float64")
 WORSE = 1.01
 """As many times the error of the deformation may be without the modes that are left out, where there is one to see."""
 LARGE = 0.1
@@ -24,8 +24,8 @@ LARGE = 0.1
 
 def needed_modes(model: ODeform, data: TrainingData) -> int:
     """As few of the first modes as miss the large deformations of the validation motions by hardly more than all do."""
-    placed, times = model.place(model.rest, 0.0), data.times
-    motions = [model.integrate(theta, placed, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
+    evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
+    motions = [model.integrate(theta, evaluated, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
     truth = data.reduced["val"][..., POSE:]
     size = np.linalg.norm(truth, axis=2)
     weights = data.known["val"] * (size > LARGE * size.max(axis=1, keepdims=True))

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.model.data import TrainingData
-from odeform.model.odeform import ODeform
-from odeform.model.reduced import POSE, motion_rmse
-from odeform.solver.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
-from odeform.solver.integrate import Quality
+from odeform.dataset.training_data import TrainingData
+from odeform.models.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
+from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_space import POSE, motion_rmse
+from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats
 
 __all__ = ["choose_qualities", "measure_frontier", "with_qualities"]
@@ -21,11 +21,11 @@ SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
 adds half a per cent to the total, three tenths four to the deformation."""
 
 
-def _candidates(step: float) -> list[Quality]:
+def _candidates(step: float) -> list[SolverSettings]:
     tolerances = [float(f"{digit}e-{power}") for power in range(2, 8) for digit in (6, 4, 3, 2, 1)]
-    adaptive = [Quality(method, tolerance=t) for method in ("bosh3", "dopri5") for t in tolerances]
-    fixed = [Quality("midpoint", step=step * factor) for factor in (2.0, 1.0, 0.5)]
-    fixed += [Quality("rk4", step=step * factor) for factor in (4.0, 2.0, 1.0, 0.5, 0.25)]
+    adaptive = [SolverSettings(method, tolerance=t) for method in ("bosh3", "dopri5") for t in tolerances]
+    fixed = [SolverSettings("midpoint", step=step * factor) for factor in (2.0, 1.0, 0.5)]
+    fixed += [SolverSettings("rk4", step=step * factor) for factor in (4.0, 2.0, 1.0, 0.5, 0.25)]
     return [*adaptive, *fixed]
 
 
@@ -36,12 +36,12 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
     the data, of all and of the deformation alone; both are root mean squares over the body's points and coordinates,
     and over time.
     """
-    placed = model.place(model.rest, 0.0)
+    evaluated = model.evaluate_basis(model.rest, 0.0)
 
-    def motions(quality: Quality) -> tuple[Floats, float]:
+    def motions(quality: SolverSettings) -> tuple[Floats, float]:
         """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
         stop = float(data.times[-1])
-        solved = [model.integrate(theta, placed, quality, stop) for theta in data.theta["val"]]
+        solved = [model.integrate(theta, evaluated, quality, stop) for theta in data.theta["val"]]
         reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
@@ -51,7 +51,7 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
     def errors_mm(motion: Floats, truth: Floats) -> tuple[float, float]:
         motion, truth = motion[frames], truth[frames]
         stiff = np.concatenate([truth[..., :POSE], motion[..., POSE:]], axis=-1)
-        of_all, of_deformation = (motion_rmse(one, truth, data.space.arm) for one in (motion, stiff))
+        of_all, of_deformation = (motion_rmse(one, truth, data.space.gyration_radius) for one in (motion, stiff))
         return 1e3 * of_all, 1e3 * of_deformation
 
     truth, _ = motions(EXACT)

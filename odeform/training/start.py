@@ -4,10 +4,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from odeform.model.config import ModelConfig
-from odeform.model.data import TrainingData
-from odeform.model.network import ODeformNet
-from odeform.model.reduced import POSE
+from odeform.dataset.training_data import TrainingData
+from odeform.models.odeform.config import ModelConfig
+from odeform.models.odeform.network import ODeformNet
+from odeform.motion.reduced_space import POSE
 
 __all__ = ["build_network", "training_shape"]
 
@@ -26,7 +26,7 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
         [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
     )
     # what does not move, as the turn of a ball that falls straight, is not blown up to size one
-    floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.arm, 1.0], [3, 3, len(gains) - POSE])
+    floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.gyration_radius, 1.0], [3, 3, len(gains) - POSE])
     floor[POSE:] = 1e-9
     net.gains.copy_(torch.as_tensor(np.maximum(gains, floor)))
     # fields of order one should cross the latent space in a few frames, not in a second
@@ -51,4 +51,4 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
 
 def training_shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
     """Points (N, 3) in units of the body's size, and their weights (N,)."""
-    return torch.as_tensor(data.rest / data.space.arm).float(), torch.as_tensor(data.weights).float()
+    return torch.as_tensor(data.rest / data.space.gyration_radius).float(), torch.as_tensor(data.weights).float()

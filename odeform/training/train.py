@@ -10,20 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from odeform.baselines.direct import Direct
-from odeform.baselines.nearest import fit_nearest
-from odeform.baselines.node import Node
-from odeform.baselines.occupancy_flow import OccupancyFlow
-from odeform.baselines.odeform_per_point import OdeformPerPoint
-from odeform.baselines.pod_rbf import fit_pod_rbf
-from odeform.baselines.rnn import Rnn
 from odeform.checkpoint import Checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
+from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.residuals import validation_residuals
-from odeform.model.data import Thinning, TrainingData, prepare
-from odeform.model.odeform import PREFIX
+from odeform.models.baselines.direct import Direct
+from odeform.models.baselines.nearest import fit_nearest
+from odeform.models.baselines.node import Node
+from odeform.models.baselines.occupancy_flow import OccupancyFlow
+from odeform.models.baselines.odeform_per_point import OdeformPerPoint
+from odeform.models.baselines.pod_rbf import fit_pod_rbf
+from odeform.models.baselines.rnn import Rnn
+from odeform.models.odeform.model import PREFIX
 from odeform.predictor import load
 from odeform.simulation.scene import known_scenes
 from odeform.training.continuation import with_continuation
@@ -69,7 +70,7 @@ def _learn_reduced(
     dataset: Dataset, request: TrainRequest, report: Callable[[str], None], body: Arrays, part: Path
 ) -> Checkpoint:
     """Models of pose and deformation."""
-    data = prepare(dataset, None, Thinning(request.window, request.every, request.stagger))
+    data = prepare(dataset, None, FrameSubsampling(request.window, request.every, request.stagger))
     modes = data.space.basis.modes
     report(
         f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
@@ -115,7 +116,7 @@ def _learn_points(dataset: Dataset, request: TrainRequest, report: Callable[[str
     if between and request.every < 2:
         raise InputError(f"{request.model}: moves between given frames, expected --every of at least 2")
     every, given = (1, request.every) if between else (request.every, 1)
-    data = prepare_points(dataset, Thinning(request.window, every, request.stagger and not between), given)
+    data = prepare_points(dataset, FrameSubsampling(request.window, every, request.stagger and not between), given)
     report(f"{request.model} on {len(data.theta['train'])} sequences of {data.moved['train'].shape[1]} frames")
     budget = Budget(60.0 * request.minutes, request.steps)
     checkpoint = fit_points(request.model, POINTS[request.model].network, data, budget, request.seed, report)

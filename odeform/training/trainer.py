@@ -12,11 +12,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import nn
 
+from odeform.dataset.subsampling import observed_frames
+from odeform.dataset.training_data import UNKNOWN, TrainingData
 from odeform.errors import InputError
-from odeform.files import safetensors_metadata, write_aside
-from odeform.model.data import UNKNOWN, TrainingData, shown_frames
-from odeform.model.network import ODeformNet
-from odeform.model.reduced import POSE
+from odeform.io import atomic_write, safetensors_metadata
+from odeform.models.odeform.network import ODeformNet
+from odeform.motion.reduced_space import POSE
 from odeform.training.config import FREE, TrainConfig
 from odeform.training.losses import Metric, balanced
 from odeform.training.readout import NormalEquations
@@ -41,7 +42,7 @@ def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
 class Trainer:
     def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device) -> None:
         self.net, self.config, self.device = net.to(device), config, device
-        self.metric = Metric(net.gains, data.space.arm)
+        self.metric = Metric(net.gains, data.space.gyration_radius)
         gains = net.gains.cpu().double().numpy()
         # frames first, as roll-outs have them
         self.truth = {
@@ -52,7 +53,9 @@ class Trainer:
         self.known = {"train": torch.where(train, 1.0, UNKNOWN), "val": val.float()}
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.times = torch.as_tensor(data.times).float().to(device)
-        self.shown, self.counted = (torch.as_tensor(v.T.copy()).to(device) for v in shown_frames(data.known["train"]))
+        self.shown, self.counted = (
+            torch.as_tensor(v.T.copy()).to(device) for v in observed_frames(data.known["train"])
+        )
         # of whole motions every other frame tells as much, and a solve costs as much as the roll-out; where fewer are
         # known all are solved for, and a batch has more motions
         whole, few = len(self.times), len(self.shown)
@@ -172,7 +175,7 @@ class Trainer:
         tensors["generator"] = self.generator.get_state()
         meta = {**self._fingerprint(), "done": self.done, "elapsed": self.elapsed, "optimiser": optimiser}
         tensors = {name: value.contiguous() for name, value in tensors.items()}
-        write_aside(path, save(tensors, {"training": json.dumps(meta)}))
+        atomic_write(path, save(tensors, {"training": json.dumps(meta)}))
 
     def restore(self, path: Path) -> None:
         try:

@@ -8,8 +8,8 @@ import viser
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
-from odeform_viz.gizmos import PlaceGizmo, Vantage
-from odeform_viz.panels.by_hand import HANDS, in_turn, on_hand
+from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
+from odeform_viz.rendering.gizmos import PlaceGizmo, Vantage
 
 __all__ = ["AlignmentPanel"]
 
@@ -42,10 +42,10 @@ class AlignmentPanel:
                 "arrows and rings", False, hint="drag the shape at rest; it follows on release"
             )
             back = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
-        on_hand(self._up, self._upright)
-        on_hand(self._size, self._scale)
-        on_hand(self._drag, self._toggled)
-        back.on_click(in_turn(lambda: self._turn(None)))
+        on_user_change(self._up, self._upright)
+        on_user_change(self._size, self._scale)
+        on_user_change(self._drag, self._toggled)
+        back.on_click(serialized(lambda: self._turn(None)))
 
     def show(self, fit: Fit | None, guess: float) -> None:
         """How a shape lies, None for the body that was trained; and the factor that was guessed."""
@@ -98,6 +98,6 @@ class AlignmentPanel:
         self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.place)
 
     def _dragged(self, motion: Similarity) -> None:
-        with HANDS:
+        with LOCK:
             if self._fit is not None:
                 self._put(motion @ self._fit.place)

@@ -149,7 +149,7 @@ class ComparePanel:
                         box.on_update(self._ticked(key))
                         self._boxes[key], self._known[key] = box, column.shown
                     elif self._known[key] != column.shown:
-                        # only then: a hand may just have ticked it, and its wish is yet to be read
+                        # only then: a hand may just have ticked it, and its request is yet to be read
                         self._boxes[key].value = self._known[key] = column.shown
             self._clear.visible = self._removable()
 
@@ -158,7 +158,7 @@ class ComparePanel:
 
     def _ticked(self, key: int) -> Callable[[viser.GuiEvent], Coroutine[None, None, None]]:
         async def show(event: viser.GuiEvent) -> None:
-            # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
+            # a coroutine reads the request at once where the message came in, before `refresh` says what is still shown
             if event.client_id is not None:
                 self._known[key] = bool(event.target.value)
                 self._columns.show(key, self._known[key])

@@ -7,8 +7,8 @@ import viser
 
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit, together
-from odeform_viz.gizmos import RegionGizmo, Vantage, reach_of
-from odeform_viz.panels.by_hand import HANDS, in_turn, on_hand
+from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
+from odeform_viz.rendering.gizmos import RegionGizmo, Vantage, reach_of
 
 __all__ = ["PartPanel", "region_like"]
 
@@ -40,11 +40,11 @@ class PartPanel:
             self._said = gui.add_markdown("")
             self._go = gui.add_button("Use this part")
             self._change = gui.add_button("Change the region", color="gray", hint="shows it over the whole shape")
-        on_hand(self._kind, lambda: self._choose(self._kind.value))
-        on_hand(self._radius, self._resize)
-        on_hand(self._edges, self._resize)
-        self._go.on_click(in_turn(self._take))
-        self._change.on_click(in_turn(lambda: self._choose(self._kind.value)))
+        on_user_change(self._kind, lambda: self._choose(self._kind.value))
+        on_user_change(self._radius, self._resize)
+        on_user_change(self._edges, self._resize)
+        self._go.on_click(serialized(self._take))
+        self._change.on_click(serialized(lambda: self._choose(self._kind.value)))
         self._choosing(False)
 
     @property
@@ -107,7 +107,7 @@ class PartPanel:
         return None if region is None or self._fit is None else region.moved(self._fit.place.inverse)
 
     def _count(self) -> None:
-        with HANDS:  # the last to get in reads the newest place
+        with LOCK:  # the last to get in reads the newest place
             region = self._chosen()
             if region is not None and self._fit is not None:
                 inside = int(region.inside(self._fit.source.points).sum())

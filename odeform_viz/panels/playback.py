@@ -7,7 +7,7 @@ import viser
 
 from odeform.errors import InputError
 from odeform.schema import Window
-from odeform_viz.clock import Clock
+from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import REACH
 
 __all__ = ["PlaybackPanel"]

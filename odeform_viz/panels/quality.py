@@ -6,8 +6,8 @@ from collections.abc import Callable
 import viser
 
 from odeform.errors import InputError
+from odeform.models.frontier import cheapest_within_error, finest_within_budget
 from odeform.predictor import Predictor
-from odeform.solver.frontier import cheapest_within_error, finest_within_budget
 
 __all__ = ["QualityPanel", "quality_names"]
 
@@ -48,7 +48,7 @@ class QualityPanel:
             self._pace = min(s.wall_ms / s.evaluations for s in solved)
         return self._pace
 
-    def wish(self) -> str:
+    def request(self) -> str:
         """A name, or a setting of the frontier as JSON. `InputError` for what no hand could choose."""
         choice = self._choice.value
         if choice not in self._names:
@@ -65,11 +65,11 @@ class QualityPanel:
             point = cheapest_within_error(frontier, control.value)
         return json.dumps(point.quality.to_json())
 
-    def set(self, wish: str) -> None:
-        """Choose what was once wished, as far as this predictor knows it."""
-        if wish in self._predictor.qualities:
-            self._choice.value = wish
+    def set(self, request: str) -> None:
+        """Choose what was once requested, as far as this predictor knows it."""
+        if request in self._predictor.qualities:
+            self._choice.value = request
         for point in self._predictor.frontier:
-            if json.dumps(point.quality.to_json()) == wish:
+            if json.dumps(point.quality.to_json()) == request:
                 self._choice.value, self._bound.value = WITHIN_MM, point.solver_error_mm
                 self._changed()

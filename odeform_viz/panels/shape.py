@@ -9,16 +9,16 @@ import numpy as np
 import viser
 
 from odeform.errors import InputError
-from odeform.geometry.bundled import bundled_shapes
+from odeform.formats.bundled import bundled_shapes
 from odeform.geometry.region import Region
 from odeform.geometry.shape import Fit, fit_to
 from odeform.geometry.similarity import Similarity
 from odeform.types import Mesh, Rotations
 from odeform_viz.columns import Columns
+from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.panels.alignment import AlignmentPanel
-from odeform_viz.panels.by_hand import HANDS, in_turn
+from odeform_viz.panels.callbacks import LOCK, serialized
 from odeform_viz.panels.part import PartPanel
-from odeform_viz.shaping import describe_fit, shape_from
 
 __all__ = ["ShapePanel"]
 
@@ -57,12 +57,12 @@ class ShapePanel:
             self._part = PartPanel(server, self._lay_out, self._use, changed)
             self._alignment = AlignmentPanel(server, hold, self._turn, self._put, changed)
             self._back = gui.add_button("Back to the trained body", color="gray", visible=False)
-            self._back.on_click(in_turn(self._return))
+            self._back.on_click(serialized(self._return))
         self._show()
 
     def _guarded(self, action: Callable[[], None]) -> None:
         try:
-            with HANDS:
+            with LOCK:
                 action()
         except (InputError, OSError) as error:
             self._say(str(error))
@@ -87,7 +87,7 @@ class ShapePanel:
 
     def set(self, fit: Fit | None) -> None:
         """Another shape, or the same in another part or place; None for the body that was trained."""
-        with HANDS:
+        with LOCK:
             if fit is not None:
                 self._name, self._turned = fit.origin, fit.place.rotation
                 self._guess = fit_to(fit.source, self._body, fit.region, fit.place.rotation).place.factor

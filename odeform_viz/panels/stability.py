@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import viser
 
-from odeform_viz.jobs import Job, map_here
+from odeform_viz.runtime.jobs import Job, map_here
 
 __all__ = ["StabilityPanel"]
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import viser
 
-from odeform.model.predicted import PredictedMotion
-from odeform_viz.heat import BANDS
+from odeform.motion.base import Motion
+from odeform_viz.rendering.error_colors import BANDS
 from odeform_viz.session import ColumnFrame, Frame
 
 __all__ = ["MomentPanel", "StatusPanel", "describe", "moment_in_words"]
@@ -27,7 +27,7 @@ def _place_in_time(frame: Frame) -> str:
     models = [shown for shown in frame.columns if shown.column.predictor]
     if not models:
         return "the truth alone" if frame.columns else "nothing shown"
-    motion, time = models[0].motion, frame.wish.time
+    motion, time = models[0].motion, frame.request.time
     beyond = list(dict.fromkeys(name for shown in models for name in shown.motion.outside))
     if motion.extrapolates(time):
         beyond.insert(0, "time")
@@ -58,7 +58,7 @@ def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
     if shown.error is not None:
         e = shown.error
         lines.append(f"now off the truth by {e.rmse_mm:.2f} mm RMSE, {e.mae_mm:.2f} MAE, {e.worst_mm:.2f} at worst")
-    expected = column.predictor.expected_error(shown.motion.parameters, np.array([time]))
+    expected = column.predictor.error_band(shown.motion.parameters, np.array([time]))
     if expected is not None:
         half, most = expected[0]
         beyond = shown.motion.extrapolates(time) or shown.motion.outside
@@ -66,7 +66,7 @@ def describe(shown: ColumnFrame, time: float, settled: bool = True) -> str:
     score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
     if score is not None:
         lines.append(f"test error of the checkpoint {score:.2f} mm RMSE")
-    if stats.status != "ok" and isinstance(shown.motion, PredictedMotion):
+    if stats.status != "ok" and isinstance(shown.motion, Motion):
         last = shown.motion.last_good
         later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
         lines.append(f"⚠ **{stats.status}**{later}")
@@ -84,7 +84,7 @@ def scale_html(top: float) -> str:
 
 
 class MomentPanel:
-    """Always in sight: where the moment lies, why a wish cannot be met, the colours' scale. Sent only on change."""
+    """Always in sight: where the moment lies, why a request cannot be met, the colours' scale. Sent only on change."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._moment = server.gui.add_markdown("")
@@ -112,7 +112,7 @@ class StatusPanel:
             self._details = server.gui.add_markdown("")
 
     def show(self, frame: Frame, settled: bool) -> None:
-        _say(self._details, "\n\n".join(describe(shown, frame.wish.time, settled) for shown in frame.columns))
+        _say(self._details, "\n\n".join(describe(shown, frame.request.time, settled) for shown in frame.columns))
 
 
 def _say(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:

@@ -8,12 +8,12 @@ import viser
 
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
-from odeform.model.recorded import RecordedMotion
+from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Schema
 from odeform.simulation.scene import known_scenes
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 from odeform_viz.columns import Column, Columns
-from odeform_viz.jobs import Job, simulate_here, simulator_installed
+from odeform_viz.runtime.jobs import Job, simulate_here, simulator_installed
 
 __all__ = ["TruthPanel", "entry_label", "other_physics"]
 
@@ -92,7 +92,7 @@ class TruthPanel:
             self._note = gui.add_markdown(note, visible=bool(note))
         self.refresh()
 
-    def open(self, sequence: Sequence, origin: str = "") -> None:
+    def open(self, sequence: MotionSequence, origin: str = "") -> None:
         """Show a sequence as truth, and move the sliders to its parameters."""
         motion = RecordedMotion(self._schema, sequence)
         self._columns.add(Column("truth", motion, motion.geometry, origin=origin))
@@ -103,7 +103,7 @@ class TruthPanel:
         return f"{self._schema.scene}/{entry.name}"
 
     async def _opened(self, event: viser.GuiEvent) -> None:
-        # a coroutine reads the wish at once where the message came in, before `refresh` says what is still shown
+        # a coroutine reads the request at once where the message came in, before `refresh` says what is still shown
         if event.client_id is not None:
             chosen = self._browser.value
             async with self._opening:
@@ -162,7 +162,7 @@ class TruthPanel:
             self._job = Job(simulate_here, arguments, self._simulated, self._failed, self._progress)
             self._job.start()
 
-    def _simulated(self, sequence: Sequence) -> None:
+    def _simulated(self, sequence: MotionSequence) -> None:
         self._working(False)
         try:
             self.open(sequence)

@@ -12,13 +12,13 @@ from odeform.dataset.folder import folder_reader, open_folder, save_sequence, wr
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.simulation.scene import get_scene
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 
-def sequence(seed: int = 0) -> Sequence:
+def sequence(seed: int = 0) -> MotionSequence:
     vertices = np.random.default_rng(seed).normal(size=(5, 4, 3)).astype(np.float32)
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
-    return Sequence(np.arange(5) / 10.0, vertices, faces, np.full(4, 0.25))
+    return MotionSequence(np.arange(5) / 10.0, vertices, faces, np.full(4, 0.25))
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import trimesh
 from authors import TETRAHEDRON, write_sequence
 
 from odeform.cli import main
-from odeform.dataset.importing import import_dataset
+from odeform.dataset.importers.importing import import_dataset
+from odeform.dataset.importers.naming import in_order
 from odeform.dataset.index import Dataset
-from odeform.dataset.naming import in_order
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 

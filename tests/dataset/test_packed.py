@@ -14,13 +14,13 @@ from odeform.dataset.packed import _expand, _squeeze, open_packed, pack
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.simulation.scene import get_scene
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 TOLERANCE = 2e-5  # m
 FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
 
 
-def tumbling(seed: int, frames: int = 31, rate: float = 120.0) -> Sequence:
+def tumbling(seed: int, frames: int = 31, rate: float = 120.0) -> MotionSequence:
     """A cloud of twelve points that flies, makes turns and wobbles in three modes."""
     rng, shape = np.random.default_rng(seed), np.random.default_rng(0)
     times = np.arange(frames) / rate
@@ -28,17 +28,17 @@ def tumbling(seed: int, frames: int = 31, rate: float = 120.0) -> Sequence:
     local = rest + np.einsum("kt,kni->tni", 0.01 * np.sin(np.outer(rng.uniform(5.0, 30.0, 3), times)), modes)
     turned = local @ rotation_from_vector(times[:, None] * rng.normal(size=3) * 20.0).swapaxes(1, 2)
     vertices = turned + times[:, None, None] * rng.normal(size=3)
-    return Sequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
+    return MotionSequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
 
 
-def holding(*sequences: Sequence) -> Dataset:
+def holding(*sequences: MotionSequence) -> Dataset:
     """A data set in memory: s0, s1, ..."""
     held = {f"s{k}": replace(sequence, name=f"s{k}") for k, sequence in enumerate(sequences)}
     entries = tuple(Entry(name, "train", {"mass": 0.5}) for name in held)
     return Dataset(Path("memory"), get_scene("kick").schema, entries, lambda entry: held[entry.name])
 
 
-def largest(a: Sequence, b: Sequence) -> float:
+def largest(a: MotionSequence, b: MotionSequence) -> float:
     """Error of the worst vertex of the worst frame."""
     return float(np.linalg.norm(a.vertices.astype(float) - b.vertices, axis=2).max())
 
@@ -96,7 +96,7 @@ def test_turns_are_counted_through(tmp_path: Path) -> None:
     times = np.arange(121) / 120.0
     rest = tumbling(0).vertices[0].astype(float)
     vertices = rest @ rotation_from_vector(times[:, None] * [0.0, 30.0, 0.0]).swapaxes(1, 2)
-    rolling = Sequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
+    rolling = MotionSequence(times, vertices.astype(np.float32), FACES, np.full(12, 1.0 / 12.0))
     pack(holding(rolling), tmp_path / "a.odp", TOLERANCE)
     assert largest(rolling, next(open_packed(tmp_path / "a.odp").sequences("all"))) <= TOLERANCE
 
@@ -282,17 +282,17 @@ def test_refuses_what_is_no_archive(tmp_path: Path) -> None:
     assert "directory" in refused(tmp_path)
 
 
-def smaller(sequence: Sequence) -> Sequence:
+def smaller(sequence: MotionSequence) -> MotionSequence:
     return replace(sequence, vertices=sequence.vertices[:, :11], weights=np.full(11, 1.0 / 11.0))
 
 
-def uneven(sequence: Sequence) -> Sequence:
+def uneven(sequence: MotionSequence) -> MotionSequence:
     times = sequence.times.copy()
     times[3] += 1e-4
     return replace(sequence, times=times)
 
 
-MISFITS: dict[str, tuple[Callable[[Sequence], Sequence], str]] = {
+MISFITS: dict[str, tuple[Callable[[MotionSequence], MotionSequence], str]] = {
     "uneven frames": (uneven, "evenly spaced"),
     "late": (lambda s: replace(s, times=s.times + 0.1), "from time 0"),
     "fewer vertices": (smaller, "expected 12 vertices"),

@@ -8,13 +8,13 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import Scores, evaluate
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.predictor import Predictor
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 ALL = np.ones(3, dtype=bool)
 ROUNDING = 1e-5  # of a score: positions are in single precision, and products of other sizes round otherwise
 
 
-def score(*pairs: tuple[np.ndarray, Sequence, np.ndarray]) -> dict:
+def score(*pairs: tuple[np.ndarray, MotionSequence, np.ndarray]) -> dict:
     """Scores of predictions with masks of the frames that count; the others lie between."""
     scores = Scores()
     for predicted, truth, counted in pairs:
@@ -22,7 +22,7 @@ def score(*pairs: tuple[np.ndarray, Sequence, np.ndarray]) -> dict:
     return scores.result()
 
 
-def wobbling(frames: int = 3, seed: int = 0) -> Sequence:
+def wobbling(frames: int = 3, seed: int = 0) -> MotionSequence:
     """A body that shifts, turns and deforms."""
     rng = np.random.default_rng(seed)
     rest = rng.normal(size=(20, 3))
@@ -30,10 +30,10 @@ def wobbling(frames: int = 3, seed: int = 0) -> Sequence:
     for k in range(1, frames):
         vertices[k] = (rest + 0.05 * rng.normal(size=rest.shape)) @ rotation_from_vector(0.2 * k * np.ones(3)).T + k
     faces = np.array([[0, 1, 2]])
-    return Sequence(np.arange(frames) / 10.0, vertices, faces, rng.dirichlet(np.ones(20)))
+    return MotionSequence(np.arange(frames) / 10.0, vertices, faces, rng.dirichlet(np.ones(20)))
 
 
-def off_by(truth: Sequence, *millimetres: float) -> np.ndarray:
+def off_by(truth: MotionSequence, *millimetres: float) -> np.ndarray:
     """Predictions wrong by so much in every coordinate of each frame."""
     return truth.vertices + 1e-3 * np.array(millimetres)[:, None, None]
 

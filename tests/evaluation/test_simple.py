@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
 from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
-from odeform.model.data import Thinning
 from odeform.schema import Schema, Window
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 
 class Falling(Dataset):
     """Three points that fall freely from different speeds, at 480 Hz; the scene has 120 Hz."""
 
-    def sequences(self, split: str) -> Iterator[Sequence]:
+    def sequences(self, split: str) -> Iterator[MotionSequence]:
         times = np.arange(241)[:, None, None] / 480.0
         points = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]])
         for speed in (0.0, 2.0):
             fall = speed * times * [1.0, 0.0, 0.0] + 0.5 * times**2 * [0.0, 0.0, -9.81]
-            yield Sequence(times.ravel(), points + fall, np.zeros((0, 3), dtype=int), np.full(3, 1.0 / 3.0))
+            yield MotionSequence(times.ravel(), points + fall, np.zeros((0, 3), dtype=int), np.full(3, 1.0 / 3.0))
 
 
 @pytest.fixture
@@ -42,8 +42,8 @@ def test_hold_last_misses_by_the_way_fallen(falling: Dataset) -> None:
 
 @pytest.mark.parametrize("stagger", [False, True])
 def test_a_spline_is_right_where_it_sees(dataset: Dataset, stagger: bool) -> None:
-    every = evaluate_simple(spline_through(Thinning()), dataset, "test", (0, 97))
-    some = evaluate_simple(spline_through(Thinning(every=8, stagger=stagger)), dataset, "test", (0, 97))
+    every = evaluate_simple(spline_through(FrameSubsampling()), dataset, "test", (0, 97))
+    some = evaluate_simple(spline_through(FrameSubsampling(every=8, stagger=stagger)), dataset, "test", (0, 97))
     assert every["rmse_pooled_mm"] == 0.0
     assert some["rmse_pooled_mm"] > 0.1
     assert some["per_frame_rmse_mm"][95] < 1e-9 or stagger

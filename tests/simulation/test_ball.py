@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from odeform.simulation.ball import RADIUS, rest_mesh, sphere, stress_free
+from odeform.simulation.objects.ball import RADIUS, rest_mesh, sphere, stress_free
 
 
 @pytest.mark.parametrize("segments", [4, 5, 10])

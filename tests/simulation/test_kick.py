@@ -3,9 +3,9 @@ import trimesh
 
 from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_z
-from odeform.simulation.ball import RADIUS
-from odeform.simulation.kick import pulse_direction, pulse_weights
+from odeform.simulation.objects.ball import RADIUS
 from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.kick import pulse_direction, pulse_weights
 
 
 def test_the_pulse_comes_from_behind_and_below() -> None:

@@ -2,24 +2,24 @@ import numpy as np
 import pytest
 
 from odeform.geometry.rigid import best_rigid, vector_from_rotation
-from odeform.simulation.ball import GRAVITY, RADIUS
-from odeform.simulation.mass_elastic import HEIGHT, REST_SPEED, REST_TIME, SCENE, SCHEMA, simulate
-from odeform.types import Floats, Sequence
+from odeform.simulation.objects.ball import GRAVITY, RADIUS
+from odeform.simulation.scenes.mass_elastic import HEIGHT, REST_SPEED, REST_TIME, SCENE, SCHEMA, simulate
+from odeform.types import Floats, MotionSequence
 
 LIGHT_AND_SOFT = {"mass": 0.2, "bending": 0.3}
 CONTACT_BEGINS = np.sqrt(2.0 * (HEIGHT - RADIUS) / GRAVITY)
 
 
 @pytest.fixture(scope="module")
-def drop() -> Sequence:
+def drop() -> MotionSequence:
     return simulate(LIGHT_AND_SOFT, step=1e-3, segments=5)
 
 
-def centre(sequence: Sequence) -> Floats:
+def centre(sequence: MotionSequence) -> Floats:
     return np.einsum("n,tni->ti", sequence.weights, sequence.vertices.astype(float))
 
 
-def test_falls_as_a_point_does(drop: Sequence) -> None:
+def test_falls_as_a_point_does(drop: MotionSequence) -> None:
     falling = drop.times < CONTACT_BEGINS - 6e-3
     assert falling.sum() == 34
     height = HEIGHT - 0.5 * GRAVITY * drop.times**2
@@ -33,7 +33,7 @@ def test_falls_as_a_point_does(drop: Sequence) -> None:
     assert np.abs(shape[taken_over] - shape[0]).max() < 1e-5
 
 
-def test_bounces_on_its_line(drop: Sequence) -> None:
+def test_bounces_on_its_line(drop: MotionSequence) -> None:
     moved = centre(drop)
     assert np.abs(moved[:, 1]).max() < 1e-6
     # along x no symmetry holds it: MuJoCo's friction cone has four sides and the ball three
@@ -46,7 +46,7 @@ def test_bounces_on_its_line(drop: Sequence) -> None:
     assert moved[landed, 2].max() > RADIUS + 0.02
 
 
-def test_ends_at_rest_on_the_floor(drop: Sequence) -> None:
+def test_ends_at_rest_on_the_floor(drop: MotionSequence) -> None:
     assert CONTACT_BEGINS < drop.times[-1] < 5.0
     last = round(REST_TIME * SCHEMA.window.rate)
     velocity = np.diff(drop.vertices[-last:].astype(float), axis=0) * SCHEMA.window.rate
@@ -56,7 +56,7 @@ def test_ends_at_rest_on_the_floor(drop: Sequence) -> None:
     assert drop.vertices[..., 2].min() > -5e-3
 
 
-def test_frames_lie_on_the_grid(drop: Sequence) -> None:
+def test_frames_lie_on_the_grid(drop: MotionSequence) -> None:
     assert np.allclose(drop.times, np.arange(len(drop.times)) / 120.0, rtol=0.0, atol=1e-12)
     assert drop.vertices.shape == (len(drop.times), 102, 3)
     assert drop.vertices.dtype == np.float32
@@ -71,7 +71,7 @@ def test_frames_asked_for_do_not_change_the_motion() -> None:
         assert np.abs(plain - fine).max() < 1e-6
 
 
-def test_what_is_shown_hangs_where_the_drop_begins(drop: Sequence) -> None:
+def test_what_is_shown_hangs_where_the_drop_begins(drop: MotionSequence) -> None:
     shown, begun = np.asarray(SCENE.rest_mesh().points), drop.vertices[0]
     assert np.allclose(shown.mean(axis=0), [0.0, 0.0, HEIGHT], atol=1e-9)
     assert np.allclose(centre(drop)[0], [0.0, 0.0, HEIGHT], atol=1e-6)

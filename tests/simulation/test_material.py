@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from odeform.simulation.ball import MATERIAL
 from odeform.simulation.material import damping_time, wall_thickness
+from odeform.simulation.objects.ball import MATERIAL
 
 
 def test_wall_has_the_stiffness_asked_for() -> None:

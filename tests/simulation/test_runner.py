@@ -10,11 +10,11 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.schema import Parameters, Window
-from odeform.simulation import kick
 from odeform.simulation.runner import simulate_dataset
 from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes import kick
 from odeform.simulation.shell import SimulationError
-from odeform.types import Sequence
+from odeform.types import MotionSequence
 
 
 @pytest.mark.usefixtures("coarse")
@@ -77,11 +77,11 @@ def test_frames_of_a_rate_asked_for(tmp_path: Path) -> None:
 def test_what_failed_is_listed_and_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tried = []
 
-    def fragile(parameters: Parameters, rate: float, step: float) -> Sequence:
+    def fragile(parameters: Parameters, rate: float, step: float) -> MotionSequence:
         tried.append(parameters)
         if len(tried) == 2:
             raise SimulationError("it broke")
-        return Sequence(np.arange(3) / rate, np.zeros((3, 4, 3)), np.array([[0, 1, 2]]), np.full(4, 0.25))
+        return MotionSequence(np.arange(3) / rate, np.zeros((3, 4, 3)), np.array([[0, 1, 2]]), np.full(4, 0.25))
 
     monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=fragile))
     made = simulate_dataset("kick", tmp_path, count=3)

@@ -11,9 +11,9 @@ import trimesh
 
 from odeform.geometry.rigid import best_rigid
 from odeform.simulation import shell
-from odeform.simulation.ball import GRAVITY, MATERIAL, RADIUS, STEP, stress_free
-from odeform.simulation.kick import simulate
 from odeform.simulation.material import wall_thickness
+from odeform.simulation.objects.ball import GRAVITY, MATERIAL, RADIUS, STEP, stress_free
+from odeform.simulation.scenes.kick import simulate
 from odeform.simulation.shell import Rest, ShellBody, SimulationError, relax_sphere, run
 from odeform.types import Mesh
 

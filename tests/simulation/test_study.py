@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from odeform.simulation.study import RATE, _condition, _contacts, _rebound, _rmse
-from odeform.types import Floats, Sequence
+from odeform.types import Floats, MotionSequence
 
 
-def bobbing(*heights: float, weights: tuple[float, ...] = (0.5, 0.5), above: float = 0.0) -> Sequence:
+def bobbing(*heights: float, weights: tuple[float, ...] = (0.5, 0.5), above: float = 0.0) -> MotionSequence:
     """Two vertices, the second `above` metres over the first, whose height in millimetres is given by frame."""
     vertices = np.zeros((len(heights), 2, 3), dtype=np.float32)
     vertices[:, :, 2] = 1e-3 * np.array(heights)[:, None] + [0.0, above]
-    return Sequence(np.arange(len(heights)) / RATE, vertices, np.array([[0, 1, 0]]), np.array(weights))
+    return MotionSequence(np.arange(len(heights)) / RATE, vertices, np.array([[0, 1, 0]]), np.array(weights))
 
 
-def moved(vertices: Floats) -> Sequence:
+def moved(vertices: Floats) -> MotionSequence:
     count = vertices.shape[1]
-    return Sequence(np.arange(len(vertices)) / RATE, vertices, np.array([[0, 0, 0]]), np.full(count, 1.0 / count))
+    return MotionSequence(np.arange(len(vertices)) / RATE, vertices, np.array([[0, 0, 0]]), np.full(count, 1.0 / count))
 
 
 def test_contacts_are_those_of_the_lowest_vertex() -> None:
@@ -64,7 +64,7 @@ def test_rmse_holds_what_ended_first() -> None:
 def test_condition_is_the_ratio_of_the_marks_that_two_parameters_leave() -> None:
     still = np.zeros((6, 3, 3))
 
-    def nudged(vertex: int, axis: int, by: float, later: float = 0.0) -> list[Sequence]:
+    def nudged(vertex: int, axis: int, by: float, later: float = 0.0) -> list[MotionSequence]:
         pair = []
         for sign in (-1.0, 1.0):
             vertices = still.copy()

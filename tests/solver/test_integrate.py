@@ -6,14 +6,14 @@ import torch
 import torchdiffeq
 
 from odeform.errors import InputError
-from odeform.solver.integrate import Quality, integrate
+from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Solution, Status
 from odeform.solver.tableau import METHODS
 
 QUALITIES = [
-    *(Quality(name, step=0.05) for name in METHODS),
-    Quality("bosh3", tolerance=1e-5),
-    Quality("dopri5", tolerance=1e-7),
+    *(SolverSettings(name, step=0.05) for name in METHODS),
+    SolverSettings("bosh3", tolerance=1e-5),
+    SolverSettings("dopri5", tolerance=1e-7),
 ]
 
 
@@ -47,7 +47,7 @@ def test_order_at_the_nodes(name: str) -> None:
     steps = [2.0**-k for k in (range(3, 7) if name == "dopri5" else range(4, 9))]
     errors = []
     for step in steps:
-        solution = integrate(field, exact(0.0), Quality(name, step=step), until=2.0)
+        solution = integrate(field, exact(0.0), SolverSettings(name, step=step), until=2.0)
         errors.append(max(np.abs(s - exact(t)).max() for t, s in zip(solution.times, solution.states, strict=True)))
     assert order(steps, errors) == pytest.approx(METHODS[name].order, abs=0.2)
 
@@ -59,7 +59,7 @@ def test_extended_precision_is_kept(name: str) -> None:
     first, e = np.ones(1, dtype=np.longdouble), np.exp(np.longdouble(1.0))
     steps, errors = (100, 200), []
     for count in steps:
-        solution = integrate(lambda _, z: z, first, Quality(name, step=1.0 / count), until=1.0)
+        solution = integrate(lambda _, z: z, first, SolverSettings(name, step=1.0 / count), until=1.0)
         assert solution.states[-1].dtype == np.longdouble
         errors.append(float(abs(solution.states[-1][0] - e)))
     assert math.log2(errors[0] / errors[1]) == pytest.approx(METHODS[name].order, abs=0.1)
@@ -73,7 +73,7 @@ def test_order_between_the_nodes(name: str) -> None:
     times = np.linspace(0.0, 2.0, 997)
     truth = np.stack([exact(t) for t in times])
     errors = [
-        np.abs(integrate(field, exact(0.0), Quality(name, step=step), until=2.0).sample(times) - truth).max()
+        np.abs(integrate(field, exact(0.0), SolverSettings(name, step=step), until=2.0).sample(times) - truth).max()
         for step in steps
     ]
     assert order(steps, errors) == pytest.approx(min(METHODS[name].order, 4), abs=0.2)
@@ -86,7 +86,7 @@ def test_quartic_within_one_dopri5_step() -> None:
     for step in steps:
         start = exact(begin)
         first = Solution([begin], [start], [field(begin, start)], next_step=step)
-        solution = integrate(field, start, Quality("dopri5", tolerance=1.0), begin + 0.5 * step, begin=first)
+        solution = integrate(field, start, SolverSettings("dopri5", tolerance=1.0), begin + 0.5 * step, begin=first)
         assert solution.steps == 1
         inside = begin + step * np.linspace(0.05, 0.95, 19)
         errors.append(np.abs(solution.sample(inside) - np.stack([exact(t) for t in inside])).max())
@@ -96,7 +96,7 @@ def test_quartic_within_one_dopri5_step() -> None:
 @pytest.mark.parametrize("name", ["bosh3", "dopri5"])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7, 1e-9])
 def test_controlled_steps_meet_their_tolerance(name: str, tolerance: float) -> None:
-    solution = integrate(field, exact(0.0), Quality(name, tolerance=tolerance), until=5.0)
+    solution = integrate(field, exact(0.0), SolverSettings(name, tolerance=tolerance), until=5.0)
     assert solution.status is Status.OK
     error = max(np.abs(s - exact(t)).max() for t, s in zip(solution.times, solution.states, strict=True))
     # the tolerance is for a step; several add up, and the interpolant is not controlled at all
@@ -115,7 +115,7 @@ def test_agrees_with_torchdiffeq() -> None:
 
     start = np.array([2.0, 0.0])
     # their tolerance is relative to the state as well
-    solution = integrate(oscillator, start, Quality("dopri5", tolerance=1e-8), until=10.0)
+    solution = integrate(oscillator, start, SolverSettings("dopri5", tolerance=1e-8), until=10.0)
     theirs = torchdiffeq.odeint(
         torch_field, torch.tensor(start), torch.tensor(times), rtol=1e-9, atol=1e-9, method="dopri5"
     )
@@ -124,7 +124,7 @@ def test_agrees_with_torchdiffeq() -> None:
 
 
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_does_not_depend_on_where_it_ends(quality: Quality) -> None:
+def test_does_not_depend_on_where_it_ends(quality: SolverSettings) -> None:
     start = np.array([2.0, 0.0])
     short, long = (integrate(oscillator, start, quality, until=until) for until in (0.73, 3.0))
     assert short.end >= 0.73
@@ -133,7 +133,7 @@ def test_does_not_depend_on_where_it_ends(quality: Quality) -> None:
 
 
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_continued_equals_at_once(quality: Quality) -> None:
+def test_continued_equals_at_once(quality: SolverSettings) -> None:
     start = np.array([2.0, 0.0])
     whole = integrate(oscillator, start, quality, until=3.0)
     parts = integrate(oscillator, start, quality, until=0.2)
@@ -144,8 +144,8 @@ def test_continued_equals_at_once(quality: Quality) -> None:
     assert (parts.evaluations, parts.rejected) == (whole.evaluations, whole.rejected)
 
 
-@pytest.mark.parametrize("quality", [*QUALITIES, Quality("dopri5", tolerance=1e-2)], ids=str)
-def test_counts_every_evaluation(quality: Quality) -> None:
+@pytest.mark.parametrize("quality", [*QUALITIES, SolverSettings("dopri5", tolerance=1e-2)], ids=str)
+def test_counts_every_evaluation(quality: SolverSettings) -> None:
     calls = 0
 
     def counted(time: float, state: np.ndarray) -> np.ndarray:
@@ -160,20 +160,20 @@ def test_counts_every_evaluation(quality: Quality) -> None:
 @pytest.mark.parametrize(("step", "count"), [(0.1, 3), (0.1, 1000), (1.0 / 120.0, 120), (0.05, 7)])
 def test_nodes_are_multiples_of_the_step(step: float, count: int) -> None:
     """No drift, and an end that is a node up to rounding needs no further step."""
-    solution = integrate(lambda _, y: -y, np.ones(1), Quality("euler", step=step), until=count * step)
+    solution = integrate(lambda _, y: -y, np.ones(1), SolverSettings("euler", step=step), until=count * step)
     assert solution.times == [index * step for index in range(count + 1)]
-    ends = integrate(lambda _, y: -y, np.ones(1), Quality("euler", step=step), until=round(count * step, 12))
+    ends = integrate(lambda _, y: -y, np.ones(1), SolverSettings("euler", step=step), until=round(count * step, 12))
     assert ends.steps == count
 
 
 def test_outside_the_span_the_end_states_stand() -> None:
-    solution = integrate(field, exact(0.0), Quality("rk4", step=0.1), until=0.35)
+    solution = integrate(field, exact(0.0), SolverSettings("rk4", step=0.1), until=0.35)
     assert np.array_equal(solution.at(-1.0), solution.states[0])
     assert np.array_equal(solution.at(9.0), solution.states[-1])
 
 
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_blow_up_ends_early_with_finite_states(quality: Quality) -> None:
+def test_blow_up_ends_early_with_finite_states(quality: SolverSettings) -> None:
     """y' = y^2, y(0) = 1 has its pole at t = 1; fixed steps may jump over it and overflow a little later."""
     with np.errstate(over="ignore", invalid="ignore"):
         solution = integrate(lambda _, y: y * y, np.array([1.0]), quality, until=10.0)
@@ -184,7 +184,7 @@ def test_blow_up_ends_early_with_finite_states(quality: Quality) -> None:
 
 
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_field_without_values(quality: Quality) -> None:
+def test_field_without_values(quality: SolverSettings) -> None:
     solution = integrate(lambda _, y: y * math.nan, np.ones(3), quality, until=1.0)
     assert solution.status is Status.NON_FINITE
     assert solution.steps == 0
@@ -192,7 +192,7 @@ def test_field_without_values(quality: Quality) -> None:
 
 
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_field_that_loses_its_values(quality: Quality) -> None:
+def test_field_that_loses_its_values(quality: SolverSettings) -> None:
     solution = integrate(lambda t, y: -y if t < 0.5 else y * math.nan, np.ones(3), quality, until=1.0)
     assert solution.status in (Status.NON_FINITE, Status.UNDERFLOW)
     assert 0.4 < solution.end <= 0.5
@@ -203,7 +203,7 @@ def test_field_that_loses_its_values(quality: Quality) -> None:
 
 
 def test_step_limit() -> None:
-    solution = integrate(lambda _, y: -y, np.ones(1), Quality("euler", step=1e-6), until=1.0)
+    solution = integrate(lambda _, y: -y, np.ones(1), SolverSettings("euler", step=1e-6), until=1.0)
     assert solution.status is Status.MAX_STEPS
     assert 0.0 < solution.end < 1.0
 
@@ -225,12 +225,12 @@ def test_step_limit() -> None:
 )
 def test_impossible_qualities(setting: dict) -> None:
     with pytest.raises(InputError):
-        Quality(**setting)
+        SolverSettings(**setting)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("quality", QUALITIES, ids=str)
-def test_many_times_at_once_are_each_time_alone(quality: Quality, dtype: type) -> None:
+def test_many_times_at_once_are_each_time_alone(quality: SolverSettings, dtype: type) -> None:
     """To the last bit: what is shown of a moment must not depend on what else was asked for."""
     solution = integrate(oscillator, np.array([2.0, 0.0], dtype), quality, until=3.0)
     times = np.concatenate([[-1.0, 0.0, 9.0], np.random.default_rng(0).uniform(0.0, 3.2, 40), solution.times[3:5]])

@@ -10,9 +10,9 @@ from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.predictor import load
-from odeform.tables.cells import KEPT, Cell, Result, run_cells
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform.tables.runs import KEPT, Cell, Result, run_cells
 
 
 @pytest.fixture(scope="module")

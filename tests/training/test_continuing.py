@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from odeform.dataset.index import Dataset
-from odeform.model.continuation import Dynamics
-from odeform.model.data import TrainingData, prepare
-from odeform.model.odeform import ODeform
+from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.continuation import Dynamics
+from odeform.models.odeform.model import ODeform
 from odeform.predictor import Predictor
 from odeform.training import continuation
 from odeform.training.continuation import fit_dynamics, foretold, with_continuation
@@ -37,7 +37,7 @@ def test_a_second_landing_follows_from_the_first() -> None:
     known, later = 22, 14
     theta, unseen = np.linspace(-1.0, 1.0, 40)[:, None], np.array([[-0.63], [0.02], [0.71]])
     truth = np.stack([bounce(t, known + later) for t in unseen[:, 0]])
-    dynamics = fit_dynamics(theta, np.stack([bounce(t, known) for t in theta[:, 0]]), arm=0.1)
+    dynamics = fit_dynamics(theta, np.stack([bounce(t, known) for t in theta[:, 0]]), gyration_radius=0.1)
     assert dynamics.gravity[2] == pytest.approx(GRAVITY / RATE**2, rel=1e-6)
     before, now = truth[:, known - 2], truth[:, known - 1]
     flown, out, fall = [before, now], [], (before, now)
@@ -66,7 +66,7 @@ def test_what_does_not_foretell_is_not_kept(
     model = cast(ODeform, predictors["odeform"])
     counts = []
 
-    def falling(theta: Floats, reduced: Floats, arm: float) -> Dynamics:
+    def falling(theta: Floats, reduced: Floats, gyration_radius: float) -> Dynamics:
         counts.append(reduced.shape[1])
         width = 2 + 6 + 2 * (reduced.shape[2] - 6) + theta.shape[1]
         empty = np.zeros((0, width)), np.zeros((0, reduced.shape[2]))

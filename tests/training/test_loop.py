@@ -7,13 +7,14 @@ import pytest
 import torch
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
+from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
-from odeform.model.data import Thinning, TrainingData, prepare
-from odeform.model.inference import make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.predictor import Predictor, load
 from odeform.simulation.scene import get_scene
-from odeform.solver.integrate import Quality, integrate
+from odeform.solver.integrate import SolverSettings, integrate
 from odeform.training.config import TrainConfig
 from odeform.training.loop import network_weights, train_network
 from odeform.training.start import build_network
@@ -48,7 +49,7 @@ def test_outputs_are_whitened(data: TrainingData) -> None:
 
 @pytest.mark.parametrize("stagger", [False, True])
 def test_descent_sees_as_many_frames_where_few_are_known(dataset: Dataset, stagger: bool) -> None:
-    data = prepare(dataset, 8, Thinning(every=6, stagger=stagger))
+    data = prepare(dataset, 8, FrameSubsampling(every=6, stagger=stagger))
     config = TrainConfig(batch=2)
     trainer = Trainer(build_network(data, 0), data, config, torch.device("cpu"))
     assert trainer.batch * len(trainer.shown) >= config.batch * len(data.times) / 2 - len(trainer.shown)
@@ -102,13 +103,13 @@ def test_random_features_leave_less(data: TrainingData) -> None:
         train_network(net, data, config, silent)
         weights = network_weights(net)
         assert all(w.dtype == np.float32 for name, w in weights.items() if not name.endswith("readout.weight"))
-        pooled = pool_shape(weights, net.config, data.rest / data.space.arm, data.weights)
+        pooled = pool_shape(weights, net.config, data.rest / data.space.gyration_radius, data.weights)
         squares = []
         for theta, truth in zip(data.theta["train"], data.reduced["train"], strict=True):
             start = make_encoder(weights, net.config)(pooled, theta, np.float64)
             field = make_field(weights, net.config, np.float64)(theta)
             stop = float(data.times[-1])
-            solution = integrate(field, start, Quality("rk4", step=float(data.times[1]) / 2.0), stop)
+            solution = integrate(field, start, SolverSettings("rk4", step=float(data.times[1]) / 2.0), stop)
             y = make_decoder(weights, net.config)(theta)(data.times, solution.sample(data.times))
             squares.append((((y - y[0] - truth)[:, 6:]) ** 2).mean())
         left.append(np.sqrt(np.mean(squares)))

@@ -3,9 +3,9 @@ import pytest
 import torch
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.training_data import TrainingData, prepare
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.model.data import TrainingData, prepare
-from odeform.model.reduced import POSE
+from odeform.motion.reduced_space import POSE
 from odeform.training.losses import Metric, balanced
 
 
@@ -22,7 +22,7 @@ def test_reads_in_millimetres_of_the_vertices(data: TrainingData, part: str) -> 
     error = truth.clone()
     error[:, where] = 1e-3 * torch.randn(error[:, where].shape, generator=torch.Generator().manual_seed(0)).double()
     gains = torch.linspace(0.5, 2.0, POSE + 8, dtype=torch.float64)
-    losses = Metric(gains, data.space.arm)(error / gains, truth, torch.ones(40).double())
+    losses = Metric(gains, data.space.gyration_radius)(error / gains, truth, torch.ones(40).double())
 
     y = error.numpy()
     local = data.rest + np.einsum("nik,tk->tni", data.space.basis.values(data.rest), y[:, POSE:])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
-from odeform.model.data import Thinning
 from odeform.training.point_data import prepare_points
 
 
 def test_displacements_come_back_from_mean_and_scale(dataset: Dataset) -> None:
-    data = prepare_points(dataset, Thinning(every=4))
+    data = prepare_points(dataset, FrameSubsampling(every=4))
     assert len(data.mean.times) == data.moved["train"].shape[1] == 121
     sequence = next(dataset.sequences("train"))
     moved = data.frame.scale * data.moved["train"][0] + data.mean.shifts[:, None]

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from odeform.dataset.store import open_dataset
-from odeform.model.data import TrainingData, prepare
-from odeform.model.odeform import ODeform
-from odeform.model.reduced import POSE
+from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_space import POSE
 from odeform.predictor import load
 from odeform.training import pruning
 from odeform.training.pruning import FINE, LARGE, needed_modes, without_modes
@@ -29,8 +29,8 @@ def data(model: ODeform) -> TrainingData:
 
 
 def _motions(model: ODeform, data: TrainingData) -> Floats:
-    placed = model.place(model.rest, 0.0)
-    solved = (model.integrate(theta, placed, FINE, float(data.times[-1])) for theta in data.theta["val"])
+    evaluated = model.evaluate_basis(model.rest, 0.0)
+    solved = (model.integrate(theta, evaluated, FINE, float(data.times[-1])) for theta in data.theta["val"])
     return np.stack([motion.reduced(data.times) for motion in solved])
 
 

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
-from odeform.model.data import Thinning, prepare
-from odeform.model.odeform import ODeform
+from odeform.dataset.subsampling import FrameSubsampling
+from odeform.dataset.training_data import prepare
+from odeform.models.frontier import FrontierPoint
+from odeform.models.odeform.model import ODeform
 from odeform.predictor import Predictor
-from odeform.solver.frontier import FrontierPoint
-from odeform.solver.integrate import Quality
+from odeform.solver.integrate import SolverSettings
 from odeform.training import qualities
 from odeform.training.qualities import choose_qualities, measure_frontier
 
@@ -39,7 +40,8 @@ def test_qualities_are_points_of_it(measured: Measured) -> None:
     for share in (1.0, 0.01):
         error, deformation = (share * e for e in errors)
         points = {
-            n: known[Quality(**setting)] for n, setting in choose_qualities(frontier, (error, deformation)).items()
+            n: known[SolverSettings(**setting)]
+            for n, setting in choose_qualities(frontier, (error, deformation)).items()
         }
         assert points["draft"].solver_error_mm <= error
         assert points["draft"].deformation_error_mm <= deformation
@@ -52,7 +54,7 @@ def test_qualities_are_points_of_it(measured: Measured) -> None:
 @pytest.mark.parametrize("errors", [(1e-12, 1.0), (1.0, 1e-12)])
 def test_nothing_is_exact_enough(measured: Measured, errors: tuple[float, float]) -> None:
     frontier, _ = measured
-    assert Quality(**choose_qualities(frontier, errors)["balanced"]) == frontier[-1].quality
+    assert SolverSettings(**choose_qualities(frontier, errors)["balanced"]) == frontier[-1].quality
 
 
 def test_a_checkpoint_brings_its_frontier(predictors: dict[str, Predictor]) -> None:
@@ -66,8 +68,8 @@ def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
     dataset: Dataset, predictors: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = cast(ODeform, predictors["odeform"])
-    monkeypatch.setattr(qualities, "_candidates", lambda _: [Quality("rk4", step=0.01)])
-    data = prepare(dataset, model.space.basis.modes, Thinning(every=6, stagger=True))
+    monkeypatch.setattr(qualities, "_candidates", lambda _: [SolverSettings("rk4", step=0.01)])
+    data = prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True))
     unknown = ~data.known["val"][..., None]
     wrong = replace(data, reduced={**data.reduced, "val": data.reduced["val"] + 9.0 * unknown})
     assert measure_frontier(model, wrong) == measure_frontier(model, data)

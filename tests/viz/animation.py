@@ -12,9 +12,9 @@ from playwright.sync_api import sync_playwright
 
 from odeform.predictor import load
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
-from odeform_viz.loopback import LoopbackClient
-from odeform_viz.shaping import shape_from
+from odeform_viz.fitting import shape_from
 
 RATE, QUALITY = 12.5, 60  # pictures a second; of WebP
 FILM = (

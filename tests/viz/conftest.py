@@ -9,10 +9,10 @@ import pytest
 
 from odeform.predictor import Predictor, load
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
-from odeform_viz.loopback import LoopbackClient
-from odeform_viz.recorder import Recorder
-from odeform_viz.session import Frame, Session, Wish
+from odeform_viz.recording.writer import Recorder
+from odeform_viz.session import Frame, Session, ViewRequest
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
 Record = Callable[..., list[Frame]]
@@ -75,8 +75,10 @@ def record() -> Record:
         schema = columns[0].source.schema
         session, shown = Session(schema), Columns.of(columns).all
         recorder = Recorder(path)
-        wishes = [Wish(schema.complete(parameters or {"mass": 0.6}), time, "balanced", shown) for time in times]
-        frames = [change(session.frame(wish)) for wish in wishes]
+        requests = [
+            ViewRequest(schema.complete(parameters or {"mass": 0.6}), time, "balanced", shown) for time in times
+        ]
+        frames = [change(session.frame(request)) for request in requests]
         for frame in frames:
             recorder.log(frame)
         recorder.close()

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from odeform import InputError
+from odeform.cancellation import check_cancelled
 from odeform.predictor import Predictor, load
-from odeform.wanted import check_wanted
 from odeform_viz.app import App
-from odeform_viz.checker import checker_parts
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
-from odeform_viz.loopback import LoopbackClient
+from odeform_viz.rendering.checkerboard import checkerboard_parts
 
 BODY = "/world/column_0/body/part_0"
 
@@ -50,7 +50,7 @@ def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: st
         client.set(label, value)
         shown = client.wait_vertices(BODY)
     expected = kick.solve(kick.rest, {label.split()[0]: value}).deformed(0.02)
-    np.testing.assert_array_equal(shown, checker_parts(kick.rest)[0].of(expected))
+    np.testing.assert_array_equal(shown, checkerboard_parts(kick.rest)[0].of(expected))
 
 
 def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predictor, port: int) -> None:
@@ -64,7 +64,7 @@ def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predic
         while (vertices := client.wait_vertices(BODY, 1.0)) is not None:
             last = vertices
     expected = kick.solve(kick.rest, {"mass": float(values[-1])}).deformed(0.03)
-    np.testing.assert_array_equal(last, checker_parts(kick.rest)[0].of(expected))
+    np.testing.assert_array_equal(last, checkerboard_parts(kick.rest)[0].of(expected))
 
 
 def test_values_that_no_slider_sends_leave_the_last_frame_and_a_message(app: App, port: int) -> None:
@@ -114,7 +114,7 @@ def test_two_people_at_one_slider_see_the_newest(app: App, kick: Predictor, port
             while (vertices := client.wait_vertices(BODY, 0.7)) is not None:
                 last[index] = vertices
         assert one.controls["mass (kg)"].value == two.controls["mass (kg)"].value == 0.55
-    expected = checker_parts(kick.rest)[0].of(kick.solve(kick.rest, {"mass": 0.55}).deformed(0.03))
+    expected = checkerboard_parts(kick.rest)[0].of(kick.solve(kick.rest, {"mass": 0.55}).deformed(0.03))
     for vertices in last:
         np.testing.assert_array_equal(vertices, expected)
 
@@ -136,7 +136,7 @@ def test_a_slow_column_stops_no_scrubbing(drop: Predictor, port: int, monkeypatc
     def slow(*asked: Any, **more: Any) -> Any:
         end = time.monotonic() + 1.0
         while time.monotonic() < end:
-            check_wanted()
+            check_cancelled()
             time.sleep(0.01)
         return sound(*asked, **more)
 
@@ -152,7 +152,7 @@ def test_a_slow_column_stops_no_scrubbing(drop: Predictor, port: int, monkeypatc
                 client.set("time (s)", float(moment))
                 client.collect(0.05)
                 assert app._shown is not None
-                times.add(app._shown.wish.time)
+                times.add(app._shown.request.time)
             assert app._shown is not None
             assert app._shown.pending == ("slow",)
             assert len(times) > 10

@@ -6,7 +6,7 @@ import pytest
 
 from odeform import InputError
 from odeform.dataset.index import Dataset
-from odeform.model.recorded import RecordedMotion
+from odeform.motion.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform_viz.columns import MOST, Column, Columns
 from odeform_viz.panels.compare import sweep

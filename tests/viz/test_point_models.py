@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from odeform.cancellation import Cancelled, cancel_unless
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.model.point_motion import PointMotion
-from odeform.model.recorded import RecordedMotion
+from odeform.motion.point_motion import PointMotion
+from odeform.motion.recorded import RecordedMotion
 from odeform.predictor import Predictor, load
-from odeform.wanted import Unwanted, as_long_as
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import moment_in_words
-from odeform_viz.session import Session, Wish
+from odeform_viz.session import Session, ViewRequest
 
 
 @pytest.fixture(scope="module")
@@ -31,25 +31,25 @@ def test_all_side_by_side_with_the_truth(models: dict[str, Predictor], truth: Re
     shown = [Column("truth", truth, truth.geometry), *(Column(name, p, p.rest) for name, p in models.items())]
     columns = Columns.of(shown).all
     session = Session(truth.schema)
-    wish = Wish(session.schema.complete(truth.parameters), 0.4, "balanced", columns)
-    frame = session.frame(wish)
+    request = ViewRequest(session.schema.complete(truth.parameters), 0.4, "balanced", columns)
+    frame = session.frame(request)
     for column in frame.columns[1:]:
         assert isinstance(column.motion, PointMotion)
         assert column.error is not None
         assert column.stats.status == "ok"
-        curves = session.curves(column, wish)
+        curves = session.curves(column, request)
         assert np.isfinite(curves.deformation).all()
         assert curves.expected is not None
-        assert session.frame(wish).columns[1].motion is frame.columns[1].motion
+        assert session.frame(request).columns[1].motion is frame.columns[1].motion
 
 
 def test_between_frames_needs_a_truth_of_these_parameters(models: dict[str, Predictor], truth: RecordedMotion) -> None:
     flow = Column("flow", models["occupancy-flow"], models["occupancy-flow"].rest)
     session = Session(truth.schema)
     with pytest.raises(InputError, match="expected the truth"):
-        session.frame(Wish(session.schema.complete({}), 0.4, "balanced", Columns.of([flow]).all))
+        session.frame(ViewRequest(session.schema.complete({}), 0.4, "balanced", Columns.of([flow]).all))
     both = Columns.of([Column("truth", truth, truth.geometry), flow]).all
-    frame = session.frame(Wish(session.schema.complete({"mass": 0.55}), 0.4, "balanced", both))
+    frame = session.frame(ViewRequest(session.schema.complete({"mass": 0.55}), 0.4, "balanced", both))
     assert [shown.column.label for shown in frame.columns] == ["truth"]  # one that refuses stops no other
     assert frame.refused == ("flow moves between observed frames: expected the truth of these parameters",)
     assert "flow moves between observed frames" in moment_in_words(frame)
@@ -60,23 +60,23 @@ def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypa
     fast, slow = Column("fast", kick, kick.rest), Column("node", models["node"], models["node"].rest)
     session = Session(kick.schema)
     columns = Columns.of([fast, slow]).all
-    wish = Wish(session.schema.complete({"mass": 0.5}), 0.4, "balanced", columns)
+    request = ViewRequest(session.schema.complete({"mass": 0.5}), 0.4, "balanced", columns)
     asked = iter([True] * 10)
-    with pytest.raises(Unwanted), as_long_as(lambda: next(asked, False)):  # a newer wish comes meanwhile
-        session.frame(wish, whole=False)
+    with pytest.raises(Cancelled), cancel_unless(lambda: next(asked, False)):  # a newer request comes meanwhile
+        session.frame(request, whole=False)
     # what was given up is left for later, and the page says so
-    first = session.frame(wish, whole=False)
+    first = session.frame(request, whole=False)
     assert [shown.column.label for shown in first.columns] == ["fast"]
     assert first.pending == ("node",)
     assert "node** is being computed" in moment_in_words(first)
-    assert first.follows(replace(wish, time=0.5))
-    whole = session.frame(wish)
+    assert first.follows(replace(request, time=0.5))
+    whole = session.frame(request)
     assert [shown.column.label for shown in whole.columns] == ["fast", "node"]
     assert not whole.pending
     # once there, it is shown at any time
-    assert not session.frame(replace(wish, time=0.5), whole=False).pending
+    assert not session.frame(replace(request, time=0.5), whole=False).pending
     monkeypatch.setattr("odeform_viz.session.SLOW", 0.0)
-    moved = replace(wish, parameters={**wish.parameters, "mass": 0.6})
+    moved = replace(request, parameters={**request.parameters, "mass": 0.6})
     assert not first.follows(moved)
     # the motion that took least is slow now too
     assert session.frame(moved, whole=False).pending == ("fast", "node")

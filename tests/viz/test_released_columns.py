@@ -10,13 +10,13 @@ import trimesh
 from authors import TETRAHEDRON, Authors, write_sequence
 
 from odeform.cli import main
-from odeform.dataset.importing import import_dataset
+from odeform.dataset.importers.importing import import_dataset
 from odeform.types import Mesh
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Columns, truth_column
-from odeform_viz.loopback import LoopbackClient
-from odeform_viz.session import Session, Wish
+from odeform_viz.session import Session, ViewRequest
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
 
@@ -59,8 +59,8 @@ def test_the_truth_is_compared_in_its_own_frame(checkpoint: str, drops: Path) ->
     assert record is not None
     assert record.setting == pytest.approx({"mass": 0.6, "bending": 1.0, "initial_offset": 0.6})
     session = Session(column.source.schema)
-    wish = Wish(session.schema.complete(record.setting), 2.5, "balanced", Columns.of((column, truth)).all)
-    error = session.frame(wish).columns[0].error
+    request = ViewRequest(session.schema.complete(record.setting), 2.5, "balanced", Columns.of((column, truth)).all)
+    error = session.frame(request).columns[0].error
     assert error is not None
     assert column.predictor is not None
     predicted = column.predictor.solve(Mesh(CORNERS, TETRAHEDRON), record.setting).vertices(2.5)

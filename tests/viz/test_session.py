@@ -8,12 +8,12 @@ import pytest
 from odeform import InputError
 from odeform.dataset.index import Dataset
 from odeform.geometry.shape import fit_to
-from odeform.model.recorded import RecordedMotion
+from odeform.motion.recorded import RecordedMotion
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
-from odeform_viz.session import INVISIBLE, Session, Wish, visible_deformation
+from odeform_viz.session import INVISIBLE, Session, ViewRequest, visible_deformation
 
 
 @pytest.fixture
@@ -27,40 +27,42 @@ def session(columns: tuple[Column, ...]) -> Session:
 
 
 @pytest.fixture
-def wish(session: Session, columns: tuple[Column, ...]) -> Wish:
-    return Wish(session.schema.complete({}), 0.02, "balanced", columns)
+def view_request(session: Session, columns: tuple[Column, ...]) -> ViewRequest:
+    return ViewRequest(session.schema.complete({}), 0.02, "balanced", columns)
 
 
-def _alone(predictor: Predictor, time: float = 0.02) -> tuple[Session, Wish]:
+def _alone(predictor: Predictor, time: float = 0.02) -> tuple[Session, ViewRequest]:
     session = Session(predictor.schema)
     columns = Columns.of([Column(predictor.model, predictor, predictor.rest)]).all
-    return session, Wish(session.schema.complete({}), time, "balanced", columns)
+    return session, ViewRequest(session.schema.complete({}), time, "balanced", columns)
 
 
-def test_time_alone_never_integrates_again(session: Session, wish: Wish) -> None:
-    first = session.frame(wish).columns[0]
-    later = session.frame(replace(wish, time=0.4)).columns[0]
+def test_time_alone_never_integrates_again(session: Session, view_request: ViewRequest) -> None:
+    first = session.frame(view_request).columns[0]
+    later = session.frame(replace(view_request, time=0.4)).columns[0]
     assert later.motion is first.motion
-    changed = session.frame(replace(wish, parameters={**wish.parameters, "mass": 0.71})).columns[0]
+    changed = session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 0.71})).columns[0]
     assert changed.motion is not first.motion
 
 
-def test_hidden_columns_are_not_computed(session: Session, wish: Wish, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hidden_columns_are_not_computed(
+    session: Session, view_request: ViewRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = []
-    for column in wish.columns:
+    for column in view_request.columns:
         solve = column.source.solve
         monkeypatch.setattr(
             column.source, "solve", lambda *a, _s=solve, _c=column.label, **k: (asked.append(_c), _s(*a, **k))[1]
         )
-    shown = tuple(replace(column, shown=index == 1) for index, column in enumerate(wish.columns))
-    frame = session.frame(replace(wish, columns=shown))
-    assert asked == [wish.columns[1].label]
+    shown = tuple(replace(column, shown=index == 1) for index, column in enumerate(view_request.columns))
+    frame = session.frame(replace(view_request, columns=shown))
+    assert asked == [view_request.columns[1].label]
     assert [column.column.label for column in frame.columns] == asked
 
 
 def test_a_frame_is_what_the_predictor_says(kick: Predictor) -> None:
-    session, wish = _alone(kick)
-    shown = session.frame(wish).columns[0]
+    session, view_request = _alone(kick)
+    shown = session.frame(view_request).columns[0]
     assert shown.points is not None
     motion = kick.solve(kick.rest)
     np.testing.assert_array_equal(shown.points, motion.deformed(0.02))
@@ -68,14 +70,14 @@ def test_a_frame_is_what_the_predictor_says(kick: Predictor) -> None:
     np.testing.assert_allclose(moved, motion.vertices(0.02), atol=1e-6)
 
 
-def test_a_pinned_column_does_not_heed_the_sliders(session: Session, wish: Wish) -> None:
-    first = wish.columns[0]
-    pinned = replace(first, key=99, pinned={**wish.parameters, "mass": 0.9})
-    heavy = replace(wish, parameters={**wish.parameters, "mass": 0.6}, columns=(first, pinned))
+def test_a_pinned_column_does_not_heed_the_sliders(session: Session, view_request: ViewRequest) -> None:
+    first = view_request.columns[0]
+    pinned = replace(first, key=99, pinned={**view_request.parameters, "mass": 0.9})
+    heavy = replace(view_request, parameters={**view_request.parameters, "mass": 0.6}, columns=(first, pinned))
     under, apart = session.frame(heavy).columns
     assert under.motion.parameters["mass"] == 0.6
     assert apart.motion.parameters["mass"] == 0.9
-    later = session.frame(replace(heavy, parameters=wish.parameters)).columns[1]
+    later = session.frame(replace(heavy, parameters=view_request.parameters)).columns[1]
     assert later.motion is apart.motion
 
 
@@ -85,14 +87,16 @@ def truth(dataset: Dataset, session: Session) -> Column:
     return Column("truth", motion, motion.geometry, key=50)
 
 
-def test_the_error_is_that_against_the_truth_at_its_vertices(session: Session, wish: Wish, truth: Column) -> None:
+def test_the_error_is_that_against_the_truth_at_its_vertices(
+    session: Session, view_request: ViewRequest, truth: Column
+) -> None:
     record = truth.truth
     assert record is not None
     time = float(record.sequence.times[12])
-    at = replace(wish, parameters=record.parameters, time=time, columns=(*wish.columns, truth))
+    at = replace(view_request, parameters=record.parameters, time=time, columns=(*view_request.columns, truth))
     shown = session.frame(at).columns[0]
     assert shown.error is not None
-    predicted = wish.columns[0].source.solve(record.geometry, record.parameters).vertices(time)
+    predicted = view_request.columns[0].source.solve(record.geometry, record.parameters).vertices(time)
     off = predicted.astype(float) - record.sequence.vertices[12]
     assert shown.error.rmse_mm == pytest.approx(1e3 * np.sqrt((off**2).mean()), rel=1e-5)
     assert shown.error.worst_mm == pytest.approx(1e3 * np.linalg.norm(off, axis=1).max(), rel=1e-5)
@@ -102,20 +106,20 @@ def test_the_error_is_that_against_the_truth_at_its_vertices(session: Session, w
 
 
 def test_without_its_parameters_the_truth_tells_no_error(
-    session: Session, wish: Wish, truth: Column, kick: Predictor
+    session: Session, view_request: ViewRequest, truth: Column, kick: Predictor
 ) -> None:
     record = truth.truth
     assert record is not None
     moved = {**record.parameters, "mass": record.parameters["mass"] * 1.05}
-    columns = (*wish.columns, truth)
-    assert all(s.error is None for s in session.frame(replace(wish, parameters=moved, columns=columns)).columns)
-    foreign = tuple(replace(column, fit=fit_to(column.geometry, kick.rest)) for column in wish.columns)
-    at = replace(wish, parameters=record.parameters, columns=(*foreign, truth))
+    columns = (*view_request.columns, truth)
+    assert all(s.error is None for s in session.frame(replace(view_request, parameters=moved, columns=columns)).columns)
+    foreign = tuple(replace(column, fit=fit_to(column.geometry, kick.rest)) for column in view_request.columns)
+    at = replace(view_request, parameters=record.parameters, columns=(*foreign, truth))
     assert all(shown.error is None for shown in session.frame(at).columns)
 
 
-def test_at_rest_a_pose_says_it_all(session: Session, wish: Wish) -> None:
-    shown = session.frame(replace(wish, time=0.0)).columns[0]
+def test_at_rest_a_pose_says_it_all(session: Session, view_request: ViewRequest) -> None:
+    shown = session.frame(replace(view_request, time=0.0)).columns[0]
     assert shown.points is None
     np.testing.assert_allclose(shown.pose, np.eye(4), atol=1e-12)
 
@@ -125,9 +129,9 @@ def test_a_deformation_too_small_to_see_is_left_out(kick: Predictor, size: float
     """Also where its modes, each at its largest, would add up to more."""
     motion = kick.solve(None, None)
     largest = float(np.linalg.norm(motion.local(0.02), axis=1).max())
-    rows = motion.placed.rows * np.float32(size * INVISIBLE / largest)
-    reach = motion.placed.reach * (2.0 * INVISIBLE / motion.deformation_bound(0.02))
-    small = replace(motion, placed=replace(motion.placed, rows=rows, reach=reach))
+    rows = motion.evaluated.rows * np.float32(size * INVISIBLE / largest)
+    reach = motion.evaluated.reach * (2.0 * INVISIBLE / motion.deformation_bound(0.02))
+    small = replace(motion, evaluated=replace(motion.evaluated, rows=rows, reach=reach))
     assert small.deformation_bound(0.02) > INVISIBLE
     assert (visible_deformation(small, 0.02) is not None) == seen
 
@@ -138,52 +142,52 @@ def test_splats_deform_with_the_body(kick: Predictor) -> None:
     splats = GaussianSplats(kick.rest.points, halves @ halves.swapaxes(1, 2), ones[:, None], ones[:, 0])
     columns = Columns.of([Column("splats", kick, splats), Column("mesh", kick, kick.rest)]).all
     session = Session(kick.schema)
-    wish = Wish(session.schema.complete({}), 0.02, "balanced", columns)
-    shown, mesh = session.frame(wish).columns
+    view_request = ViewRequest(session.schema.complete({}), 0.02, "balanced", columns)
+    shown, mesh = session.frame(view_request).columns
     assert shown.covariances is not None
     assert mesh.covariances is None
     turn = shown.pose[:3, :3]
     moved = kick.solve(splats).covariances(0.02)
     np.testing.assert_allclose(turn @ shown.covariances @ turn.T, moved, atol=1e-5 * moved.max())
     assert np.abs(shown.covariances - splats.covariances).max() > 1e-3 * splats.covariances.max()
-    assert session.frame(replace(wish, time=0.0)).columns[0].covariances is None
+    assert session.frame(replace(view_request, time=0.0)).columns[0].covariances is None
 
 
 @pytest.mark.parametrize("time", [float("nan"), float("inf"), -1.0])
-def test_impossible_times_are_refused(session: Session, wish: Wish, time: float) -> None:
+def test_impossible_times_are_refused(session: Session, view_request: ViewRequest, time: float) -> None:
     with pytest.raises(InputError, match="time"):
-        session.frame(replace(wish, time=time))
+        session.frame(replace(view_request, time=time))
 
 
-def test_the_moment_in_words(session: Session, wish: Wish) -> None:
-    assert "between two" in moment_in_words(session.frame(replace(wish, time=0.02)))
-    assert "on a trained frame" in moment_in_words(session.frame(replace(wish, time=0.025)))
-    late = moment_in_words(session.frame(replace(wish, time=1.3)))
+def test_the_moment_in_words(session: Session, view_request: ViewRequest) -> None:
+    assert "between two" in moment_in_words(session.frame(replace(view_request, time=0.02)))
+    assert "on a trained frame" in moment_in_words(session.frame(replace(view_request, time=0.025)))
+    late = moment_in_words(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
-    heavy = moment_in_words(session.frame(replace(wish, parameters={**wish.parameters, "mass": 1.1})))
+    heavy = moment_in_words(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.1})))
     assert "mass" in heavy
 
 
-def test_a_body_below_the_floor_is_remarked(session: Session, wish: Wish) -> None:
-    frame = session.frame(wish)
+def test_a_body_below_the_floor_is_remarked(session: Session, view_request: ViewRequest) -> None:
+    frame = session.frame(view_request)
     sunk = replace(frame.columns[0], depth=0.012)
     assert sunk.sunk
     assert "12 mm below the floor" in moment_in_words(replace(frame, columns=(sunk,)))
 
 
-def test_status_names_solver_error_as_such(session: Session, wish: Wish) -> None:
-    shown = session.frame(wish).columns[0]
-    text = describe(shown, wish.time)
+def test_status_names_solver_error_as_such(session: Session, view_request: ViewRequest) -> None:
+    shown = session.frame(view_request).columns[0]
+    text = describe(shown, view_request.time)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
     assert f"{shown.stats.evaluations} evaluations" in text
     assert "model error here ≈" in text
     assert "a guess" not in text
-    later = replace(wish, time=1.2 * session.schema.window.stop)
+    later = replace(view_request, time=1.2 * session.schema.window.stop)
     assert "⚠ a guess" in describe(session.frame(later).columns[0], later.time)
 
 
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:
-    session, wish = _alone(kick, 0.0)
-    assert 0.005 < session.largest_deformation(wish) < 0.03
+    session, view_request = _alone(kick, 0.0)
+    assert 0.005 < session.largest_deformation(view_request) < 0.03

@@ -14,13 +14,13 @@ from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.predictor import Predictor
 from odeform.types import GaussianSplats, PointCloud
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
-from odeform_viz.gizmos import RegionGizmo
-from odeform_viz.loopback import LoopbackClient
+from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.panels.part import region_like
-from odeform_viz.scene import SceneView
-from odeform_viz.session import Looks, Session, Wish
-from odeform_viz.shaping import describe_fit, shape_from
+from odeform_viz.rendering.gizmos import RegionGizmo
+from odeform_viz.rendering.scene import SceneView
+from odeform_viz.session import DisplayOptions, Session, ViewRequest
 
 BALL, REST = 24_000, 27_482  # splats of the bundled scene
 
@@ -65,9 +65,9 @@ def test_what_stands_still_is_sent_once_for_all_columns(
     fit = shape_from("volleyball", kick.rest)
     columns = Columns.of([Column(name, kick, fit.geometry, fit=fit) for name in ("a", "b")])
     session, view = Session(kick.schema), SceneView(server, 0.2, 2)
-    wish = Wish(session.schema.complete({}), 0.01, "balanced", columns.all)
+    request = ViewRequest(session.schema.complete({}), 0.01, "balanced", columns.all)
     for time in (0.01, 0.02):
-        view.publish(session.frame(replace(wish, time=time)), Looks(), None)
+        view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
     assert sorted(made) == [
         ("/world/column_0/body/splats", BALL),
         ("/world/column_1/body/splats", BALL),
@@ -77,7 +77,7 @@ def test_what_stands_still_is_sent_once_for_all_columns(
     assert not view._floor.visible
     # back to the trained body: it goes, and the floor of the viewer is there again
     columns.reshape(None)
-    view.publish(session.frame(replace(wish, columns=columns.all)), Looks(), None)
+    view.publish(session.frame(replace(request, columns=columns.all)), DisplayOptions(), None)
     assert view._still is None
     assert view._floor.visible
 
@@ -100,8 +100,8 @@ def test_small_splats_keep_their_size_as_float16(
         covariances = np.tile(sigma**2 * np.eye(3), (count, 1, 1))
         splats = GaussianSplats(kick.rest.points, covariances, np.ones((count, 1, 3)), np.ones(count))
         session, columns = Session(kick.schema), Columns.of([Column("splats", kick, splats)]).all
-        wish = Wish(session.schema.complete({}), 0.0, "balanced", columns)
-        SceneView(server, 0.2, 1).publish(session.frame(wish), Looks(), None)
+        request = ViewRequest(session.schema.complete({}), 0.0, "balanced", columns)
+        SceneView(server, 0.2, 1).publish(session.frame(request), DisplayOptions(), None)
         shown, scale = sent[-1]
         assert np.allclose(
             scale**2 * shown.astype(np.float16).astype(float), covariances, rtol=1e-3, atol=1e-3 * sigma**2
@@ -193,11 +193,11 @@ def test_a_region_of_another_kind_is_about_the_same(kick: Predictor) -> None:
 def test_too_many_points_are_refused_or_thinned_out_with_a_word(
     kick: Predictor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("odeform_viz.shaping.MOST_POINTS", 30_000)
+    monkeypatch.setattr("odeform_viz.fitting.MOST_POINTS", 30_000)
     fit = shape_from("volleyball", kick.rest)
     assert len(fit.source.points) == 30_000
     assert "the 30,000 most visible of 51,482 splats" in describe_fit(fit, "volleyball", kick.rest)
     cloud = PointCloud(np.random.default_rng(0).normal(size=(30_001, 3)))
-    monkeypatch.setattr("odeform_viz.shaping.read_shape", lambda _: (cloud, None))
+    monkeypatch.setattr("odeform_viz.fitting.read_shape", lambda _: (cloud, None))
     with pytest.raises(ValueError, match="30,001 points; expected at most 30,000"):
         shape_from("cloud.ply", kick.rest)

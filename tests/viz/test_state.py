@@ -13,8 +13,8 @@ from odeform.geometry.shape import fit_to
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.predictor import load
 from odeform_viz.columns import Column, Columns, truth_column
-from odeform_viz.session import Looks, Wish
-from odeform_viz.shaping import fit_from_json, fit_to_json, shape_from
+from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
+from odeform_viz.session import DisplayOptions, ViewRequest
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 
 SCENE = "mass-elastic"
@@ -23,21 +23,21 @@ TRUTH = {**MODEL, "origin": "nowhere/x", "truth": True}
 
 
 @pytest.fixture(scope="module")
-def wish() -> Wish:
+def view_request() -> ViewRequest:
     model = load(SCENE)
     at = model.schema.complete({"mass": 0.31})
     columns = Columns.of([Column("odeform", model, model.rest, origin=SCENE)])
     columns.add(Column("heavy", model, model.rest, origin=SCENE, pinned={**at, "mass": 0.9}))
     columns.add(truth_column(f"{SCENE}/mass-elastic_00001"))
     columns.show(columns.all[0].key, False)
-    return Wish(at, 0.271, "draft", columns.all)
+    return ViewRequest(at, 0.271, "draft", columns.all)
 
 
-def test_what_is_restored_is_what_was_saved(wish: Wish) -> None:
-    looks = Looks(overlay=True, heat=False)
-    state = state_from_json(state_to_json(capture(SCENE, wish, looks)), SCENE)
-    columns = columns_of(state, wish.columns[0].source.schema)
-    again = capture(SCENE, Wish(state.parameters, state.time, state.quality, tuple(columns)), looks)
+def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
+    looks = DisplayOptions(overlay=True, heat=False)
+    state = state_from_json(state_to_json(capture(SCENE, view_request, looks)), SCENE)
+    columns = columns_of(state, view_request.columns[0].source.schema)
+    again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks)
     assert again == state
     assert [c.label for c in columns] == ["odeform", "heavy", "truth"]
     assert [c.shown for c in columns] == [False, True, True]
@@ -59,35 +59,37 @@ def test_what_is_restored_is_what_was_saved(wish: Wish) -> None:
         (lambda s: json.dumps([s]).encode(), "format 1"),
     ],
 )
-def test_other_files_are_refused(wish: Wish, broken: Callable[[dict], bytes], said: str) -> None:
-    whole = json.loads(state_to_json(capture(SCENE, wish, Looks())))
+def test_other_files_are_refused(view_request: ViewRequest, broken: Callable[[dict], bytes], said: str) -> None:
+    whole = json.loads(state_to_json(capture(SCENE, view_request, DisplayOptions())))
     with pytest.raises(InputError, match=said):
         state_from_json(broken(whole), SCENE)
 
 
 @pytest.mark.parametrize("wrong", [{"parameters": {"mass": "x"}}, {"parameters": [1]}, {"columns": [MODEL, TRUTH]}])
-def test_wrong_values_are_refused_when_columns_are_made(wish: Wish, wrong: dict) -> None:
-    raw = {**json.loads(state_to_json(capture(SCENE, wish, Looks()))), **wrong}
+def test_wrong_values_are_refused_when_columns_are_made(view_request: ViewRequest, wrong: dict) -> None:
+    raw = {**json.loads(state_to_json(capture(SCENE, view_request, DisplayOptions()))), **wrong}
     with pytest.raises(InputError):
-        columns_of(state_from_json(json.dumps(raw).encode(), SCENE), wish.columns[0].source.schema)
+        columns_of(state_from_json(json.dumps(raw).encode(), SCENE), view_request.columns[0].source.schema)
 
 
-def test_a_missing_checkpoint_is_named(wish: Wish) -> None:
-    state = capture(SCENE, wish, Looks())
+def test_a_missing_checkpoint_is_named(view_request: ViewRequest) -> None:
+    state = capture(SCENE, view_request, DisplayOptions())
     lost = json.loads(state_to_json(state))
     lost["columns"][0]["origin"] = "nowhere.safetensors"
     with pytest.raises(InputError, match="nowhere"):
-        columns_of(state_from_json(json.dumps(lost).encode(), SCENE), wish.columns[0].source.schema)
+        columns_of(state_from_json(json.dumps(lost).encode(), SCENE), view_request.columns[0].source.schema)
 
 
-def test_a_shape_its_part_and_its_place_are_kept(wish: Wish) -> None:
-    (model,) = {c.predictor for c in wish.columns if c.predictor and c.pinned is None}
+def test_a_shape_its_part_and_its_place_are_kept(view_request: ViewRequest) -> None:
+    (model,) = {c.predictor for c in view_request.columns if c.predictor and c.pinned is None}
     guessed = shape_from("volleyball", model.rest)
     turned = Similarity(1.1 * guessed.place.factor, UPRIGHT["+x"] @ guessed.place.rotation, guessed.place.shift)
     region = Sphere(guessed.region.centre + 0.5 * guessed.region.radius, guessed.region.radius)
     fit = replace(fit_to(guessed.source, model.rest, region, place=turned), origin="volleyball")
-    columns = Columns.of([replace(wish.columns[0], geometry=fit.geometry, fit=fit)])
-    state = state_from_json(state_to_json(capture(SCENE, replace(wish, columns=columns.all), Looks())), SCENE)
+    columns = Columns.of([replace(view_request.columns[0], geometry=fit.geometry, fit=fit)])
+    state = state_from_json(
+        state_to_json(capture(SCENE, replace(view_request, columns=columns.all), DisplayOptions())), SCENE
+    )
     assert state.shape is not None
     again = fit_from_json(state.shape, model.rest)
     np.testing.assert_array_equal(again.geometry.points, fit.geometry.points)
@@ -95,7 +97,7 @@ def test_a_shape_its_part_and_its_place_are_kept(wish: Wish) -> None:
     assert again.origin == "volleyball"
     # what was uploaded is in no file here
     nowhere = replace(columns.all[0], fit=replace(fit, origin=""))
-    lost = capture(SCENE, replace(wish, columns=(nowhere,)), Looks())
+    lost = capture(SCENE, replace(view_request, columns=(nowhere,)), DisplayOptions())
     assert lost.shape is None
     assert "uploaded" in lost.notes[0]
 
@@ -111,8 +113,8 @@ def test_a_shape_its_part_and_its_place_are_kept(wish: Wish) -> None:
         {"place": {}},
     ],
 )
-def test_a_wrong_shape_is_refused(wish: Wish, wrong: dict) -> None:
-    body = next(c.predictor.rest for c in wish.columns if c.predictor)
+def test_a_wrong_shape_is_refused(view_request: ViewRequest, wrong: dict) -> None:
+    body = next(c.predictor.rest for c in view_request.columns if c.predictor)
     whole = fit_to_json(shape_from("volleyball", body))
     with pytest.raises(InputError):
         fit_from_json({**whole, **wrong}, body)

@@ -6,9 +6,9 @@ import numpy as np
 
 from odeform.predictor import Predictor, load
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import MOST, Column
-from odeform_viz.loopback import LoopbackClient
-from odeform_viz.scene import COLORS, color_of
+from odeform_viz.rendering.scene import COLORS, color_of
 
 Kicked = tuple[App, LoopbackClient]
 Serve = Callable[..., Kicked]
@@ -43,7 +43,7 @@ def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Pre
     assert moved is not None
     # what did not move is not sent again, or sent as it was
     still = kick.solve(kick.rest, {"mass": 0.6}).deformed(0.03)
-    assert client.until(lambda: app._shown is not None and app._shown.wish.parameters["mass"] == 0.9)
+    assert client.until(lambda: app._shown is not None and app._shown.request.parameters["mass"] == 0.9)
     assert app._shown is not None
     np.testing.assert_array_equal(app._shown.columns[1].points, still)
 

@@ -1,7 +1,7 @@
 """Help: for each client alone, and it names every key."""
 
 from odeform_viz.app import App
-from odeform_viz.loopback import LoopbackClient
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.help import TABS
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from odeform.predictor import Predictor
-from odeform_viz import notices
 from odeform_viz.app import App
-from odeform_viz.loopback import LoopbackClient
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.parameters import OWN, presets, samples_svg, slider_range, slider_step
+from odeform_viz.runtime import notices
 
 Kicked = tuple[App, LoopbackClient]
 

@@ -8,17 +8,17 @@ import pytest
 
 from odeform.predictor import Predictor
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
-from odeform_viz.loopback import LoopbackClient
 from odeform_viz.panels.plots import Line, cursor_svg, plots_svg
-from odeform_viz.session import Session, Wish
+from odeform_viz.session import Session, ViewRequest
 
 
 @pytest.fixture(scope="module")
 def line(drop: Predictor) -> Line:
     session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest)]).all
-    wish = Wish(session.schema.complete({}), 0.3, "balanced", columns)
-    return ("odeform", (206, 78, 26), session.curves(session.frame(wish).columns[0], wish))
+    request = ViewRequest(session.schema.complete({}), 0.3, "balanced", columns)
+    return ("odeform", (206, 78, 26), session.curves(session.frame(request).columns[0], request))
 
 
 def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:

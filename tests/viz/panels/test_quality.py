@@ -6,14 +6,14 @@ import pytest
 
 from odeform.predictor import Predictor, load
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
-from odeform_viz.loopback import LoopbackClient
 from odeform_viz.panels.quality import WITHIN_MM, WITHIN_MS, quality_names
 from odeform_viz.session import quality_of
 
 
 def chosen(app: App) -> dict[str, object]:
-    quality = app.wish().quality
+    quality = app.request().quality
     return json.loads(quality) if quality.startswith("{") else {}
 
 
@@ -51,9 +51,9 @@ def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: 
     assert app._quality is not None
     setting = json.dumps(kick.frontier[1].quality.to_json())
     app._quality.set(setting)
-    assert app.wish().quality == setting
+    assert app.request().quality == setting
     app._quality.set("draft")
-    assert app.wish().quality == "draft"
+    assert app.request().quality == "draft"
     client.set("at most (mm)", -1.0)
     client.set("quality", WITHIN_MM)
     assert client.until(lambda: "expected a positive bound" in client.text())
@@ -67,7 +67,7 @@ def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
 
 
 def test_settings_without_sense_are_refused(kick: Predictor) -> None:
-    for wished in ("{", '{"method": "rk5", "step": 1}', '{"step": 0.1}', '{"method": "rk4", "step": "x"}'):
+    for requested in ("{", '{"method": "rk5", "step": 1}', '{"step": 0.1}', '{"method": "rk4", "step": "x"}'):
         with pytest.raises(ValueError, match=r"quality|solver"):
-            quality_of(kick, wished)
+            quality_of(kick, requested)
     assert quality_of(kick, "unknown") == "balanced"

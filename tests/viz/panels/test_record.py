@@ -12,8 +12,8 @@ import trimesh
 from odeform.dataset.store import open_dataset
 from odeform.predictor import Predictor, load
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, truth_column
-from odeform_viz.loopback import LoopbackClient
 
 View = tuple[App, LoopbackClient]
 STATE = "odeform-mass-elastic.json"

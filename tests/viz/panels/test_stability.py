@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from odeform_viz.app import App
-from odeform_viz.jobs import Send
-from odeform_viz.loopback import LoopbackClient
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels import stability
+from odeform_viz.runtime.jobs import Send
 
 
 def small(send: Send, checkpoint: str) -> np.ndarray:

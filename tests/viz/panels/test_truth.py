@@ -9,32 +9,32 @@ import numpy as np
 import pytest
 
 from odeform.dataset.store import open_dataset
-from odeform.model.odeform import ODeform
+from odeform.models.odeform.model import ODeform
 from odeform.predictor import Predictor, load
-from odeform.simulation import kick as kick_scene
-from odeform.types import Sequence
+from odeform.simulation.scenes import kick as kick_scene
+from odeform.types import MotionSequence
 from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
-from odeform_viz.jobs import Send
-from odeform_viz.loopback import LoopbackClient
 from odeform_viz.panels import truth
 from odeform_viz.panels.truth import NONE, OTHER, entry_label, other_physics
+from odeform_viz.runtime.jobs import Send
 
 View = tuple[App, LoopbackClient]
 ENTRIES = open_dataset("mass-elastic").select("test")
 
 
-def coarse(send: Send, scene: str, parameters: dict[str, float], rate: float) -> Sequence:
+def coarse(send: Send, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     """A kick of a quarter of the vertices; in this module, for the job's process to find it."""
     assert scene == "kick"
     return replace(kick_scene.SCENE, step=2e-3).simulate(parameters, rate=rate, report=send, segments=4)
 
 
-def at_rest(send: Send, scene: str, parameters: dict[str, float], rate: float) -> Sequence:
+def at_rest(send: Send, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     rest = load(scene).rest
     frames = np.tile(rest.points, (3, 1, 1))
     weights = np.full(len(rest.points), 1.0 / len(rest.points), dtype=np.float32)
-    return Sequence(np.arange(3) / rate, frames, rest.faces, weights, parameters)
+    return MotionSequence(np.arange(3) / rate, frames, rest.faces, weights, parameters)
 
 
 def endless(send: Send, scene: str, parameters: dict[str, float], rate: float) -> None:

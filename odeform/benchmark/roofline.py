@@ -1,0 +1,91 @@
+"""What this machine can do at most, and what share of it decoding reaches."""
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from odeform.benchmark.probes import round_cloud
+from odeform.benchmark.timing import milliseconds, typical
+from odeform.models.reduced_model import ReducedModel
+from odeform.motion.evaluated_basis import evaluate_basis
+
+__all__ = ["least_ms", "limits", "scaling"]
+
+SIDE = 2048  # of the matrices that are multiplied
+BYTES = 256 << 20  # that are copied
+THREADS = os.cpu_count() or 1
+POINTS = 100_000
+FRAMES = 20
+
+
+def gemm_gflops() -> float:
+    """Best of five products of square matrices, single precision."""
+    rng = np.random.default_rng(0)
+    a, b = rng.normal(size=(2, SIDE, SIDE)).astype(np.float32)
+    out = np.empty_like(a)
+    best = milliseconds(lambda _: np.matmul(a, b, out=out), 5, warm=1).min()
+    return 2.0 * SIDE**3 / best / 1e6
+
+
+def memory_gb_s() -> float:
+    """Best of five copies, read and written bytes counted, on all threads."""
+    source, target = np.ones((2, BYTES // 4), dtype=np.float32)
+    parts = [slice(i * len(source) // THREADS, (i + 1) * len(source) // THREADS) for i in range(THREADS)]
+    with ThreadPoolExecutor(THREADS) as pool:
+        best = milliseconds(
+            lambda _: list(pool.map(lambda part: np.copyto(target[part], source[part]), parts)), 5, warm=1
+        ).min()
+    return 2.0 * BYTES / best / 1e6
+
+
+def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -> float:
+    """What decoding takes where either arithmetic or memory is all that counts, whichever binds.
+
+    A frame reads the modes, the points at rest and those it adds them to, and writes the result; frames that are
+    decoded together read all that once.
+    """
+    read = 4.0 * points * (3 * modes + 4 + 3)
+    written = 4.0 * points * 3 * frames
+    operations = 2.0 * points * frames * (3 * modes + 9 + 12)
+    return max((read + written) / gb_s, operations / gflops) / 1e6
+
+
+def limits(predictor: ReducedModel) -> dict[str, Any]:
+    """Rates of this machine, and the share of them at which points are decoded, a frame or `FRAMES` at once.
+
+    From coordinates to points: a motion keeps the coordinates of the moments that it was asked for last.
+    """
+    gflops, gb_s = gemm_gflops(), memory_gb_s()
+    motion = predictor.solve(round_cloud(POINTS, predictor))
+    window = predictor.schema.window
+    times = np.linspace(window.start, window.stop, FRAMES)
+    modes = len(motion.evaluated.values)
+    one = typical(lambda _: motion.vertices(float(times[FRAMES // 2])), 40)
+    many = typical(lambda _: motion.vertices(times), 10)
+    return {
+        "gemm_gflops": gflops,
+        "memory_gb_s": gb_s,
+        "modes": modes,
+        "decode_ms": one,
+        "decode_share_of_limit": least_ms(POINTS, modes, 1, gflops, gb_s) / one,
+        f"decode_{FRAMES}_frames_ms": many,
+        f"decode_{FRAMES}_frames_share_of_limit": least_ms(POINTS, modes, FRAMES, gflops, gb_s) / many,
+    }
+
+
+def scaling(predictor: ReducedModel, sizes: Sequence[int]) -> list[dict[str, Any]]:
+    """Solve, basis, and decode of one frame from its coordinates, over the number of points."""
+    window = predictor.schema.window
+    moment = 0.5 * (window.start + window.stop)
+    rows = []
+    for points in sizes:
+        shape = round_cloud(points, predictor)
+        motion = predictor.solve(shape)
+        basis = float(milliseconds(lambda _, on=motion: evaluate_basis(on.geometry, on.space, 0.0), 1, warm=0)[0])
+        solve = typical(lambda _, shape=shape: predictor.solve(shape), 20)
+        decode = typical(lambda _, motion=motion: motion.vertices(moment), 30)
+        rows.append({"points": points, "solve_ms": solve, "basis_ms": basis, "decode_ms": decode})
+    return rows

@@ -1,0 +1,108 @@
+"""A folder of mesh frames: a sub-folder a sequence with its frames as .obj or .ply, and a table of parameters.
+
+The table, `parameters.csv`, has a row a sequence: a column `sequence` that names the sub-folder, and one for each
+parameter, its unit in brackets if it has one: `mass (kg)`. A column `split` (train, val, test) and a column `rate` (Hz,
+the same in all rows) may be there. `parameters.json` is a list of such rows as objects.
+"""
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from odeform.dataset.importers.naming import in_order, subfolders
+from odeform.dataset.importers.source import Found, Source
+from odeform.errors import InputError
+from odeform.formats.geometry_files import read_geometry
+from odeform.types import Faces, Frames, Mesh
+
+__all__ = ["TABLES", "mesh_source", "table_of"]
+
+ENDINGS = (".obj", ".ply")
+TABLES = ("parameters.csv", "parameters.json")
+SEQUENCE, SPLIT, RATE = "sequence", "split", "rate"
+SPLITS = ("train", "val", "test")
+
+Row = Mapping[Any, Any]
+
+
+def table_of(root: Path) -> Path | None:
+    """The table of parameters in a folder; None without one."""
+    return next((root / name for name in TABLES if (root / name).is_file()), None)
+
+
+def mesh_source(root: Path, table: Path, rate: float | None = None) -> Source:
+    """All sequences of the table. `rate` in Hz, unless the table says. `InputError` in one line for what is wrong."""
+    rows = _rows(table)
+    folders = {folder.name: folder for folder in subfolders(root)}
+    sequences, units = [], {}
+    for row in rows:
+        name = str(row.get(SEQUENCE, ""))
+        if name not in folders:
+            raise InputError(f"import {table}: sequence {name!r}: there is no such folder in {root}")
+        split = str(row.get(SPLIT) or "")
+        if split not in ("", *SPLITS):
+            raise InputError(f"import {table}: {name}: split: expected {', '.join(SPLITS)}, got {split!r}")
+        parameters = {}
+        for column, value in row.items():
+            if column not in (SEQUENCE, SPLIT, RATE):
+                parameter, _, unit = column.partition("(")
+                units[parameter.strip()] = unit.rstrip(") ")
+                parameters[parameter.strip()] = _number(value, f"import {table}: {name}: {column}")
+        files = in_order(path for path in folders[name].iterdir() if path.suffix.lower() in ENDINGS)
+        sequences.append(Found(name, parameters, len(files), lambda files=files: _read(files), split))
+    if len({found.name for found in sequences}) != len(sequences):
+        raise InputError(f"import {table}: expected each sequence once")
+    made = {"imported": root.name, "layout": "meshes"}
+    return Source(f"imported-{root.name}", _rate(rows, table, rate), tuple(sequences), units, provenance=made)
+
+
+def _rows(table: Path) -> list[Row]:
+    try:
+        text = table.read_text(encoding="utf-8-sig")
+        if table.suffix == ".json":
+            rows = json.loads(text)
+            if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+                raise ValueError("expected a list of objects, one a sequence")
+        else:
+            rows: list[Row] = [*csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)]
+            if any(None in row or None in row.values() for row in rows):
+                raise ValueError("expected as many cells in each row as in the first")
+    except (OSError, ValueError, csv.Error) as error:
+        raise InputError(f"import {table}: cannot be read: {error}") from None
+    if not rows or not all(SEQUENCE in row for row in rows):
+        raise InputError(f"import {table}: expected rows with a column {SEQUENCE!r}")
+    return rows
+
+
+def _rate(rows: list[Row], table: Path, asked: float | None) -> float:
+    said = {_number(row[RATE], f"import {table}: {RATE}") for row in rows if row.get(RATE) not in (None, "")}
+    if asked is not None:
+        said = {asked}
+    if len(said) != 1 or not 0.0 < min(said) < float("inf"):
+        raise InputError(
+            f"import {table}: expected one rate in Hz, in a column {RATE!r} or by --rate, got {sorted(said)}"
+        )
+    return said.pop()
+
+
+def _number(value: Any, where: str) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: expected a number, got {value!r}") from None
+
+
+def _read(files: list[Path]) -> tuple[Frames, Faces]:
+    meshes = []
+    for file in files:
+        mesh = read_geometry(file, merge=False)
+        if not isinstance(mesh, Mesh):
+            raise InputError(f"import {file}: expected a mesh, got points")
+        if meshes and (mesh.points.shape != meshes[0].points.shape or not np.array_equal(mesh.faces, meshes[0].faces)):
+            raise InputError(f"import {file}: expected the mesh of {files[0].name}, got another")
+        meshes.append(mesh)
+    return np.stack([mesh.points for mesh in meshes]), meshes[0].faces

@@ -1,0 +1,74 @@
+"""Splats as SuperSplat compresses them: 16 bytes each, as shares of the extent of their chunk of 256, in a .ply.
+
+https://developer.playcanvas.com/user-manual/gaussian-splatting/formats/ply/. Older files have no extent of colours,
+which are shares of [0, 1] then. An element `sh` has a byte for each further harmonic.
+"""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.formats.ply import Table, columns
+from odeform.formats.splat_inria import harmonic_columns
+from odeform.geometry.ellipsoids import covariances_from_axes, with_fourth
+from odeform.types import SH0, Floats, GaussianSplats, Harmonics, Points
+
+__all__ = ["compressed_splats"]
+
+CHUNK = 256
+
+
+def compressed_splats(tables: dict[str, Table], path: Path) -> GaussianSplats:
+    """The elements vertex and chunk, and sh if there is one -> splats."""
+    table, chunks, sh = tables["vertex"], tables.get("chunk"), tables.get("sh")
+    count = len(table)
+    if chunks is None or len(chunks) * CHUNK < count:
+        expected, got = -(-count // CHUNK), 0 if chunks is None else len(chunks)
+        raise InputError(f"geometry {path}: expected {expected} chunks for {count} splats, got {got}")
+    if sh is not None and len(sh) != count:
+        raise InputError(f"geometry {path}: expected harmonics of {count} splats, got {len(sh)}")
+
+    def words(name: str) -> Table:
+        if name not in (table.dtype.names or ()):
+            raise InputError(f"geometry {path}: compressed splats without {name}")
+        return table[name].astype(np.uint32)
+
+    def spread(shares: Points, names: str) -> Points:
+        """Shares of the extent of each chunk -> values."""
+        low, high = (columns(chunks, [f"{end}_{name}" for name in names.split()], path) for end in ("min", "max"))
+        low, high = (np.repeat(end, CHUNK, axis=0)[:count] for end in (low, high))
+        return low * (1.0 - shares) + high * shares
+
+    rgba = words("packed_color").astype(">u4").view("u1").reshape(-1, 4) / 255.0
+    colors = spread(rgba[:, :3], "r g b") if "min_r" in (chunks.dtype.names or ()) else rgba[:, :3]
+    harmonics = ((colors - 0.5) / SH0).astype(np.float32)[:, None]
+    if sh is not None:
+        harmonics = np.concatenate([harmonics, _further(sh, path)], axis=1)
+    scales = np.exp(spread(_shares(words("packed_scale")), "scale_x scale_y scale_z"))
+    return GaussianSplats(
+        spread(_shares(words("packed_position")), "x y z").astype(np.float32),
+        covariances_from_axes(scales, _quaternions(words("packed_rotation"))),
+        harmonics,
+        rgba[:, 3],
+    )
+
+
+def _further(sh: Table, path: Path) -> Harmonics:
+    names = harmonic_columns(sh, path)
+    level = columns(sh, list(itertools.chain(*names)), path)
+    # the middle of each step, but both ends exactly
+    share = np.where(level == 0.0, 0.0, np.where(level == 255.0, 1.0, (level + 0.5) / 256.0))
+    return (8.0 * (share - 0.5)).astype(np.float32).reshape(len(sh), len(names), 3)
+
+
+def _shares(packed: Table) -> Points:
+    """(N,) words of 11, 10 and 11 bits -> (N, 3) in [0, 1]."""
+    return np.stack([(packed >> 21) / 2047.0, (packed >> 11 & 1023) / 1023.0, (packed & 2047) / 2047.0], axis=1)
+
+
+def _quaternions(packed: Table) -> Floats:
+    """(N,) words of 2 bits for which component is the largest, and 10 for each other -> (N, 4), w first."""
+    others = np.stack([packed >> 20 & 1023, packed >> 10 & 1023, packed & 1023], axis=1)
+    return with_fourth((others / 1023.0 - 0.5) * np.sqrt(2.0), packed >> 30)

@@ -1,0 +1,113 @@
+"""Parameters within their trained range that explain an observation best: Levenberg and Marquardt, several starts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from odeform.identification.discrepancy import Discrepancy
+from odeform.identification.linear import Comparison, Linear
+from odeform.types import Floats
+
+__all__ = ["Fit", "fit", "normal_equations"]
+
+STARTS, REFINED, MOST_REFINED = 16, 2, 5
+ROUNDS = 12
+CLOSE = 1e-2  # squared standard deviations: not even an undamped step promises more
+DAMPING = (1e-3, 0.2, 5.0)  # at first; its change by a good step, and by a bad one
+LARGEST = 1e6
+COARSE = (16, 40)  # points and frames that starts are compared on
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """`theta` (P,) in [-1, 1], its `information` (P, P), and `misfit`, the mean square of the residuals in what is
+    expected of them: 1 or less where model and noise explain what was seen."""
+
+    theta: Floats
+    information: Floats
+    misfit: float
+
+
+def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tuple[Floats, Floats, float]:
+    """J' C^-1 J (P, P), J' C^-1 r (P,) and r' C^-1 r, of r with covariance C = noise^2 + spread variances spread'.
+
+    Woodbury's identity: never more than 6 + K unknowns a frame, and fewer points than those are no trouble.
+    """
+    square, deviations = noise_mm**2, np.sqrt(variances)[:, :, None]
+    turned = linear.spread.swapaxes(1, 2)
+    normal, pulled = turned @ linear.spread, turned @ linear.off[..., None]
+    causes = np.arange(normal.shape[1])
+    inner = deviations * normal * deviations.swapaxes(1, 2)
+    inner[:, causes, causes] += square
+    known = np.concatenate([deviations * (normal @ linear.gain), deviations * pulled], axis=2)
+    solved = np.linalg.solve(inner, known)
+    gain = linear.gain / deviations
+    information = np.einsum("tkp,tkq->pq", gain, solved[..., :-1])
+    score = np.einsum("tkp,tk->p", gain, solved[..., -1])
+    cost = float((linear.off**2).sum() - (known[..., -1] * solved[..., -1]).sum()) / square
+    return 0.5 * (information + information.T), score, cost
+
+
+def fit(comparison: Comparison, discrepancy: Discrepancy, progress: Callable[[Floats], None] = lambda _: None) -> Fit:
+    """Starts spread over the box (Sobol points) are compared, the best are refined, and the best of those wins. More
+    are refined as long as none explains what was seen. `progress` is told where each step arrives."""
+    coarse = Comparison(comparison.predictor, comparison.observation.thinned(*COARSE))
+    size = len(comparison.predictor.schema.learned)
+    # after the corner that the points begin with comes the middle of the box
+    spread = 2.0 * qmc.Sobol(size, scramble=False).random(STARTS)[1:] - 1.0
+
+    def cost(theta: Floats) -> float:
+        observation = coarse.observation
+        linear = discrepancy.less_mean(coarse.at(theta, sloped=False), theta, observation.times)
+        return normal_equations(linear, discrepancy.at(observation.times), observation.noise_mm)[2]
+
+    refined: list[Fit] = []
+    for start in sorted(spread, key=cost)[:MOST_REFINED]:
+        if len(refined) >= REFINED and min(one.misfit for one in refined) <= 1.0:
+            break
+        refined.append(_refined(comparison, discrepancy, start, progress))
+    return min(refined, key=lambda one: one.misfit)
+
+
+def _refined(
+    comparison: Comparison, discrepancy: Discrepancy, start: Floats, progress: Callable[[Floats], None]
+) -> Fit:
+    observation = comparison.observation
+    variances = discrepancy.at(observation.times)
+
+    def look(theta: Floats) -> tuple[Floats, Floats, float]:
+        linear = discrepancy.less_mean(comparison.at(theta), theta, observation.times)
+        return normal_equations(linear, variances, observation.noise_mm)
+
+    theta, damping = start, DAMPING[0]
+    information, score, cost = look(theta)
+    for _ in range(ROUNDS):
+        progress(theta)
+        promised = _bounded_step(information, score, theta, 0.0)
+        if promised @ information @ promised < CLOSE or damping > LARGEST:
+            break
+        step = _bounded_step(information, score, theta, damping)
+        ahead = look(theta + step)
+        if ahead[2] < cost:
+            theta, (information, score, cost), damping = theta + step, ahead, damping * DAMPING[1]
+        else:
+            damping *= DAMPING[2]
+    return Fit(theta, information, cost / observation.positions.size)
+
+
+def _bounded_step(information: Floats, score: Floats, theta: Floats, damping: float) -> Floats:
+    """The damped Gauss-Newton step within the box: parameters that it pushes out stop at their bound, and the others
+    are solved for once more."""
+    damped = information + damping * np.diag(np.diag(information)) + 1e-12 * np.eye(len(theta))
+    step, free = np.zeros(len(theta)), np.ones(len(theta), dtype=bool)
+    while free.any():
+        left = score - damped @ np.where(free, 0.0, step)
+        step[free] = np.linalg.solve(damped[np.ix_(free, free)], left[free])
+        out = free & (np.abs(theta + step) > 1.0)
+        if not out.any():
+            break
+        step[out] = np.sign(theta[out] + step[out]) - theta[out]
+        free &= ~out
+    return step

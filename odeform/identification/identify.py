@@ -1,0 +1,77 @@
+"""Physical parameters from an observed motion, all together, each with how sure that is."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from odeform.identification.discrepancy import TWO_SIDED, Discrepancy
+from odeform.identification.fit import Fit, fit
+from odeform.identification.linear import Comparison
+from odeform.identification.observation import Observation
+from odeform.predictor import Predictor
+from odeform.schema import Parameter
+from odeform.types import Floats
+
+__all__ = ["Identification", "Identified", "identify"]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """One parameter: the value found, and the interval that holds nine in ten truths, within the trained range.
+
+    `identifiable` is whether that interval was narrower than the trained range: a motion that leaves more than that
+    open says nothing. `unit` and `reach` are the value and half the interval with the trained range as [-1, 1].
+    """
+
+    value: float
+    low: float
+    high: float
+    identifiable: bool
+    unit: float
+    reach: float
+
+
+@dataclass(frozen=True)
+class Identification:
+    """`parameters` by name; `misfit` is 1 or less where model and noise explain what was seen."""
+
+    parameters: dict[str, Identified]
+    misfit: float
+    seconds: float
+
+
+def identify(
+    predictor: Predictor,
+    observation: Observation,
+    discrepancy: Discrepancy,
+    progress: Callable[[dict[str, float]], None] = lambda _: None,
+) -> Identification:
+    """Parameters of the motion that was observed, by least squares that weigh noise and the model's own error.
+
+    `discrepancy` comes from `odeform.identification.discrepancy.calibrate`. Takes about a second.
+    `progress` is told the parameters after each step; what it raises ends the search.
+    """
+    begin = time.perf_counter()
+
+    def tell(theta: Floats) -> None:
+        progress({p.name: p.denormalise(float(unit)) for p, unit in zip(predictor.schema.learned, theta, strict=True)})
+
+    found = fit(Comparison(predictor, observation.thinned()), discrepancy, tell)
+    reaches = _reaches(found)
+    pairs = zip(predictor.schema.learned, found.theta, reaches, strict=True)
+    parameters = {p.name: _identified(p, float(unit), float(reach)) for p, unit, reach in pairs}
+    return Identification(parameters, found.misfit, time.perf_counter() - begin)
+
+
+def _reaches(found: Fit) -> Floats:
+    """(P,) half the intervals: from the curvature, and wider where what was seen is not explained."""
+    size = len(found.theta)
+    covariance = np.linalg.inv(found.information + 1e-6 * np.eye(size))
+    return TWO_SIDED * np.sqrt(np.diag(covariance) * max(found.misfit, 1.0))
+
+
+def _identified(parameter: Parameter, unit: float, reach: float) -> Identified:
+    low, high = (parameter.denormalise(float(np.clip(unit + side * reach, -1.0, 1.0))) for side in (-1.0, 1.0))
+    return Identified(parameter.denormalise(unit), low, high, reach < 1.0, unit, reach)

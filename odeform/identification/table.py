@@ -1,0 +1,131 @@
+"""Identification over a split, scored where the parameters are known (as the paper's Table V, one at a time there)."""
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.dataset.index import Dataset, Entry
+from odeform.errors import InputError
+from odeform.identification.discrepancy import NOMINAL, Discrepancy, calibrate
+from odeform.identification.identify import Identification, Identified, identify
+from odeform.identification.observation import Observation, View, observe
+from odeform.parallel import parallel_map
+from odeform.predictor import Predictor
+from odeform.progress import Progress
+from odeform.schema import Parameter, Parameters
+
+__all__ = ["identify_split", "report"]
+
+CALIBRATION = "val"
+TOGETHER = 4  # sequences that a process is given at once
+
+
+def identify_split(
+    predictor: Predictor, dataset: Dataset, split: str = "test", limit: int | None = None, view: View | None = None
+) -> dict[str, Any]:
+    """Scores and a row for each of the first `limit` sequences, as far as `view` sees them (default: whole).
+
+    On every core; `seconds` is what a sequence takes by the clock on all of them, in each row what it took on its own.
+    """
+    if predictor.schema.scene != dataset.schema.scene:
+        raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {dataset.schema.scene}")
+    seen = view or View()
+    entries = dataset.select(split)[:limit]
+    if not entries:
+        raise InputError(f"{dataset.root}: no sequence in split {split}")
+    if split in (CALIBRATION, "all"):
+        print(f"note: intervals are calibrated on {CALIBRATION}, which is among what is scored", file=sys.stderr)
+    discrepancy = _calibrated(predictor, dataset)
+    observed = [(entry, observe(dataset.read(entry), predictor.schema, seen)) for entry in entries]
+    work = partial(_rows, type(predictor), predictor.checkpoint, discrepancy)
+    begin = time.perf_counter()
+    rows = parallel_map(f"identify {dataset.schema.scene}", work, observed, TOGETHER)
+    seconds = (time.perf_counter() - begin) / len(rows)
+    return {
+        "model": predictor.model,
+        "scene": dataset.schema.scene,
+        "split": split,
+        "view": asdict(seen),
+        "sequences": len(rows),
+        "seconds": seconds,
+        "parameters": {p.name: _scores(p, rows) for p in predictor.schema.learned},
+        "rows": rows,
+    }
+
+
+def _rows(
+    model: Callable[[Checkpoint], Predictor],
+    checkpoint: Checkpoint,
+    discrepancy: Discrepancy,
+    observed: Sequence[tuple[Entry, Observation]],
+) -> list[dict[str, Any]]:
+    predictor = model(checkpoint)
+    return [_row(entry.name, entry.parameters, identify(predictor, seen, discrepancy)) for entry, seen in observed]
+
+
+def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:
+    progress = Progress("calibrate", 100)
+    done = 0
+
+    def tell(share: float) -> None:
+        nonlocal done
+        ahead = int(100 * share) - done
+        progress.advance(ahead)
+        done += ahead
+
+    discrepancy = calibrate(predictor, dataset, CALIBRATION, tell)
+    progress.close()
+    return discrepancy
+
+
+def _row(name: str, truth: Parameters, found: Identification) -> dict[str, Any]:
+    values = {key: {"true": truth[key], **_claim(one)} for key, one in found.parameters.items()}
+    return {"name": name, "parameters": values, "misfit": found.misfit, "seconds": found.seconds}
+
+
+def _claim(one: Identified) -> dict[str, Any]:
+    return {"found": one.value, "low": one.low, "high": one.high, "identifiable": one.identifiable}
+
+
+def _scores(parameter: Parameter, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Errors over all rows, in units and in halves of the trained range; coverage over those that claim something.
+
+    `identifiable` is the share of rows that do.
+    """
+    cells = [row["parameters"][parameter.name] for row in rows]
+    apart = [parameter.normalise(cell["found"]) - parameter.normalise(cell["true"]) for cell in cells]
+    claimed = [cell["low"] <= cell["true"] <= cell["high"] for cell in cells if cell["identifiable"]]
+    return {
+        "mae": float(np.mean([abs(cell["found"] - cell["true"]) for cell in cells])),
+        "unit": parameter.unit,
+        "mae_normalised": float(np.abs(apart).mean()),
+        "largest_normalised": float(np.abs(apart).max()),
+        "coverage_90": float(np.mean(claimed)) if claimed else None,
+        "identifiable": len(claimed) / len(cells),
+    }
+
+
+def report(result: dict[str, Any]) -> str:
+    """A table for people."""
+    view = result["view"]
+    points = f"{view['points']} points" if view["points"] else "all points"
+    frames = f"{view['frames']} frames" if view["frames"] else "all frames"
+    lines = [
+        f"{result['scene']}, {result['model']}: {result['sequences']} sequences of {result['split']}, "
+        f"{points}, {frames}, {view['noise_mm']:g} mm of noise; {result['seconds']:.2f} s each",
+        f"{'':<12}{'MAE':>16}{'of half range':>16}{'largest':>10}{f'in {NOMINAL:.0%}':>10}{'identifiable':>14}",
+    ]
+    for name, one in result["parameters"].items():
+        mae = f"{one['mae']:.4g} {one['unit']}"
+        covered = "-" if one["coverage_90"] is None else f"{one['coverage_90']:.0%}"
+        lines.append(
+            f"{name:<12}{mae:>16}{one['mae_normalised']:>16.4f}{one['largest_normalised']:>10.3f}"
+            f"{covered:>10}{one['identifiable']:>14.0%}"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,96 @@
+"""Networks as functions of arrays: written once, run by numpy to predict and by torch to learn."""
+
+import itertools
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from scipy.special import expit
+
+from odeform.cancellation import check_cancelled
+
+__all__ = ["CLOCK", "Arithmetic", "Net", "Numpy", "Sizes", "layer_shapes"]
+
+Sizes = Mapping[str, list[int]]
+"""Widths of the layers of each part of a network, inputs first, outputs last."""
+OCTAVES = 7  # the shortest period of a clock's features is 1/32 of the window: 4.7 frames of 150
+CLOCK = 1 + 2 * OCTAVES
+
+
+@runtime_checkable
+class Arithmetic(Protocol):
+    """What numpy and torch call by other names. Arrays are (..., features)."""
+
+    def linear(self, x: Any, weight: Any, bias: Any) -> Any: ...
+    def join(self, parts: list[Any]) -> Any: ...
+    def stack(self, parts: list[Any]) -> Any: ...
+    def act(self, name: str, x: Any) -> Any: ...
+
+
+def _silu(x: Any) -> Any:
+    return x * expit(x)
+
+
+def _relu(x: Any) -> Any:
+    return np.maximum(x, 0.0)
+
+
+class Numpy:
+    """The arithmetic of predictions."""
+
+    acts: Mapping[str, Any] = {
+        "silu": _silu,
+        "relu": _relu,
+        "tanh": np.tanh,
+        "sigmoid": expit,
+        "sin": np.sin,
+        "cos": np.cos,
+    }
+
+    def linear(self, x: Any, weight: Any, bias: Any) -> Any:
+        return x @ weight.T + bias
+
+    def join(self, parts: list[Any]) -> Any:
+        return np.concatenate(parts, axis=-1)
+
+    def stack(self, parts: list[Any]) -> Any:
+        return np.stack(parts)
+
+    def act(self, name: str, x: Any) -> Any:
+        return self.acts[name](x)
+
+
+class Net:
+    """Weights by name, PART.LAYER.weight and PART.LAYER.bias as a `torch.nn.Sequential` has them, and an arithmetic."""
+
+    def __init__(self, weights: Mapping[str, Any], arithmetic: Arithmetic) -> None:
+        self.weights, self.arithmetic = weights, arithmetic
+        self.join, self.stack, self.act = arithmetic.join, arithmetic.stack, arithmetic.act
+
+    def layers(self, part: str, x: Any, act: str = "silu") -> Any:
+        """(..., inputs) -> (..., outputs): linear layers with `act` between them."""
+        check_cancelled()
+        index = 0
+        while True:
+            x = self.arithmetic.linear(x, self.weights[f"{part}.{index}.weight"], self.weights[f"{part}.{index}.bias"])
+            index += 2
+            if f"{part}.{index}.weight" not in self.weights:
+                return x
+            x = self.act(act, x)
+
+    def clock(self, times: Any) -> Any:
+        """(...) times in windows -> (..., CLOCK): the time, and its sines and cosines over octaves.
+
+        Contacts last a few frames: a plain network of time bends over the window at first, and learns that for long.
+        """
+        time = times[..., None]
+        waves = [self.act(wave, np.pi * 2.0**k * time) for k in range(OCTAVES) for wave in ("sin", "cos")]
+        return self.join([time, *waves])
+
+
+def layer_shapes(sizes: Sizes) -> Iterable[tuple[str, tuple[int, ...]]]:
+    """Names and shapes of all weights of a network."""
+    for part, widths in sizes.items():
+        for layer, (before, after) in enumerate(itertools.pairwise(widths)):
+            yield f"{part}.{2 * layer}.weight", (after, before)
+            yield f"{part}.{2 * layer}.bias", (after,)

@@ -1,0 +1,72 @@
+"""What all models that move each point by itself share: how they are kept and read, and how they solve."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.errors import InputError
+from odeform.models.base import TrainedModel, check_finite
+from odeform.models.baselines.arithmetic import Net, Numpy, layer_shapes
+from odeform.models.baselines.point_network import PointNet
+from odeform.models.baselines.point_trajectories import FramedPoints, MomentaryPoints
+from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, PointTrajectory, evaluate_probes
+from odeform.motion.reduced_space import to_canonical
+from odeform.schema import Parameters, Schema
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Arrays, GaussianSplats, Geometry, MotionSequence, Points
+
+__all__ = ["PointModel", "point_checkpoint"]
+
+PREFIX = "net."
+
+
+class PointModel(TrainedModel):
+    """A predictor of where each point goes."""
+
+    network: PointNet
+    trajectory: type[MomentaryPoints | FramedPoints]
+
+    def _read(self, checkpoint: Checkpoint) -> None:
+        frame = checkpoint.config["frame"]
+        self.frame = PointFrame(**{**frame, "anchor": tuple(frame["anchor"])})
+        weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
+        for name, shape in layer_shapes(self.network.sizes(len(self.schema.learned), checkpoint.config["width"])):
+            if weights[name].shape != shape or not np.isfinite(weights[name]).all():
+                raise ValueError(f"{name}: expected finite numbers of shape {shape}, got {weights[name].shape}")
+        self.net = Net(weights, Numpy())
+        self.mean = MeanMotion(checkpoint.arrays["mean.times"], checkpoint.arrays["mean.shifts"])
+        self._probes = evaluate_probes(self.rest, np.array(self.frame.anchor))
+
+    def _trajectory(self, rest: Points, parameters: Parameters, observed: MotionSequence | None) -> PointTrajectory:
+        """Of points (N, 3) in metres about the anchor, canonical."""
+        seen, theta = self.frame.seen(rest), self.schema.inputs(parameters)
+        return self.trajectory(self.net, self.network, self.frame, self.schema.window, seen, theta)
+
+    def solve(
+        self,
+        geometry: Geometry | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        quality: str | SolverSettings = "balanced",
+        until: float | None = None,
+        observed: MotionSequence | None = None,
+    ) -> PointMotion:
+        shape = self._shape(geometry, observed)
+        check_finite(shape)
+        if isinstance(shape, GaussianSplats):
+            raise InputError(f"{self.model}: moves meshes and points, and has no gradient to take splats along")
+        complete = self.schema.complete(parameters)
+        rest = to_canonical(shape.points, np.array(self.frame.anchor), self.schema.azimuth(complete))
+        moved, body = (self._trajectory(x, complete, observed) for x in (rest, self._probes.points))
+        return PointMotion(self.schema, complete, shape, self.frame, self.mean, self._probes, moved, body)
+
+
+def point_checkpoint(
+    model: str, schema: Schema, frame: PointFrame, mean: MeanMotion, weights: Arrays, config: dict[str, Any]
+) -> Checkpoint:
+    """What a model of points is read from, but for the body that viewers show."""
+    arrays = {PREFIX + name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+    arrays |= {"mean.times": mean.times, "mean.shifts": mean.shifts}
+    return Checkpoint(model, schema, {"frame": asdict(frame), **config}, arrays)

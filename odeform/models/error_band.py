@@ -1,0 +1,63 @@
+"""How wrong a model is likely to be: an error bar from its errors on sequences that it was not trained on."""
+
+import numpy as np
+
+from odeform.types import Arrays, Floats, Times
+
+__all__ = ["ErrorBand"]
+
+NOMINAL = 0.9
+WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
+"""Candidates for the distance in normalised parameters over which errors are alike."""
+TINY = 1e-6  # mm
+FARTHEST = 10.0  # widths outside, from where on the band is as wide as it gets
+ABOUT = 0.05  # of the frames on either side have their say in the quantiles of a frame
+
+
+class ErrorBand:
+    """The RMSE that half, and `NOMINAL` of all, unseen motions of these parameters keep to at a time.
+
+    A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
+    the product of a profile over time, a scale that is smooth over the parameters, and a rest whose quantiles about
+    each time, with each sequence's scale told by the others alone, make the band. Beyond the trained ranges nothing was
+    validated: there the band doubles with each `width` outside. Beyond the window it grows in proportion to the time,
+    or as the errors of a continuation did when it foretold the last third of the window, if that is more.
+    """
+
+    def __init__(self, arrays: Arrays) -> None:
+        """`val.theta` (S, P) in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T); KeyError without them. Of a
+        continuation, `val.later_mm` (S, L) so many frames after the last that it was given."""
+        self._theta = arrays["val.theta"].astype(float)
+        self._times = arrays["val.times"].astype(float)
+        logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
+        profile = np.median(logs, axis=0)
+        self._levels = (logs - profile).mean(axis=1)
+        rests = {width: self._levels - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
+        self._width = min(WIDTHS, key=lambda width: float((rests[width] ** 2).mean()))
+        rest = logs - profile - (self._levels - rests[self._width])[:, None]
+        near, count = round(ABOUT * len(profile)), len(profile)
+        quantiles = [np.quantile(rest[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
+        self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
+        later = arrays.get("val.later_mm", np.zeros((1, 1)))
+        self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
+
+    def _smooth(self, theta: Floats, width: float, leave_out: bool = False) -> Floats:
+        """(M, P) -> (M,) the log scale there, a kernel mean over the validation sequences."""
+        squares = ((theta[:, None] - self._theta) ** 2).sum(axis=2) / (2.0 * width**2)
+        if leave_out:
+            np.fill_diagonal(squares, np.inf)
+        weights = np.exp(squares.min(axis=1, keepdims=True) - squares)
+        return (weights @ self._levels) / weights.sum(axis=1)
+
+    def at(self, theta: Floats, times: Times) -> Floats:
+        """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and what `NOMINAL` keep to."""
+        inside = np.clip(theta, -1.0, 1.0)
+        outside = min(float(np.linalg.norm(theta - inside)) / self._width, FARTHEST)
+        level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * outside
+        stop = self._times[-1]
+        profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
+        grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)
+        frames = (times - stop) / (self._times[1] - self._times[0])
+        leads = np.arange(len(self._later) + 1.0)
+        later = [np.interp(frames, leads, np.concatenate([[0.0], column])) for column in self._later.T]
+        return np.where(times[:, None] > 0.0, np.maximum(grown, np.stack(later, axis=1)), 0.0)

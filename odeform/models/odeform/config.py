@@ -1,0 +1,61 @@
+"""Sizes of the ODeform network."""
+
+from dataclasses import dataclass
+
+from odeform.motion.reduced_space import POSE
+
+__all__ = ["ModelConfig"]
+
+
+@dataclass(frozen=True)
+class ModelConfig:
+    """Sizes of the network."""
+
+    parameters: int
+    modes: int
+    rigid: bool = True
+    """Whether the scene has rigid motion; without, there is no rigid branch."""
+    rigid_latent: int = 16
+    local_latent: int = 48
+    point_width: int = 32
+    encoder_width: int = 128
+    rigid_width: int = 64
+    local_width: int = 128
+    decoder_widths: tuple[int, ...] = (512,)
+    clock: float = 0.1
+    """Seconds after which the clock of the decoders, which runs from -1 to 1 and ever slower, is halfway."""
+    components: int = 16
+    """Principal components of what a decoder sees, of which its random features are made."""
+    random_features: int = 0
+    """Of each decoder; they are added when the rest is trained."""
+
+    @property
+    def state(self) -> int:
+        return self.rigid_latent * self.rigid + self.local_latent
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        return ("rigid", "local") if self.rigid else ("local",)
+
+    def latent(self, branch: str) -> int:
+        return self.rigid_latent if branch == "rigid" else self.local_latent
+
+    def sizes(self, branch: str) -> dict[str, list[int]]:
+        """Widths of the layers of each part of a branch, inputs first. Decoders are told the clock besides."""
+        rigid = branch == "rigid"
+        latent, outputs = self.latent(branch), POSE if rigid else self.modes
+        seen = (self.rigid_latent if rigid else self.state) + self.parameters
+        width = self.rigid_width if rigid else self.local_width
+        told = 1 + self.parameters
+        return {
+            "encoder.points": [3, self.point_width, self.point_width],
+            "encoder.head": [self.point_width + self.parameters, self.encoder_width, self.encoder_width, latent],
+            "field": [seen, width, width, latent],
+            "decoder.hidden": [latent + told, *self.decoder_widths],
+            "decoder.random": [
+                latent + self.decoder_widths[-1] + told,
+                self.components + told,
+                self.random_features,
+            ],
+            "decoder.readout": [latent + self.decoder_widths[-1] + self.random_features, outputs],
+        }

@@ -1,0 +1,81 @@
+"""A geometry seen through a basis: what is computed once per geometry and heading."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.geometry.rigid import rotation_z
+from odeform.geometry.shape import surface_shares
+from odeform.motion.local_frames import Axes, LocalFrames, evaluate_local_frames
+from odeform.motion.reduced_space import ReducedSpace, to_canonical
+from odeform.types import GaussianSplats, Geometry, Perpoint, Points
+
+__all__ = ["STILL", "EvaluatedBasis", "evaluate_basis"]
+
+STILL = 4  # rows of `EvaluatedBasis` that are no modes
+CHUNK = 1 << 14  # points, or their coordinates, that are worked on at once: they stay in the cache
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluatedBasis:
+    """A geometry, as it lies in the scene at rest, and the basis on it; float32.
+
+    `points` (N, 3) are as given, `rest` canonical. What only some need is computed when first asked for.
+    """
+
+    geometry: Geometry
+    space: ReducedSpace
+    azimuth: float
+    points: Points
+    rest: Points
+    rows: Float[np.ndarray, "rows entries"]
+    """(4 + K, 3 N): shifts along the three axes, `rest`, and the modes. Bodies deformed and shifted are one product."""
+    reach: Float[np.ndarray, " modes"]
+    """Largest displacement of any point by each mode."""
+    shares: Perpoint
+    """Share of the surface at each point."""
+
+    @property
+    def values(self) -> Float[np.ndarray, "modes entries"]:
+        """(K, 3 N), of the basis."""
+        return self.rows[STILL:]
+
+    @cached_property
+    def gram(self) -> Float[np.ndarray, "modes modes"]:
+        """Mean products of the modes over the surface: c gram c is the mean square displacement, m^2."""
+        shares, modes = np.repeat(self.shares, 3).astype(np.float32), len(self.values)
+        out = np.zeros((modes, modes))
+        for at in range(0, len(shares), CHUNK):
+            part = self.values[:, at : at + CHUNK]
+            out += (part * shares[at : at + CHUNK]) @ part.T
+        return out.astype(np.float32)
+
+    @cached_property
+    def local_frames(self) -> LocalFrames:
+        """The axes at each point and how the basis moves them."""
+        return evaluate_local_frames(self.rest, self.space)
+
+    @cached_property
+    def covariances(self) -> Axes:
+        """(3, 3, N) covariances of splats in the axes of their local_frames, m^2."""
+        assert isinstance(self.geometry, GaussianSplats)
+        axes = rotation_z(self.azimuth) @ self.local_frames.rest
+        half = np.einsum("nik,lkn->iln", self.geometry.covariances, axes)
+        return np.einsum("jin,iln->jln", axes, half).astype(np.float32)
+
+
+def evaluate_basis(geometry: Geometry, space: ReducedSpace, azimuth: float) -> EvaluatedBasis:
+    """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
+    rest = to_canonical(geometry.points, space.anchor, azimuth)
+    points, (count, modes) = np.asarray(geometry.points, dtype=np.float32), (len(rest), space.basis.modes)
+    rows = np.empty((STILL + modes, 3 * count), dtype=np.float32)
+    values = rows[STILL:].reshape(modes, count, 3)
+    space.basis.values(rest, out=values)
+    rest = rest.astype(np.float32)
+    rows[:3] = np.tile(np.eye(3, dtype=np.float32), count)
+    rows[3] = rest.ravel()
+    squares = (np.square(values[:, at : at + CHUNK]).sum(axis=2).max(axis=1) for at in range(0, count, CHUNK))
+    reach = np.sqrt(np.max(list(squares), axis=0))
+    return EvaluatedBasis(geometry, space, azimuth, points, rest, rows, reach, surface_shares(geometry))

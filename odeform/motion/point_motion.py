@@ -1,0 +1,200 @@
+"""The motion of a model that predicts where each point goes: pose and deformation are read off its points.
+
+In the scene's canonical frame (turned by minus the azimuth about the vertical axis through the anchor) a motion is
+
+    P(t) = P0 + Rz(a) [ m(t) + u(x, t) ],   x = Rz(-a) (P0 - anchor),   m(0) = u(x, 0) = 0,
+
+with the mean motion m (3) of the training data, and what a model adds to it. The pose is the best rigid motion of some
+points of the trained body, the same whatever shape is moved.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+
+from odeform.errors import InputError
+from odeform.geometry.rigid import best_rigid, rotation_z
+from odeform.geometry.shape import surface_shares
+from odeform.motion.base import Motion, SolveStats
+from odeform.motion.reduced_space import to_canonical
+from odeform.schema import Parameters, Schema, soft_clip
+from odeform.types import Frames, Geometry, Matrices, Mesh, Points, Pose, Times, Vector, Vectors
+
+__all__ = ["MeanMotion", "PointFrame", "PointMotion", "PointTrajectory", "Probes", "evaluate_probes"]
+
+PROBES = 96
+MARGIN = 1.25  # times the largest displacement that was trained, up to which displacements are as predicted
+
+
+@runtime_checkable
+class PointTrajectory(Protocol):
+    """Displacements of some points from the mean motion. What it says of a time never depends on what was asked."""
+
+    def stats(self) -> SolveStats:
+        """Of the whole roll-out, which takes place if it has not yet."""
+        ...
+
+    def displacements(self, times: Times) -> Frames:
+        """(T,) seconds -> (T, N, 3) metres in canonical axes; zero at time 0."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class MeanMotion:
+    """How bodies move on average: `shifts` (T, 3) metres, canonical, at `times` (T,) s, cubic between, held after."""
+
+    times: Times
+    shifts: Float[np.ndarray, "times 3"]
+
+    def at(self, times: Times) -> Float[np.ndarray, "asked 3"]:
+        """(T,) seconds -> (T, 3) metres; zero at the start."""
+        return self._spline(np.clip(times, self.times[0], self.times[-1]))
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.times, self.shifts)
+
+
+@dataclass(frozen=True)
+class PointFrame:
+    """Where a model of points sees them: about the `anchor`, in units of `arm`, the body's radius of gyration.
+
+    `reach` is the farthest point of the trained body from the anchor, `largest` the largest displacement in the
+    training data; `scale` is the root mean square over coordinates of displacements from the mean motion, `part_scale`
+    that of displacements less their mean over the body. All metres.
+    """
+
+    anchor: tuple[float, float, float]
+    gyration_radius: float
+    reach: float
+    largest: float
+    scale: float
+    part_scale: float
+
+    def seen(self, rest: Vectors) -> Points:
+        """(N, 3) metres about the anchor -> units of `arm`, float32.
+
+        Points farther than one and a half times the trained body reaches are taken for points below them, at most
+        twice as far: what networks are asked for is bounded.
+        """
+        away = np.maximum(np.linalg.norm(rest, axis=-1, keepdims=True), np.finfo(float).tiny)
+        near = soft_clip(away, 1.5 * self.reach, 0.5 * self.reach)
+        return (rest * (near / away) / self.gyration_radius).astype(np.float32)
+
+    def bounded(self, displacements: Frames) -> Frames:
+        """To the last bit as they are up to a quarter above the largest trained; beyond, ever less."""
+        limit = MARGIN * self.largest
+        size = np.linalg.norm(displacements, axis=-1, keepdims=True)
+        if not (size > limit).any():
+            return displacements
+        return np.where(
+            size > limit, displacements * (soft_clip(size, limit, limit - self.largest) / size), displacements
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Probes:
+    """`points` (M, 3) of the trained body, canonical, metres, and their `shares` (M,) of its surface."""
+
+    points: Float[np.ndarray, "probes 3"]
+    shares: Float[np.ndarray, " probes"]
+
+
+def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
+    """Vertices spread over the body, each the farthest from those before (Gonzalez 1985)."""
+    points = to_canonical(rest.points, anchor, 0.0)
+    chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)
+    nearest = np.zeros(len(points), dtype=int)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(distance.argmax()))
+        other = np.linalg.norm(points - points[chosen[-1]], axis=1)
+        nearest[other < distance] = len(chosen) - 1
+        distance = np.minimum(distance, other)
+    return Probes(points[chosen], np.bincount(nearest, surface_shares(rest), minlength=len(chosen)))
+
+
+class PointMotion(Motion):
+    """P0 + m + u: `shape` moves the points of the geometry, `body` the probes that the pose is read off."""
+
+    def __init__(
+        self,
+        schema: Schema,
+        parameters: Parameters,
+        geometry: Geometry,
+        frame: PointFrame,
+        mean: MeanMotion,
+        probes: Probes,
+        shape: PointTrajectory,
+        body: PointTrajectory,
+    ) -> None:
+        self.schema, self.parameters, self.geometry = schema, parameters, geometry
+        self._frame, self._mean, self._probes, self._shape, self._body = frame, mean, probes, shape, body
+        self._points = np.asarray(geometry.points, dtype=np.float32)
+        self._turn = rotation_z(schema.azimuth(parameters))
+        self._known: tuple[float, Points] | None = None
+
+    @property
+    def stats(self) -> SolveStats:
+        return self._shape.stats()
+
+    @property
+    def last_good(self) -> float:
+        return float("inf")
+
+    def vertices(self, t: float | Times) -> Points | Frames:
+        if np.ndim(t) == 0 and self._known is not None and self._known[0] == t:
+            return self._known[1].copy()
+        moved = self._displaced(self._shape, t)
+        out = self._points + moved @ self._turn.T.astype(np.float32)
+        if np.ndim(t) == 0:
+            self._known = (float(np.asarray(t)), out[0])
+            return out[0].copy()
+        return out
+
+    def pose(self, t: float | Times) -> Pose:
+        moved, (points, shares) = self._displaced(self._body, t), (self._probes.points, self._probes.shares)
+        rotation, shift = best_rigid(points, points + moved, shares)
+        centre = shares @ points
+        turned = self._turn @ rotation @ self._turn.T
+        anchor = np.array(self._frame.anchor)
+        out = np.zeros((len(moved), 4, 4))
+        out[:, :3, :3] = turned
+        out[:, :3, 3] = anchor - turned @ (anchor + self._turn @ centre) + (centre + shift) @ self._turn.T
+        out[:, 3, 3] = 1.0
+        out[~moved.any(axis=(1, 2))] = np.eye(4)
+        return out[0] if np.ndim(t) == 0 else out
+
+    def local(self, t: float | Times) -> Points | Frames:
+        pose, moved = self.pose(t).reshape(-1, 4, 4), self.vertices(t).reshape(-1, *self._points.shape)
+        back = (moved - pose[:, None, :3, 3]) @ pose[:, :3, :3]
+        out = (back - self._points).astype(np.float32)
+        return out[0] if np.ndim(t) == 0 else out
+
+    def deformed(self, t: float) -> Points:
+        return self._points + self.local(t)
+
+    def covariances(self, t: float) -> Matrices:
+        raise InputError("a model of points has no gradient to take splats along: expected a mesh or points")
+
+    def deformed_covariances(self, t: float) -> Matrices:
+        return self.covariances(t)
+
+    def deformation_bound(self, time: float) -> float:
+        return float(np.linalg.norm(self.local(time), axis=1).max())
+
+    def deformation_rms(self, times: Times) -> Times:
+        moved, (points, shares) = self._displaced(self._body, times), (self._probes.points, self._probes.shares)
+        rotation, shift = best_rigid(points, points + moved, shares)
+        centre = shares @ points
+        back = np.einsum("tji,tnj->tni", rotation, points + moved - (centre + shift)[:, None])
+        return np.sqrt(((back - (points - centre)) ** 2).sum(axis=2) @ shares)
+
+    def _displaced(self, trajectory: PointTrajectory, t: float | Times) -> Frames:
+        """(T, N, 3) metres, canonical, float32; (1, N, 3) for a single time."""
+        times = self.schema.window.soft_clamped(np.atleast_1d(np.asarray(t, dtype=float)))
+        moved = trajectory.displacements(times) + self._mean.at(times)[:, None]
+        return self._frame.bounded(moved).astype(np.float32)

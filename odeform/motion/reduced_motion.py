@@ -1,0 +1,175 @@
+"""The motion of a reduced model: pose and coefficients at any time, and the points that they move."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.motion.base import Motion, SolveStats
+from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.local_frames import Axes, gradients, moved_covariances
+from odeform.motion.reduced_space import ReducedSpace, rotation_of
+from odeform.schema import Parameters, Schema
+from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
+
+__all__ = ["Motion", "Trajectory"]
+
+SEVERAL = 4  # points that are turned as one: products with three rows leave most of a processor's width unused
+BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are turned
+MANY = 16  # such blocks are shared among the cores
+CORES = ThreadPoolExecutor(os.cpu_count(), "decode")  # kept: a thread's first product takes longer than a frame
+
+
+@runtime_checkable
+class Trajectory(Protocol):
+    """Reduced coordinates over time. What it says of a time never depends on what was asked before."""
+
+    @property
+    def stats(self) -> SolveStats: ...
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which the trajectory is sound; later times show the state of that moment."""
+        ...
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) seconds -> (T, 6 + K)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedMotion(Motion):
+    """T(t) and D(t) apart: a pose, and coefficients of a basis. `placed` is the geometry on its way into the basis."""
+
+    schema: Schema
+    parameters: Parameters
+    geometry: Geometry
+    space: ReducedSpace
+    evaluated: EvaluatedBasis
+    trajectory: Trajectory
+
+    @property
+    def stats(self) -> SolveStats:
+        return self.trajectory.stats
+
+    @property
+    def last_good(self) -> float:
+        return self.trajectory.last_good
+
+    def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        return self.space.bounded(self.trajectory.reduced(self.schema.window.soft_clamped(times)))
+
+    def vertices(self, t: float | Times) -> Points | Frames:
+        y = self._reduced(t)
+        rotation, shift = self._rotation_shift(y)
+        # deformed and shifted in the body's own axes, which is one product for all times, then turned
+        ahead = np.einsum("ti,tij->tj", shift + self.space.anchor, rotation)
+        weights = np.concatenate([ahead, np.ones((len(y), 1)), y[:, 6:]], axis=1).astype(np.float32)
+        turned = rotation.swapaxes(-1, -2).astype(np.float32)
+        count = len(self.evaluated.points)
+        out = np.empty((len(y), 3 * count), dtype=np.float32)
+        size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
+
+        def fill(begin: int) -> None:
+            place = slice(3 * begin, 3 * (begin + size))
+            _turn(weights @ self.evaluated.rows[:, place], turned, out[:, place])
+
+        begins = range(0, count, size)
+        list((CORES.map if len(begins) >= MANY else map)(fill, begins))
+        out = out.reshape(len(y), count, 3)
+        # P(0) is P0 to the last bit
+        out[~y.any(axis=1)] = self.evaluated.points
+        return out[0] if np.ndim(t) == 0 else out
+
+    def pose(self, t: float | Times) -> Pose:
+        rotation, shift = self._rotation_shift(self._reduced(t))
+        rotation = rotation @ self._to_canonical_axes
+        out = np.zeros((len(rotation), 4, 4))
+        out[:, :3, :3] = rotation
+        out[:, :3, 3] = shift + self.space.anchor - rotation @ self.space.anchor
+        out[:, 3, 3] = 1.0
+        return out[0] if np.ndim(t) == 0 else out
+
+    def local(self, t: float | Times) -> Points | Frames:
+        out = self._deformation(self._reduced(t)) @ self._to_canonical_axes.astype(np.float32)
+        return out[0] if np.ndim(t) == 0 else out
+
+    def deformed(self, t: float) -> Points:
+        return self.evaluated.points + self.local(t)
+
+    def gradients(self, t: float) -> Matrices:
+        """F(t) = dP/dP0 at each point: (N, 3, 3), float32, with singular values within `local_frames.BOUND`.
+
+        From data on a surface the tangential part alone: the unit normal there goes to that of the deformed surface,
+        a point off the surface takes the normal of the nearest one on it.
+        """
+        y = self._reduced(t)
+        carried = self._carried_axes(y, self._rotation_shift(y)[0][0])
+        return gradients(_turned(self.evaluated.local_frames.rest, self._to_scene_axes), carried)
+
+    def rotations(self, t: float) -> Matrices:
+        """(N, 3, 3) the rotation nearest to F(t) at each point, its polar factor."""
+        u, _, vt = np.linalg.svd(self.gradients(t))
+        u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
+        return u @ vt
+
+    def covariances(self, t: float) -> Matrices:
+        y = self._reduced(t)
+        return self._moved_covariances(y, self._rotation_shift(y)[0][0])
+
+    def deformed_covariances(self, t: float) -> Matrices:
+        return self._moved_covariances(self._reduced(t), self._to_scene_axes)
+
+    def deformation_bound(self, time: float) -> float:
+        y = self._reduced(time)
+        return float(np.abs(y[0, 6:]) @ self.evaluated.reach)
+
+    def deformation_rms(self, times: Times) -> Times:
+        y = self._reduced(times)
+        return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", y[:, 6:], self.evaluated.gram, y[:, 6:]), 0.0))
+
+    @property
+    def _to_scene_axes(self) -> Rotations:
+        return rotation_of(np.zeros(6), self.schema.azimuth(self.parameters))[0]
+
+    @property
+    def _to_canonical_axes(self) -> Rotations:
+        return self._to_scene_axes.T
+
+    def _rotation_shift(self, y: Floats) -> tuple[Rotations, Vectors]:
+        return rotation_of(y[:, :6], self.schema.azimuth(self.parameters))
+
+    def _deformation(self, y: Floats) -> Frames:
+        """(T, N, 3) canonical displacements: one product for all times."""
+        return (y[:, 6:].astype(np.float32) @ self.evaluated.values).reshape(len(y), -1, 3)
+
+    def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
+        """The local_frames under the deformation of `y` (1, 6 + K), turned from canonical axes by `turn` (3, 3)."""
+        return _turned(self.evaluated.local_frames.carried(y[0, 6:]), turn)
+
+    def _moved_covariances(self, y: Floats, turn: Rotations) -> Matrices:
+        assert isinstance(self.geometry, GaussianSplats)
+        if y[0, 6:].any():
+            return moved_covariances(self.evaluated.covariances, self._carried_axes(y, turn))
+        # a rigid motion turns the numbers as they were given: those of P(0) are what they were
+        rotation = turn @ self._to_canonical_axes
+        flat = self.geometry.covariances.reshape(-1, 9) @ np.kron(rotation, rotation).T
+        return flat.reshape(-1, 3, 3).astype(np.float32)
+
+
+def _turned(axes: Axes, rotation: Rotations) -> Axes:
+    return rotation.astype(np.float32) @ axes
+
+
+def _turn(bodies: Floats, turned: Rotations, out: Floats) -> None:
+    """`out` (T, 3 N): each row of `bodies` (T, 3 N) times its matrix of `turned` (T, 3, 3), point by point."""
+    rows, size = len(bodies), 3 * SEVERAL
+    whole = bodies.shape[1] // size * size
+    together = np.einsum("ab,tij->taibj", np.eye(SEVERAL, dtype=np.float32), turned).reshape(rows, size, size)
+    np.matmul(bodies[:, :whole].reshape(rows, -1, size), together, out=out[:, :whole].reshape(rows, -1, size))
+    if whole < bodies.shape[1]:
+        np.matmul(bodies[:, whole:].reshape(rows, -1, 3), turned, out=out[:, whole:].reshape(rows, -1, 3))

@@ -1,0 +1,153 @@
+"""Reduced coordinates: a motion as a rigid pose and the coefficients of a displacement basis.
+
+In the scene's canonical frame (turned by minus the azimuth about the vertical axis through the anchor), a motion is
+
+    P(t) = anchor + Rz(a) [ R(w(t)) (x + sum_k c_k(t) phi_k(x)) + p(t) ],   x = Rz(-a) (P0 - anchor),
+
+with shift p (3) metres, rotation vector w (3) radians (unwrapped over several turns), and coefficients c (K). All
+models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P0 exact (paper eq. 4).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
+from odeform.motion.basis import DisplacementBasis, fit_basis
+from odeform.schema import soft_clip
+from odeform.types import Arrays, Basis, Frames, Mesh, MotionSequence, Perpoint, Rotations, Vector, Vectors
+
+__all__ = [
+    "POSE",
+    "ReducedSpace",
+    "decompose",
+    "fit_modes",
+    "make_space",
+    "motion_rmse",
+    "rotation_of",
+    "small_motion",
+    "to_canonical",
+]
+
+POSE = 6  # numbers of the rigid part of y
+MARGIN = 1.15  # times the largest that was trained, up to which shifts and deformations are as predicted
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSpace:
+    """Where y lives: the `anchor` (3,) that rotations turn about, in metres, and the basis of deformations.
+
+    The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
+    displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
+    does the same for small rotation errors. `surface`, canonical, is where the training data lie; None where they
+    fill a volume, so that their derivatives are known in every direction. `largest` are those of |p| and |c| in
+    the training data.
+    """
+
+    anchor: Vector
+    gyration_radius: float
+    basis: DisplacementBasis
+    surface: Mesh | None
+    largest: tuple[float, float] = (float("inf"), float("inf"))
+
+    def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
+        """(T, 6 + K), to the last bit as they are up to shifts and deformations 15 % larger than any trained.
+
+        Beyond, by parameters or times far from those trained or by a solver too coarse, they grow ever less, and never
+        to 30 % more: a body keeps its shape and its place whatever is asked.
+        """
+        for part, largest in zip((slice(0, 3), slice(POSE, None)), self.largest, strict=True):
+            limit = MARGIN * largest
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                size = np.linalg.norm(y[:, part], axis=1)
+                if (size > limit).any():
+                    y = y.copy()
+                    y[:, part] *= np.where(size > limit, soft_clip(size, limit, limit - largest) / size, 1.0)[:, None]
+        return y
+
+    def to_json(self) -> dict[str, object]:
+        return {
+            "anchor": [float(x) for x in self.anchor],
+            "arm": self.gyration_radius,
+            "basis_scale": self.basis.scale,
+            "surface": self.surface is not None,
+            **({"largest": list(self.largest)} if np.isfinite(self.largest).all() else {}),
+        }
+
+    def arrays(self) -> Arrays:
+        return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
+
+    @classmethod
+    def from_parts(cls, data: dict[str, object], arrays: Arrays, rest: Mesh) -> "ReducedSpace":
+        """`rest` is the trained body as it rests in the scene."""
+        basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
+        anchor = np.array(data["anchor"], dtype=float)
+        # older checkpoints do not say: all of them are of surfaces
+        surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
+        shift, deformation = data.get("largest", ("inf", "inf"))  # pyright: ignore
+        return cls(anchor, float(data["arm"]), basis, surface, (float(shift), float(deformation)))  # pyright: ignore
+
+
+def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:
+    """(..., 3) points in the scene -> about the anchor, turned by minus the azimuth."""
+    return (np.asarray(points, dtype=float) - anchor) @ rotation_z(azimuth)
+
+
+def decompose(sequence: MotionSequence, anchor: Vector, azimuth: float) -> tuple[Float[np.ndarray, "times 6"], Frames]:
+    """Best-fit rigid motion and remaining deformation, in the canonical frame.
+
+    Returns `pose` (T, 6): shift of the anchor and rotation vector; `local` (T, N, 3): displacements in the body's
+    frame, metres, both zero in frame 0.
+    """
+    moved = to_canonical(sequence.vertices, anchor, azimuth)
+    rest = moved[0]
+    rotation, shift = best_rigid(rest, moved, sequence.weights)
+    centre = sequence.weights @ rest
+    shift = shift + centre - rotation @ centre  # the rotation turns about the anchor, not the centroid
+    local = np.einsum("tji,tnj->tni", rotation, moved - shift[:, None]) - rest
+    pose = np.concatenate([shift, unwrapped_vectors(rotation)], axis=1)
+    return pose, local
+
+
+def fit_modes(locals_: list[Float[np.ndarray, "_ points 3"]], weights: Perpoint, modes: int) -> Basis:
+    """POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the weights."""
+    root = np.sqrt(weights)[:, None]
+    covariance = np.zeros((3 * len(weights), 3 * len(weights)))
+    for local in locals_:
+        snapshots = (local * root).reshape(len(local), -1)
+        covariance += snapshots.T @ snapshots
+    _, vectors = np.linalg.eigh(covariance)
+    return vectors[:, ::-1][:, :modes].reshape(len(weights), 3, -1) / root[..., None]
+
+
+def make_space(rest: Mesh, shapes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
+    """The space of the modes `shapes` (N, 3, K) at the vertices of `rest`, canonical. One without a face is inside."""
+    gyration_radius = float(np.sqrt((weights[:, None] * rest.points**2).sum()))
+    surface = rest if len(np.unique(rest.faces)) == len(rest.points) else None
+    return ReducedSpace(
+        np.asarray(anchor, dtype=float), gyration_radius, fit_basis(rest.points, shapes, gyration_radius), surface
+    )
+
+
+def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Rotations, Vectors]:
+    """Pose (..., 6) -> rotation (..., 3, 3) from canonical to scene axes, shift (..., 3) in scene axes."""
+    turn = rotation_z(azimuth)
+    return turn @ rotation_from_vector(pose[..., 3:]), pose[..., :3] @ turn.T
+
+
+def small_motion(y: Float[np.ndarray, "*batch y"], gyration_radius: float) -> Float[np.ndarray, "*batch"]:
+    """Root mean square displacement in metres, over the body, by a small y (..., 6 + K).
+
+    A small turn |w| moves a round body of radius of gyration `arm` by sqrt(2/3) arm |w|.
+    """
+    scale = np.ones(y.shape[-1])
+    scale[3:POSE] = gyration_radius * np.sqrt(2.0 / 3.0)
+    return np.linalg.norm(y * scale, axis=-1)
+
+
+def motion_rmse(
+    one: Float[np.ndarray, "*batch y"], other: Float[np.ndarray, "*batch y"], gyration_radius: float
+) -> float:
+    """Root mean square difference in metres between motions y (..., 6 + K), over coordinates, points and the rest."""
+    return float(np.sqrt((small_motion(one - other, gyration_radius) ** 2).mean() / 3.0))

@@ -1,0 +1,54 @@
+"""Whether a motion is a function of what was asked: of parameters, points and time, and of nothing else."""
+
+import numpy as np
+
+from odeform.predictor import Predictor
+from odeform.solver.integrate import SolverSettings
+from odeform.stress.cases import inside
+from odeform.stress.check import Check, Checks
+from odeform.types import Floats, PointCloud
+
+__all__ = ["check_answers"]
+
+ROUNDING = 1e-6  # m; what single precision rounds coordinates of metres by
+DRAWS = 6
+
+
+def check_answers(predictor: Predictor, seed: int = 0) -> Checks:
+    """Any set of queries in any order, repetition, parts of a shape, and precision."""
+    window, rng = predictor.schema.window, np.random.default_rng(seed)
+    times = window.times
+    grid = order = again = part = precision = 0.0
+    few = rng.permutation(len(predictor.rest.points))[:50]
+    body = PointCloud(np.asarray(predictor.rest.points, dtype=np.float32))
+    for parameters in inside(predictor.schema, DRAWS, seed):
+        motion = predictor.solve(body, parameters)
+        frames = motion.vertices(times)
+        shuffled = rng.permutation(len(times))
+        grid = max(grid, _apart(motion.vertices(times[shuffled]), frames[shuffled]))
+        late = predictor.solve(body, parameters, until=3.0 * window.stop)
+        for row in shuffled[:20]:
+            one = motion.vertices(float(times[row]))
+            grid = max(grid, _apart(one, frames[row]))
+            order = max(order, _apart(one, late.vertices(float(times[row]))))
+        again = max(again, _apart(predictor.solve(body, parameters).vertices(times), frames))
+        some = predictor.solve(PointCloud(body.points[few]), parameters)
+        part = max(part, _apart(some.vertices(times), frames[:, few]))
+        single, double = (
+            predictor.solve(body, parameters, SolverSettings("rk4", step=1.0 / window.rate, dtype=dtype)).vertices(
+                times
+            )
+            for dtype in ("float32", "float64")
+        )
+        precision = max(precision, _apart(single, double))
+    return {
+        "grid_invariance_m": Check(grid, ROUNDING),
+        "scrub_order_m": Check(order, 0.0),
+        "determinism_m": Check(again, 0.0),
+        "batch_invariance_m": Check(part, ROUNDING),
+        "single_precision_mm": Check(1e3 * precision, 0.1),
+    }
+
+
+def _apart(one: Floats, other: Floats) -> float:
+    return float(np.abs(np.subtract(one, other, dtype=float)).max())

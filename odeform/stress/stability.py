@@ -1,0 +1,96 @@
+"""How far a body is deformed over two parameters and time, inside the trained box and beyond."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from PIL import Image, ImageDraw
+
+from odeform.predictor import Predictor
+from odeform.stress.cases import inside
+from odeform.types import Floats, Times
+
+__all__ = ["StabilityMap", "largest_deformation", "map_image", "stability_map"]
+
+MOMENTS = (0.5, 1.0, 1.5, 3.0, 10.0)
+CELL, GAP = 8, 24  # pixels
+SCALE = np.array([[247, 247, 242], [253, 212, 120], [240, 120, 60], [170, 20, 60]], dtype=float)
+FAILED = (60, 60, 60)
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap:
+    """`values[t, i, j]`: RMS deformation, relative to the largest in the trained box, with the first of `names` at
+    `units[j]` and the second at `units[i]` (halves of its trained range, from its middle), at `times[t]` seconds.
+
+    `sound` is False where the integration failed and the last good state is shown. All other parameters are at their
+    defaults.
+    """
+
+    names: tuple[str, str]
+    units: Float[np.ndarray, " units"]
+    times: Times
+    window: float
+    values: Float[np.ndarray, "times units units"]
+    sound: Bool[np.ndarray, "times units units"]
+
+
+def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) -> float:
+    """RMS deformation in metres, the largest of some motions of the trained box within the trained window."""
+    times = predictor.schema.window.times
+    motions = (predictor.solve(None, parameters) for parameters in inside(predictor.schema, count, seed))
+    return max(float(motion.deformation_rms(times).max()) for motion in motions)
+
+
+def stability_map(
+    predictor: Predictor,
+    names: tuple[str, str] | None = None,
+    reach: float = 3.0,
+    count: int = 25,
+    moments: tuple[float, ...] = MOMENTS,
+    quality: str = "balanced",
+) -> StabilityMap:
+    """Over `count` x `count` values of two parameters (default: the first two), up to `reach` times the trained box, at
+    `moments` in trained windows."""
+    schema = predictor.schema
+    known = {p.name: p for p in schema.learned}
+    first, second = (known[name] for name in names or list(known)[:2])
+    times = schema.window.stop * np.array(moments)
+    units = np.linspace(-reach, reach, count)
+    values, sound = np.empty((len(times), count, count)), np.empty((len(times), count, count), dtype=bool)
+    for i, j in np.ndindex(count, count):
+        given = {first.name: first.denormalise(float(units[j])), second.name: second.denormalise(float(units[i]))}
+        motion = predictor.solve(None, given, quality, until=times[-1])
+        values[:, i, j] = motion.deformation_rms(times)
+        sound[:, i, j] = schema.window.soft_clamped(times) <= motion.last_good
+    return StabilityMap(
+        (first.name, second.name), units, times, schema.window.stop, values / largest_deformation(predictor), sound
+    )
+
+
+def map_image(plot: StabilityMap) -> Image.Image:
+    """A panel a moment; grey is where the integration failed."""
+
+    side = CELL * len(plot.units)
+    image = Image.new("RGB", (GAP + len(plot.times) * (side + GAP), side + 3 * GAP), (255, 255, 255))
+    draw = ImageDraw.Draw(image)
+    for index, time in enumerate(plot.times):
+        left = GAP + index * (side + GAP)
+        cells = np.where(plot.sound[index][..., None], _colors(plot.values[index]), FAILED).astype(np.uint8)
+        panel = Image.fromarray(cells[::-1]).resize((side, side), Image.Resampling.NEAREST)
+        image.paste(panel, (left, GAP))
+        reach = plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0])
+        low, high = (0.5 * side * (1.0 + end / reach) for end in (-1.0, 1.0))
+        draw.rectangle((left + low, GAP + low, left + high, GAP + high), outline=(0, 0, 0))
+        draw.text((left, 6), f"{time:.3g} s = {time / plot.window:g} windows", fill=(0, 0, 0))
+        draw.text((left, side + GAP + 4), f"{plot.names[0]} to the right, {plot.names[1]} up", fill=(0, 0, 0))
+    text = (
+        "RMS deformation, of the largest trained: 0 (pale), 1 (orange), 2 and more (dark red). Framed: the trained box"
+    )
+    draw.text((GAP, side + 2 * GAP), f"{text}; to the edge {plot.units[-1]:g} times as far", fill=(0, 0, 0))
+    return image
+
+
+def _colors(values: Floats) -> Floats:
+    at = np.clip(values, 0.0, 2.0) / 2.0 * (len(SCALE) - 1)
+    return np.stack([np.interp(at, np.arange(len(SCALE)), channel) for channel in SCALE.T], axis=-1)

@@ -1,0 +1,161 @@
+"""Numerical stability at the extremes: what is shown for whatever is asked, each claim with a figure and a bound."""
+
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from odeform.dataset.store import bundled_datasets, open_dataset
+from odeform.errors import InputError
+from odeform.models.odeform.model import ODeform
+from odeform.parallel import parallel_map
+from odeform.predictor import Predictor, load_reduced
+from odeform.schema import Window
+from odeform.stress.cases import Case, draws, shapes, thinned
+from odeform.stress.check import Check, Checks
+from odeform.stress.consistency import check_answers
+from odeform.stress.convergence import check_orders, check_refining
+from odeform.stress.physics import check_physics
+from odeform.stress.solvers import check_calibration, check_field, check_sensitivities
+from odeform.types import Floats, Geometry
+
+__all__ = ["Outcome", "report", "show", "stress"]
+
+CASES = 20_000
+MOMENTS = (0.0, 0.05, 0.3, 1.0, 1.5, 3.0, 10.0)  # trained windows
+PATIENCE = 10.0  # s
+TOGETHER = 64  # draws that a process takes at a time
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a draw: a status, and what was shown at `MOMENTS`.
+
+    `moved` and `deformed` are (T,): the largest distance of a point from rest, and the RMS deformation; metres.
+    """
+
+    status: str
+    seconds: float
+    non_finite: int = 0
+    """Frames of which any coordinate is not finite."""
+    start_off: float = 0.0
+    """Largest distance of P(0) from P0 in metres."""
+    moved: tuple[float, ...] = ()
+    deformed: tuple[float, ...] = ()
+
+
+def show(predictor: Predictor, draw: Case, geometries: Mapping[str, Geometry]) -> Outcome:
+    """Solve one draw, and look at it until ten windows. Refusals and faults are outcomes, too."""
+    begin = time.perf_counter()
+    try:
+        return _shown(predictor, draw, geometries[draw.shape], begin)
+    except InputError:
+        return Outcome("refused", time.perf_counter() - begin)
+    except Exception as error:
+        return Outcome(f"fault: {type(error).__name__}", time.perf_counter() - begin)
+
+
+def _shown(predictor: Predictor, draw: Case, geometry: Geometry, begin: float) -> Outcome:
+    schema = predictor.schema
+    parameters = {p.name: value for p, value in zip(schema.parameters, draw.values, strict=True)}
+    times = schema.window.stop * np.array(MOMENTS)
+    motion = predictor.solve(geometry, parameters, draw.quality or "balanced", until=times[-1])
+    frames, rest = motion.vertices(times), np.asarray(geometry.points, dtype=np.float32)
+    moved = np.sqrt(((frames - rest) ** 2).sum(axis=2).max(axis=1))
+    return Outcome(
+        status=motion.stats.status + (", outside the trained box" if motion.outside else ""),
+        seconds=time.perf_counter() - begin,
+        non_finite=int((~np.isfinite(frames).all(axis=(1, 2))).sum()),
+        start_off=float(np.abs(frames[0] - rest).max()),
+        moved=tuple(moved.tolist()),
+        deformed=tuple(motion.deformation_rms(times).tolist()),
+    )
+
+
+def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
+    """`count` distinct draws and all checks, as JSON; the same for the same seed, but for wall times."""
+    predictor = load_reduced(checkpoint)
+    schema = predictor.schema
+    asked = draws(schema, bool(predictor.qualities), count, seed)
+    outcomes = parallel_map("stress", partial(_show_part, checkpoint), asked, TOGETHER)
+    checks = _of_all(predictor, asked, outcomes)
+    checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
+    if isinstance(predictor, ODeform):
+        checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
+        checks |= check_field(predictor, seed) | check_calibration(predictor, seed)
+        if schema.scene in bundled_datasets():
+            checks |= check_refining(predictor, open_dataset(schema.scene))
+    return {
+        "cases": len(asked),
+        "non_finite_shown": sum(outcome.non_finite for outcome in outcomes),
+        "by_status": dict(Counter(outcome.status for outcome in outcomes).most_common()),
+        "checks": {name: check.to_json() for name, check in checks.items()},
+    }
+
+
+def _show_part(checkpoint: str, asked: Sequence[Case]) -> list[Outcome]:
+    predictor, geometries = _opened(checkpoint)
+    return [show(predictor, draw, geometries) for draw in asked]
+
+
+@cache
+def _opened(checkpoint: str) -> tuple[Predictor, dict[str, Geometry]]:
+    """Once in a process."""
+    predictor = load_reduced(checkpoint)
+    return predictor, shapes(predictor.rest)
+
+
+def _of_all(predictor: Predictor, asked: list[Case], outcomes: list[Outcome]) -> Checks:
+    """What all outcomes have to keep to.
+
+    Growth is relative to the largest of the trained motions: what is moved or deformed twice as far as anything
+    that was trained is no motion of that body. Settings coarser than a step a frame or a tolerance of 1e-2 count apart.
+    """
+    largest = _trained(predictor)
+    of_body = [(d, o) for d, o in zip(asked, outcomes, strict=True) if o.moved and d.shape == "body"]
+    growth = np.array([np.divide((o.moved, o.deformed), largest[:, None]) for _, o in of_body])  # (draws, 2, moments)
+    coarse = np.array([_coarse(d, predictor.schema.window) for d, _ in of_body])
+    sound = growth[~coarse]
+    diverged = (sound > 2.0).any(axis=(0, 1))
+    return {
+        "faults": Check(sum(outcome.status.startswith("fault") for outcome in outcomes), 0),
+        "non_finite_frames": Check(sum(outcome.non_finite for outcome in outcomes), 0),
+        "start_off_m": Check(max(outcome.start_off for outcome in outcomes), 0.0),
+        "slowest_case_s": Check(max(outcome.seconds for outcome in outcomes), PATIENCE),
+        "distance_growth": Check(float(sound[:, 0].max()), 2.0),
+        "deformation_growth": Check(float(sound[:, 1].max()), 2.0),
+        "deformation_growth_of_coarse_solvers": Check(float(growth[:, 1].max()), 2.0),
+        "until_divergence_windows": Check(MOMENTS[diverged.argmax() if diverged.any() else -1], MOMENTS[-1], True),
+    }
+
+
+def _trained(predictor: Predictor) -> Floats:
+    """(2,) metres: largest distance of a point from rest, and RMS deformation, of the trained motions and window."""
+    times, rest, rows = predictor.schema.window.times, thinned(predictor.rest), []
+    for theta in predictor.checkpoint.arrays["training.theta"]:
+        units = zip(predictor.schema.learned, theta, strict=True)
+        motion = predictor.solve(rest, {p.name: p.denormalise(float(unit)) for p, unit in units})
+        moved = np.linalg.norm(motion.vertices(times) - rest.points, axis=2)
+        rows.append((moved.max(), motion.deformation_rms(times).max()))
+    return np.max(rows, axis=0)
+
+
+def _coarse(draw: Case, window: Window) -> bool:
+    quality = draw.quality
+    if quality is None:
+        return False
+    return quality.tolerance > 1e-2 if quality.tolerance is not None else (quality.step or 0.0) > 1.01 / window.rate
+
+
+def report(result: Mapping[str, Any]) -> str:
+    """The result as a few lines of text."""
+    lines = [f"{result['cases']} cases, {result['non_finite_shown']} frames shown that were not finite"]
+    lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
+    for name, check in result["checks"].items():
+        figure = "not finite" if check["figure"] is None else f"{check['figure']:.4g}"
+        lines.append(f"{'holds' if check['holds'] else 'FAILS'}   {name:<40}{figure:>12}   bound {check['bound']:.4g}")
+    return "\n".join(lines)

@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from odeform.identification.fit import normal_equations
+from odeform.identification.linear import Linear
+
+TIMES, COORDINATES, CAUSES, PARAMETERS = 5, 12, 8, 2
+NOISE = 0.7
+
+
+def problem(seed: int = 0) -> tuple[Linear, np.ndarray]:
+    """A random linear problem without residuals, and variances of its causes."""
+    rng = np.random.default_rng(seed)
+    spread = rng.normal(size=(TIMES, COORDINATES, CAUSES))
+    gain = rng.normal(size=(TIMES, CAUSES, PARAMETERS))
+    return Linear(np.zeros((TIMES, COORDINATES)), spread, gain), rng.uniform(0.01, 2.0, size=(TIMES, CAUSES)) ** 2
+
+
+def observed(linear: Linear, variances: np.ndarray, theta: np.ndarray, rng: np.random.Generator) -> Linear:
+    causes = linear.gain @ theta + np.sqrt(variances) * rng.normal(size=variances.shape)
+    off = np.einsum("tnk,tk->tn", linear.spread, causes) + NOISE * rng.normal(size=linear.off.shape)
+    return Linear(off, linear.spread, linear.gain)
+
+
+@pytest.mark.parametrize("coordinates", [COORDINATES, 3])
+def test_agrees_with_the_covariance_written_out(coordinates: int) -> None:
+    """Also with fewer coordinates than causes, where those could not be solved for."""
+    linear, variances = problem()
+    linear = observed(linear, variances, np.array([0.3, -0.5]), np.random.default_rng(1))
+    linear = Linear(linear.off[:, :coordinates], linear.spread[:, :coordinates], linear.gain)
+    information, score, cost = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS), 0.0
+    for off, spread, gain, squares in zip(linear.off, linear.spread, linear.gain, variances, strict=True):
+        inverse = np.linalg.inv(NOISE**2 * np.eye(coordinates) + spread * squares @ spread.T)
+        slopes = spread @ gain
+        information += slopes.T @ inverse @ slopes
+        score += slopes.T @ inverse @ off
+        cost += off @ inverse @ off
+    ours = normal_equations(linear, variances, NOISE)
+    assert np.allclose(ours[0], information)
+    assert np.allclose(ours[1], score)
+    assert ours[2] == pytest.approx(cost)
+
+
+def test_intervals_cover_as_often_as_they_claim() -> None:
+    linear, variances = problem()
+    rng, theta, inside = np.random.default_rng(2), np.array([0.3, -0.5]), []
+    for _ in range(500):
+        information, score, _ = normal_equations(observed(linear, variances, theta, rng), variances, NOISE)
+        covariance = np.linalg.inv(information)
+        inside.append(np.abs(covariance @ score - theta) < 1.6449 * np.sqrt(np.diag(covariance)))
+    assert np.mean(inside, axis=0) == pytest.approx(0.9, abs=0.03)

@@ -1,0 +1,149 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.identification.discrepancy import Discrepancy
+from odeform.identification.identify import Identification, identify
+from odeform.identification.linear import derivatives, parameters_of
+from odeform.identification.observation import Observation
+from odeform.predictor import Predictor, load
+from odeform.solver.integrate import SolverSettings
+from odeform.types import PointCloud
+
+HEADING = 0.7
+FINE = SolverSettings("dopri5", tolerance=1e-7, dtype="float64")
+
+
+def certain(predictor: Predictor) -> Discrepancy:
+    """A model that is hardly wrong."""
+    times = predictor.schema.window.times[1:]
+    causes, terms = 6 + predictor.solve().space.basis.modes, 1 + len(predictor.schema.learned)
+    return Discrepancy(times, np.full((len(times), causes), 1e-6), np.zeros((len(times), causes, terms)))
+
+
+def seen(predictor: Predictor, theta: np.ndarray, times: np.ndarray, points: int = 40) -> Observation:
+    """The model's own motion, at points of the surface that are no vertices."""
+    mesh = predictor.rest
+    chosen = np.random.default_rng(0).choice(len(mesh.faces), points, replace=False)
+    rest = mesh.points[mesh.faces[chosen]].mean(axis=1)
+    heading = HEADING if predictor.schema.scene == "kick" else 0.0
+    motion = predictor.solve(PointCloud(rest), parameters_of(predictor.schema, theta, heading), FINE)
+    return Observation(rest, times, motion.vertices(times).astype(float), heading, 1e-3)
+
+
+def units(found: Identification) -> np.ndarray:
+    return np.array([one.unit for one in found.parameters.values()])
+
+
+CASES = {"kick": (0.4, -0.7, 0.3, 0.8), "mass-elastic": (-0.35, 0.6)}
+
+
+@pytest.mark.usefixtures("unchecked")
+@pytest.mark.parametrize("scene", CASES)
+def test_recovers_what_a_model_was_told(scene: str) -> None:
+    predictor, theta = load(scene), np.array(CASES[scene])
+    times = predictor.schema.window.times[1::3]
+    found = identify(predictor, seen(predictor, theta, times), certain(predictor))
+    assert np.abs(units(found) - theta).max() < 1e-3
+    assert found.misfit <= 1.0
+    assert all(one.identifiable and one.low <= one.value <= one.high for one in found.parameters.values())
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
+    predictor, theta = load("mass-elastic"), np.array([-1.0, 1.0])
+    steps: list[dict[str, float]] = []
+    view = seen(predictor, theta, predictor.schema.window.times[1:60:2])
+    found = identify(predictor, view, certain(predictor), steps.append)
+    assert np.abs(units(found) - theta).max() < 1e-3
+    assert len(steps) > 2
+    inside = [p.inside(step[p.name]) for p in predictor.schema.learned for step in steps]
+    assert all(inside)
+
+
+class Cancelled(Exception):
+    pass
+
+
+def test_can_be_cancelled() -> None:
+    def cancel(_: object) -> None:
+        raise Cancelled
+
+    predictor = load("mass-elastic")
+    view = seen(predictor, np.zeros(2), predictor.schema.window.times[1::20])
+    with pytest.raises(Cancelled):
+        identify(predictor, view, certain(predictor), cancel)
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
+    predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
+    clean = seen(predictor, theta, predictor.schema.window.times[2:90:3], points=5)
+    noise = np.random.default_rng(0).normal(size=clean.positions.shape)
+    noisy = replace(clean, positions=clean.positions + 1e-3 * noise, noise_mm=1.0)
+    sure, unsure = (identify(predictor, view, certain(predictor)) for view in (clean, noisy))
+    for one, other, truth in zip(sure.parameters.values(), unsure.parameters.values(), theta, strict=True):
+        assert other.reach > 10.0 * one.reach
+        assert abs(other.unit - truth) < 2.0 * other.reach
+        assert other.identifiable
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_what_is_expected_of_the_error_is_taken_off() -> None:
+    predictor, theta = load("mass-elastic"), np.array([0.3, -0.4])
+    whole = certain(predictor)
+    true = seen(predictor, theta, whole.times[:60])  # the first contact tells enough
+    # a model that is off by 3 mm, and by 2 mm more for each half of the range of mass
+    means = whole.means.copy()
+    means[:, 2, :2] = 3.0, 2.0
+    biased = replace(true, positions=true.positions + np.array([0.0, 0.0, 3.0 + 2.0 * theta[0]]) / 1e3)
+    for means_known, close in ((means, True), (whole.means, False)):
+        found = identify(predictor, biased, replace(whole, means=means_known))
+        off = max(abs(one.unit - truth) for one, truth in zip(found.parameters.values(), theta, strict=True))
+        assert (off < 1e-3) == close, off
+
+
+def test_free_flight_tells_nothing() -> None:
+    """All balls fall alike: what a model makes of mass and bending before the first landing is less than its error."""
+    predictor = load("mass-elastic")
+    flight = seen(predictor, np.array([0.5, 0.5]), np.arange(1, 25) / 120.0)
+    vague = replace(certain(predictor), variances=np.ones_like(certain(predictor).variances))
+    found = identify(predictor, replace(flight, noise_mm=1.0), vague)
+    for parameter, one in zip(predictor.schema.learned, found.parameters.values(), strict=True):
+        assert not one.identifiable
+        assert one.low >= 0.999 * parameter.low
+        assert one.high <= 1.001 * parameter.high
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_what_no_parameters_explain_widens_the_intervals() -> None:
+    predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
+    view = seen(predictor, theta, predictor.schema.window.times[1:60:4], points=8)
+    other = view.positions + 5e-3 * np.random.default_rng(1).normal(size=view.positions.shape)
+    sure, unsure = (
+        identify(predictor, replace(view, positions=positions, noise_mm=0.1), certain(predictor))
+        for positions in (view.positions, other)
+    )
+    assert unsure.misfit > 100.0
+    assert all(unsure.parameters[name].reach > 10.0 * one.reach for name, one in sure.parameters.items())
+
+
+def test_a_model_without_gradients() -> None:
+    predictor, theta = load("mass-elastic/pod-rbf"), np.array(CASES["mass-elastic"])
+    times = predictor.schema.window.times[1::6]
+    jet = derivatives(predictor, theta, times)
+    motions = [
+        predictor.solve(None, parameters_of(predictor.schema, theta + shift, 0.0)).trajectory.reduced(times)
+        for shift in ([0.0, 2e-3], [0.0, -2e-3])
+    ]
+    assert np.allclose(jet[2], (motions[0] - motions[1]) / 4e-3, atol=2e-2 * np.abs(jet[2]).max())
+    found = identify(predictor, seen(predictor, theta, times), certain(predictor))
+    assert np.abs(units(found) - theta).max() < 1e-3
+
+
+def test_looking_up_has_no_slope_and_claims_nothing() -> None:
+    predictor = load("mass-elastic/nearest")
+    times = predictor.schema.window.times[1::10]
+    found = identify(predictor, seen(predictor, np.zeros(2), times), certain(predictor))
+    assert not any(one.identifiable for one in found.parameters.values())

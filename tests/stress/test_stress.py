@@ -1,0 +1,218 @@
+"""A short stress run on really trained models, and that each check finds what it is there to find."""
+
+import itertools
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from odeform.cli import main
+from odeform.dataset.store import open_dataset
+from odeform.geometry.rigid import rotation_from_vector
+from odeform.models.odeform.inference import LatentTrajectory
+from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_motion import ReducedMotion
+from odeform.predictor import Predictor, load
+from odeform.solver import tableau
+from odeform.stress import cases as cases_module
+from odeform.stress import consistency, convergence, physics, solvers, stress
+from odeform.stress.cases import draws, shapes
+from odeform.stress.check import Check
+from odeform.stress.physics import energy_gained
+from odeform.stress.stability import map_image, stability_map
+
+REFINED, FINER = (12, 16, 48), (3, 4, 6)  # within the asymptotic range of all methods
+
+
+@pytest.fixture
+def model(predictors: dict[str, Predictor]) -> ODeform:
+    model = predictors["odeform"]
+    assert isinstance(model, ODeform)
+    return model
+
+
+@pytest.fixture
+def _short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One motion where a full run takes many, and no million points."""
+    monkeypatch.setattr(cases_module, "SHAPES", cases_module.SHAPES[:-1])
+    for module in (consistency, convergence, physics, solvers):
+        monkeypatch.setattr(module, "DRAWS", 1)
+    monkeypatch.setattr(solvers, "CALIBRATION", (4, 6))
+    monkeypatch.setattr(convergence, "SEQUENCES", 1)
+    monkeypatch.setattr(convergence, "REFINED", REFINED)
+    monkeypatch.setattr(convergence, "FINER", FINER)
+
+
+def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
+    some = draws(model.schema, True, 3000, seed=0)
+    assert len(set(some)) == len(some) == 3000
+    assert repr(draws(model.schema, True, 3000, seed=0)) == repr(some)
+    assert repr(draws(model.schema, True, 3000, seed=1)) != repr(some)
+    assert {d.shape for d in some} == set(shapes(model.rest))
+    ways = {(d.quality.method, d.quality.dtype) for d in some if d.quality}
+    assert ways == set(itertools.product(tableau.METHODS, ("float32", "float64")))
+    mass = np.array([d.values[0] for d in some])
+    assert set(np.round([model.schema.parameters[0].normalise(m) for m in mass if 0.0 < m < 1e9], 6)) >= {
+        sign * reach for sign in (-1.0, 1.0) for reach in (1.0, 1.5, 3.0, 10.0)
+    }
+    few = draws(model.schema, True, 50, seed=0)
+    assert len(few) == 50
+    assert sum(math.isinf(max(d.values)) for d in some) > 0
+
+
+def test_bounds() -> None:
+    assert Check(1.0, 1.0).holds
+    assert not Check(1.1, 1.0).holds
+    assert Check(0.9, 0.9, at_least=True).holds
+    assert not Check(0.8, 0.9, at_least=True).holds
+    assert not Check(math.nan, 1.0).holds
+    assert not Check(math.inf, 1.0, at_least=True).holds
+
+
+@pytest.mark.usefixtures("_short", "unchecked")
+@pytest.mark.parametrize("name", ["odeform", "pod-rbf"])
+def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    out, cases = tmp_path / "stress.json", 30
+    assert main(["stress", str(trained[name]), "--cases", str(cases), "--json", str(out)]) == 0
+    result = json.loads(out.read_text())
+    assert set(result) == {"cases", "non_finite_shown", "by_status", "checks"}
+    assert result["cases"] == sum(result["by_status"].values()) == cases
+    assert result["non_finite_shown"] == 0
+    assert {"ok", "ok, outside the trained box", "refused"} <= set(result["by_status"])
+    assert not any(status.startswith("fault") for status in result["by_status"])
+    said = capsys.readouterr().out
+    for check, row in result["checks"].items():
+        assert set(row) == {"holds", "figure", "bound"}
+        assert check in said
+    sure = {"faults", "non_finite_frames", "start_off_m", "grid_invariance_m", "scrub_order_m", "determinism_m"}
+    sure |= {"batch_invariance_m", "single_precision_mm"}
+    if name == "odeform":
+        sure |= {f"order_{method}_deviation" for method in tableau.METHODS}
+        sure |= {"sensitivity_relative", "solver_error_rank_correlation"}
+    assert sure <= set(result["checks"])
+    assert [check for check in sure if not result["checks"][check]["holds"]] == []
+
+
+def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convergence, "DRAWS", 1)
+    monkeypatch.setattr(convergence, "REFINED", REFINED)
+    monkeypatch.setattr(convergence, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
+    monkeypatch.setitem(tableau.METHODS, "rk4", replace(tableau.METHODS["rk4"], b=(1 / 6, 1 / 3, 1 / 6, 1 / 3)))
+    checks = convergence.check_orders(model)
+    assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
+
+
+def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solvers, "DRAWS", 1)
+    assert solvers.check_sensitivities(model)["sensitivity_relative"].holds
+    sound = ODeform.sensitivities
+    monkeypatch.setattr(ODeform, "sensitivities", lambda *asked: 1.1 * sound(*asked))
+    assert not solvers.check_sensitivities(model)["sensitivity_relative"].holds
+
+
+def test_refining_that_leads_away_from_the_truth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(convergence, "METHODS", {"rk4": tableau.METHODS["rk4"]})
+    model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
+    assert isinstance(model, ODeform)
+    assert convergence.check_refining(model, dataset)["refining_error_ratio"].holds
+    sound = ODeform.solve
+
+    def drifting(self: ODeform, shape: Any, parameters: Any, quality: Any) -> ReducedMotion:
+        heavier = {**parameters, "mass": parameters["mass"] * (1.0 + 1e-5 / quality.step)}
+        return sound(self, shape, heavier, quality)
+
+    monkeypatch.setattr(ODeform, "solve", drifting)
+    assert not convergence.check_refining(model, dataset)["refining_error_ratio"].holds
+
+
+def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:
+    some = draws(model.schema, True, 3000, seed=0)[-5:]
+    return (stress.show(model, draw, shapes(model.rest)) for draw in some)
+
+
+def test_what_is_not_finite_is_counted(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert all(outcome.non_finite == 0 for outcome in _outcomes(model))
+    sound = LatentTrajectory.reduced
+
+    def broken(self: LatentTrajectory, times: np.ndarray) -> np.ndarray:
+        return sound(self, times) * np.where(times > 1.02, np.nan, 1.0)[:, None]
+
+    monkeypatch.setattr(LatentTrajectory, "reduced", broken)
+    assert [outcome.non_finite for outcome in _outcomes(model)] == [3] * 5
+
+
+def test_faults_are_outcomes(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(ODeform, "_trajectory", broken)
+    assert {outcome.status for outcome in _outcomes(model)} == {"fault: ZeroDivisionError"}
+
+
+def test_answers_that_depend_on_the_question_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(consistency, "DRAWS", 1)
+    sound, asked = ReducedMotion.vertices, itertools.count()
+
+    def broken(self: ReducedMotion, t: Any) -> Any:
+        return sound(self, t) + np.float32(1e-5 * next(asked))
+
+    monkeypatch.setattr(ReducedMotion, "vertices", broken)
+    failed = {name for name, check in consistency.check_answers(model).items() if not check.holds}
+    assert failed >= {"grid_invariance_m", "scrub_order_m", "determinism_m", "batch_invariance_m"}
+
+
+def test_exaggerated_deformations_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(physics, "DRAWS", 1)
+    arrays = model.checkpoint.arrays
+    weights = {"basis.weights": 50.0 * arrays["basis.weights"]}
+    wild = ODeform(replace(model.checkpoint, arrays={**arrays, **weights}))
+    failed = [{n for n, c in physics.check_physics(m).items() if not c.holds} for m in (model, wild)]
+    assert failed[1] - failed[0] >= {"inverted_faces", "edge_strain", "volume_drift"}
+
+
+@pytest.mark.parametrize(("restitution", "gained"), [(0.8, 0.0), (1.0, 0.0), (1.1, 0.21), (1.4, 0.96)])
+def test_energy_out_of_nothing(restitution: float, gained: float) -> None:
+    """A point mass is dropped and leaves the floor with `restitution` times the speed it had."""
+    times, drop, gravity = np.linspace(0.0, 0.6, 601), 0.5, 9.81
+    landing = math.sqrt(2.0 * drop / gravity)
+    after = np.maximum(times - landing, 0.0)
+    bounce = restitution * gravity * landing * after - 0.5 * gravity * after**2
+    poses = np.tile(np.eye(4), (len(times), 1, 1))
+    poses[:, 2, 3] = np.where(times < landing, -0.5 * gravity * times**2, bounce - drop)
+    said = energy_gained(times, poses, np.array([[0.0, 0.0, drop]]), np.ones(1))
+    assert said == pytest.approx(gained, abs=0.02)
+
+
+def test_spin_is_energy() -> None:
+    """Two halves of a shell at 0.1 m, at rest and then turning: 1/2 (2/3 r^2) w^2 joins the energy of the fall."""
+    times = np.linspace(0.0, 1.0, 1001)
+    angle = 30.0 * np.maximum(times - 0.5, 0.0)
+    poses = np.stack([np.eye(4)] * len(times))
+    poses[:, :3, :3] = rotation_from_vector(angle[:, None] * np.array([0.0, 0.0, 1.0]))
+    poses[:, 2, 3] = -0.5 * 9.81 * np.minimum(times, 0.2) ** 2
+    points, shares = np.array([[0.1, 0.0, 1.0], [-0.1, 0.0, 1.0]]), np.array([0.5, 0.5])
+    # the first tenth: all of the potential energy over the lowest point
+    potential = 0.5 * 9.81**2 * 0.2**2
+    assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
+
+
+def test_map_shows_where_and_when(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    plot = stability_map(model, ("force", "mass"), reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
+    assert plot.names == ("force", "mass")
+    assert plot.values.shape == plot.sound.shape == (3, 3, 3)
+    assert plot.sound.all()
+    force, mass = (next(p for p in model.schema.parameters if p.name == name) for name in plot.names)
+    motion = model.solve(None, {"force": force.denormalise(2.0), "mass": mass.denormalise(-2.0)})
+    shares = motion.deformation_rms(plot.times) / plot.values[:, 0, 2]
+    assert np.allclose(shares, shares[0])
+    picture = np.asarray(map_image(plot))
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
+    monkeypatch.setattr(LatentTrajectory, "last_good", property(lambda _: 1.02))
+    failed = stability_map(model, reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
+    assert failed.sound.all(axis=(1, 2)).tolist() == [True, True, False]
+    assert not np.array_equal(picture, np.asarray(map_image(failed)))

@@ -1,0 +1,37 @@
+"""Hundreds of random requests over all panels; `python -m odeform_viz.benchmark.latency --soak` sends thousands."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odeform.predictor import Predictor, load
+from odeform_viz.app import App
+from odeform_viz.benchmark.soak import soak
+from odeform_viz.columns import Column, truth_column
+from odeform_viz.panels import truth
+from odeform_viz.runtime import jobs
+
+
+def test_wishes_over_all_panels_break_nothing(
+    drop: Predictor, port: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(truth, "simulate_here", _quick)
+    rival = load("mass-elastic/pod-rbf")
+    columns = [
+        Column("odeform", drop, drop.rest, origin="mass-elastic"),
+        Column("pod-rbf", rival, rival.rest, origin="mass-elastic/pod-rbf"),
+        truth_column("mass-elastic/mass-elastic_00001"),
+    ]
+    app = App(columns, port=port)
+    try:
+        result = soak(app, port, 300, tmp_path, parts=2)
+    finally:
+        app.close()
+    assert result.errors == ()
+    assert np.isfinite(result.newest_s).all()
+    assert result.requests == 300
+
+
+def _quick(send: jobs.Send, *_: object) -> None:
+    raise RuntimeError("no simulator in this test")

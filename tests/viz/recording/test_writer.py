@@ -1,0 +1,215 @@
+"""A recording holds what was shown."""
+
+import json
+import resource
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from odeform import InputError
+from odeform.geometry.shape import fit_to
+from odeform.predictor import Predictor
+from odeform.types import PointCloud
+from odeform_viz.columns import Column, Columns, truth_column
+from odeform_viz.fitting import shape_from
+from odeform_viz.recording.provenance import provenance_of
+from odeform_viz.recording.reader import read_recording
+from odeform_viz.recording.writer import Recorder
+from odeform_viz.session import Frame, Session, ViewRequest
+
+Record = Callable[..., list[Frame]]
+
+
+def _rows(path: Path) -> dict[str, list]:
+    """Component rows by entity and component name, read back from the file."""
+    rows: dict[str, list] = {}
+    for chunk in rr.chunk.RrdReader(str(path)).stream().to_chunks():
+        batch = chunk.to_record_batch()
+        for name in (n for n in batch.schema.names if ":" in n):  # components; the rest are timelines and row ids
+            some = [row for row in batch.column(name).to_pylist() if row]
+            rows.setdefault(f"{chunk.entity_path}:{name}", []).extend(some)
+    return rows
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "session.rrd"
+
+
+def test_positions_parameters_and_provenance_read_back(kick: Predictor, path: Path, record: Record) -> None:
+    frames = record(path, [Column("odeform", kick, kick.rest, origin="kick")])
+    rows = _rows(path)
+    positions = next(v for k, v in rows.items() if "body" in k and "vertex_positions" in k)
+    for frame, logged in zip(frames, positions, strict=True):
+        expected = frame.columns[0].motion.deformed(frame.request.time)
+        np.testing.assert_array_equal(np.asarray(logged, dtype=np.float32), expected)
+    faces = next(v for k, v in rows.items() if "triangle_indices" in k)
+    assert len(faces) == 1  # static: once
+    assert rows["/parameters/mass:Scalars:scalars"] == [[0.6]] * 3
+    provenance = next(v for k, v in rows.items() if "provenance" in k and k.endswith(":text"))
+    assert kick.checkpoint.sha256 in str(provenance)
+
+
+def test_what_reads_back_is_exact(kick: Predictor, path: Path, record: Record) -> None:
+    times, parameters = (0.1 + 0.2, 1.0 / 3.0), {"mass": 0.1 + 0.3, "force": np.nextafter(100.0, 200.0)}
+    frames = record(path, [Column("odeform", kick, kick.rest)], times, parameters)
+    recording = read_recording(path)
+    assert [request["time"] for request in recording.requests.values()] == list(times)
+    assert recording.requests[0]["parameters"] == frames[0].request.parameters
+    assert recording.frames == 2
+    np.testing.assert_array_equal(recording.rest["column_0/form_0"], kick.rest.points)
+    np.testing.assert_array_equal(recording.faces["column_0/form_0"], kick.rest.faces)
+    np.testing.assert_allclose(recording.poses["column_0/form_0", 1], frames[1].columns[0].pose, atol=1e-7)
+    assert set(recording.header["versions"]) >= {"odeform", "numpy", "torch", "rerun-sdk", "viser"}
+
+
+def test_points_go_in_only_when_they_move(kick: Predictor, path: Path, record: Record) -> None:
+    record(path, [Column("odeform", kick, kick.rest)], [0.0, 0.0, 0.02, 0.02, 0.03])
+    recording = read_recording(path)
+    assert [frame for _, frame, _ in recording.points()] == [0, 2, 4]
+    assert [request["columns"]["column_0/form_0"] for request in recording.requests.values()] == [0, 0, 2, 2, 4]
+    assert len(recording.poses) == 5
+
+
+def test_errors_curves_and_statistics_are_series(path: Path, record: Record) -> None:
+    truth = truth_column("mass-elastic/" + _a_test_sequence())
+    model = _load("mass-elastic")
+    columns = [Column("odeform", model, model.rest, origin="mass-elastic"), truth]
+    assert truth.truth is not None
+    frames = record(path, columns, [0.31, 0.35], dict(truth.truth.parameters))
+    rows = _rows(path)
+    errors = [frame.columns[0].error for frame in frames]
+    for quantity in ("rmse_mm", "mae_mm", "worst_mm"):
+        logged = rows[f"/errors/{quantity}/column_0/form_0:Scalars:scalars"]
+        assert logged == [[getattr(error, quantity)] for error in errors]
+    stats = frames[0].columns[0].stats
+    assert rows["/statistics/evaluations/column_0/form_0:Scalars:scalars"] == [[stats.evaluations]] * 2
+    assert rows["/statistics/wall_ms/column_0/form_0:Scalars:scalars"] == [[stats.wall_ms]] * 2
+    assert stats.status in str(rows["/status/column_0/form_0:TextLog:text"])
+    for column in ("column_0", "column_1"):
+        assert len(rows[f"/curves/height_m/{column}/form_0:Scalars:scalars"]) == 2
+        assert len(rows[f"/curves/deformation_mm/{column}/form_0:Scalars:scalars"]) == 2
+
+
+def _a_test_sequence() -> str:
+    from odeform.dataset.store import open_dataset
+
+    return open_dataset("mass-elastic").select("test")[0].name
+
+
+def _load(name: str) -> Predictor:
+    import odeform
+
+    return odeform.load(name)
+
+
+def test_any_label_makes_a_sound_path(
+    kick: Predictor, path: Path, record: Record, capfd: pytest.CaptureFixture[str]
+) -> None:
+    labels = ["kick at 0.4 kg", "kick #2", "kick/pod-rbf (no azimuth)", "Ärger: %$!\\"]
+    record(path, [Column(label, kick, kick.rest) for label in labels])
+    said = capfd.readouterr()
+    assert "WARN" not in said.err
+    assert [column["label"] for _, column in sorted(read_recording(path).columns.items())] == labels
+
+
+def test_the_layout_has_a_view_in_space_for_each_column(kick: Predictor, path: Path, record: Record) -> None:
+    record(path, [Column("one", kick, kick.rest), Column("two", kick, kick.rest)])
+    reader = rr.chunk.RrdReader(path)
+    chunks = [chunk for store in reader.blueprints() for chunk in reader.stream(store=store).to_chunks()]
+    texts = [
+        str({name: batch.column(name).to_pylist() for name in batch.schema.names if ":" in name})
+        for batch in (chunk.to_record_batch() for chunk in chunks)
+    ]
+    assert len(reader.blueprints()) == 1
+    for key, label in enumerate(("one", "two")):
+        assert any(f"world/column_{key}/**" in text for text in texts)
+        assert any(label in text and "DisplayName" not in label for text in texts)
+    assert any("TimeSeries" in text for text in texts)
+
+
+def test_another_shape_is_another_form_and_hidden_columns_are_cleared(kick: Predictor, path: Path) -> None:
+    columns = Columns.of([Column("one", kick, kick.rest), Column("two", kick, kick.rest)])
+    session, recorder = Session(kick.schema), Recorder(path)
+    request = ViewRequest(kick.schema.complete({}), 0.02, "balanced", columns.all)
+    recorder.log(session.frame(request))
+    columns.show(1, False)
+    recorder.log(session.frame(replace(request, columns=columns.all)))
+    columns.show(1, True)
+    columns.reshape(fit_to(PointCloud(kick.rest.points[:50]), kick.rest))
+    recorder.log(session.frame(replace(request, columns=columns.all)))
+    recorder.close()
+    recording = read_recording(path)
+    shown = [set(request["columns"]) for request in recording.requests.values()]
+    assert shown[0] == {"column_0/form_0", "column_1/form_0"}
+    assert shown[1] == {"column_0/form_0"}
+    assert shown[2] == {"column_0/form_1", "column_1/form_1"}
+    assert recording.columns["column_0/form_1"]["geometry"] == "points"
+    assert recording.columns["column_0/form_1"]["shape"]["place"]["factor"] > 0.0
+    assert "/world/column_1/form_0:Clear:is_recursive" in _rows(path)
+
+
+def test_a_file_is_named_by_its_whole_path(kick: Predictor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "model.safetensors").write_bytes(b"")
+    monkeypatch.chdir(tmp_path)
+    origin = provenance_of(Column("model", kick, kick.rest, origin="model.safetensors"))["origin"]
+    assert origin == str(tmp_path / "model.safetensors")
+    assert provenance_of(Column("model", kick, kick.rest, origin="kick/pod-rbf"))["origin"] == "kick/pod-rbf"
+    json.dumps(provenance_of(Column("model", kick, kick.rest, pinned={"mass": 0.5})))
+
+
+def test_two_recordings_of_one_process_are_two(kick: Predictor, tmp_path: Path, record: Record) -> None:
+    ids = set()
+    for name in ("one.rrd", "two.rrd"):
+        record(tmp_path / name, [Column("odeform", kick, kick.rest)])
+        ids.add(rr.chunk.RrdReader(tmp_path / name).recordings()[0].recording_id)
+    assert len(ids) == 2
+
+
+def test_an_unwritable_place_is_refused_at_once(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="recording"):
+        Recorder(tmp_path / "file" / "session.rrd")
+
+
+@pytest.fixture
+def small_files() -> Iterator[None]:
+    """No file grows beyond 200 kB: a disk that is full."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.usefixtures("small_files")
+def test_a_full_disk_is_told_and_what_was_written_reads_back(
+    kick: Predictor, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("odeform_viz.recording.writer.FLUSH", 0.0)
+    columns = Columns.of([Column("odeform", kick, kick.rest)]).all
+    session, recorder = Session(kick.schema), Recorder(path)
+
+    def record_all() -> None:
+        for time in np.linspace(0.01, 0.1, 20):
+            recorder.log(session.frame(ViewRequest(kick.schema.complete({}), float(time), "balanced", columns)))
+
+    with pytest.raises(InputError, match="can no longer be written"):
+        record_all()
+    recording = read_recording(path)
+    assert 0 < len(recording.requests) == recorder.frames - 1
+    assert recording.frames is None
+
+
+def test_what_stands_still_is_recorded_once(kick: Predictor, path: Path, record: Record) -> None:
+    fit = shape_from("volleyball", kick.rest)
+    record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
+    rows = _rows(path)
+    (points,) = rows["/world/still/points:Points3D:positions"]
+    assert fit.still is not None
+    assert len(points) == len(fit.still.points)
+    (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
+    assert "volleyball" in shape

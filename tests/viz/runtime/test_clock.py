@@ -1,0 +1,65 @@
+"""The clock that plays a motion."""
+
+import pytest
+
+from odeform_viz.runtime.clock import Clock
+
+
+class Wall:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def wall() -> Wall:
+    return Wall()
+
+
+def test_plays_at_speed_and_pauses(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.set_speed(0.2)
+    clock.play()
+    wall.now += 2.0
+    assert clock.time() == pytest.approx(0.4)
+    clock.pause()
+    wall.now += 5.0
+    assert clock.time() == pytest.approx(0.4)
+
+
+def test_changing_speed_does_not_jump(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.play()
+    wall.now += 0.3
+    clock.set_speed(0.1)
+    assert clock.time() == pytest.approx(0.3)
+    wall.now += 1.0
+    assert clock.time() == pytest.approx(0.4)
+
+
+def test_loops_within_the_window(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.play()
+    wall.now += 1.25
+    assert clock.time() == pytest.approx(0.25)
+    wall.now += 0.5
+    assert clock.time() == pytest.approx(0.75)
+
+
+def test_without_loop_halts_at_the_end_and_starts_over(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.loop = False
+    clock.play()
+    wall.now += 3.0
+    assert clock.time() == 1.0
+    assert not clock.playing
+    clock.play()
+    assert clock.time() == 0.0
+
+
+def test_seek_beyond_the_window_is_kept(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.seek(1.4)
+    assert clock.time() == 1.4
