@@ -1,17 +1,22 @@
-"""Shared fixtures: a small real data set, simulated once, and a model trained on it for seconds."""
+"""Shared fixtures: a small simulated data set and models trained on it for seconds, made once for all workers."""
 
 import functools
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import jaxtyping
 import pytest
+import torch
+from filelock import FileLock
 from joblib import parallel_config
+from threadpoolctl import threadpool_limits
 
 import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
 from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
 from odeform.models.baselines.point_network import Trial
 from odeform.predictor import Predictor, load
 from odeform.simulation.runner import simulate_dataset
@@ -19,6 +24,15 @@ from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
 from odeform.training.train import POINTS, TrainRequest, train
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Workers share the cores: products on several threads would wait for each other."""
+    torch.set_num_threads(1)
+    with pytest.MonkeyPatch.context() as patch, threadpool_limits(1, "blas"):
+        patch.setenv("OMP_NUM_THREADS", "1")  # for processes that tests start
+        yield
 
 
 def _coarsen(patch: pytest.MonkeyPatch) -> None:
@@ -50,24 +64,53 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="session")
-def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    """Coarse kicks: really simulated, with fewer vertices and at a larger step than the scene's own."""
-    with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
-        _coarsen(patch)
-        return simulate_dataset("kick", tmp_path_factory.mktemp("kick"), count=21, seed=3, workers=2)
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """A folder of that name, filled by the first worker that asks for it; the others wait for it."""
+    root = tmp_path_factory.getbasetemp()
+    root = root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+    def make(name: str, fill: Callable[[Path], object]) -> Path:
+        folder, done = root / name, root / f"{name}.done"
+        with FileLock(f"{folder}.lock"):
+            if not done.exists():
+                fill(folder)
+                done.touch()
+        return folder
+
+    return make
+
+
+MadeOnce = Callable[[str, Callable[[Path], object]], Path]
 
 
 @pytest.fixture(scope="session")
-def trained(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A checkpoint of every model, each trained on the small data set; with fewer random features, for time."""
-    root, rest, paths = tmp_path_factory.mktemp("models"), get_scene("kick").rest_mesh(), {}
-    few = functools.partial(config.TrainConfig, random_features=200, sharpnesses=(1.0,))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(config, "TrainConfig", few)
-        for model in ("odeform", "pod-rbf", "nearest"):
-            paths[model] = root / f"{model}.safetensors"
-            train(dataset, rest, paths[model], TrainRequest(model, seed=1, steps=60), lambda _: None)
-    return paths
+def dataset(made_once: MadeOnce) -> Dataset:
+    """Coarse kicks: really simulated, with fewer vertices and a larger step than the scene's own."""
+
+    def simulate(folder: Path) -> None:
+        with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
+            _coarsen(patch)
+            simulate_dataset("kick", folder, count=21, seed=3, workers=2)
+
+    return open_dataset(made_once("kick", simulate))
+
+
+@pytest.fixture(scope="session")
+def trained(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
+    """A checkpoint of every reduced model, trained on the small data set with few random features."""
+    models = ("odeform", "pod-rbf", "nearest")
+
+    def fit(folder: Path) -> None:
+        few = functools.partial(config.TrainConfig, random_features=200, sharpnesses=(1.0,))
+        folder.mkdir()
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(config, "TrainConfig", few)
+            for model in models:
+                path = folder / f"{model}.safetensors"
+                train(dataset, get_scene("kick").rest_mesh(), path, TrainRequest(model, seed=1, steps=60), _silent)
+
+    folder = made_once("models", fit)
+    return {model: folder / f"{model}.safetensors" for model in models}
 
 
 @pytest.fixture(scope="session")
@@ -76,17 +119,25 @@ def predictors(trained: dict[str, Path]) -> dict[str, Predictor]:
 
 
 @pytest.fixture(scope="session")
-def point_models(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def point_models(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
     """A checkpoint of every model that moves each point by itself: narrow, and trained for a few steps."""
-    root, rest, paths = tmp_path_factory.mktemp("points"), get_scene("kick").rest_mesh(), {}
-    with pytest.MonkeyPatch.context() as patch, _unchecked():
-        for name, model in POINTS.items():
-            patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
-            patch.setattr(model.network, "work", 256, raising=False)
-            paths[name] = root / f"{name}.safetensors"
-            steps = 210 if model.network.teaching == "moments" else 56  # which are cheap
-            train(dataset, rest, paths[name], TrainRequest(name, seed=1, steps=steps, every=4), lambda _: None)
-    return paths
+
+    def fit(folder: Path) -> None:
+        folder.mkdir()
+        with pytest.MonkeyPatch.context() as patch, _unchecked():
+            for name, model in POINTS.items():
+                patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
+                patch.setattr(model.network, "work", 256, raising=False)
+                steps = 210 if model.network.teaching == "moments" else 56  # a step of these is cheap
+                request = TrainRequest(name, seed=1, steps=steps, every=4)
+                train(dataset, get_scene("kick").rest_mesh(), folder / f"{name}.safetensors", request, _silent)
+
+    folder = made_once("points", fit)
+    return {name: folder / f"{name}.safetensors" for name in POINTS}
+
+
+def _silent(_: str) -> None:
+    """Training reports its progress to nobody."""
 
 
 @pytest.fixture(scope="session")
