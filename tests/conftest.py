@@ -2,10 +2,12 @@
 
 import functools
 import os
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jaxtyping
 import pytest
@@ -33,6 +35,25 @@ def one_thread() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch, threadpool_limits(1, "blas"):
         patch.setenv("OMP_NUM_THREADS", "1")  # for processes that tests start
         yield
+
+
+@pytest.fixture(autouse=True)
+def no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Processes that a test starts end with it; one that is left is killed, and the test fails."""
+    started: list[subprocess.Popen[Any]] = []
+    start = subprocess.Popen.__init__
+
+    def remember(process: subprocess.Popen[Any], *args: Any, **settings: Any) -> None:
+        start(process, *args, **settings)
+        started.append(process)
+
+    monkeypatch.setattr(subprocess.Popen, "__init__", remember)
+    yield
+    left = [process for process in started if process.poll() is None]
+    for process in left:
+        process.kill()
+        process.wait()
+    assert not left, f"left running: {[process.args for process in left]}"
 
 
 def _coarsen(patch: pytest.MonkeyPatch) -> None:
