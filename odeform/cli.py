@@ -61,15 +61,10 @@ def _emit(result: dict[str, Any], path: str | None) -> None:
 
 def _simulate(args: argparse.Namespace) -> None:
     try:
-        from odeform.simulation.runner import simulate_dataset
-        from odeform.simulation.scene import get_scene
+        from odeform.simulation.runner import simulate
     except ModuleNotFoundError as error:
         raise InputError(f"simulation needs {error.name}: pip install 'odeform[simulate]'") from None
-    count = get_scene(args.scene).count if args.count is None else args.count
-    rate = 1.0 if args.rate is None else args.rate
-    if count < 1 or args.workers < 1 or args.seed < 0 or not 0.0 < rate < float("inf"):
-        raise InputError("simulate: expected --count and --workers of at least 1, --seed from 0 on, a positive --rate")
-    dataset = simulate_dataset(args.scene, args.out, count, args.seed, args.workers, args.rate, corners=args.corners)
+    dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, args.rate, corners=args.corners)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
 

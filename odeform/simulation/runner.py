@@ -1,5 +1,6 @@
 """Many motions of one scene: in parallel, resumable, the same data whatever the number of workers."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from odeform.progress import Progress
 from odeform.simulation.scene import Scene, get_scene
 from odeform.simulation.shell import SimulationError
 
-__all__ = ["simulate_dataset"]
+__all__ = ["simulate"]
 
 
 TEST_RATE = 4  # test sequences have so many times the frames: people look between those that were learned
@@ -41,41 +42,47 @@ def _finished(root: Path, plan: list[Entry], new: Dataset) -> dict[str, Entry]:
     return {e.name: e for e in old.entries if e.name in wanted and e.parameters == wanted[e.name].parameters}
 
 
-def simulate_dataset(
-    scene_name: str,
+def simulate(
+    scene: str,
     out: str | Path,
-    count: int,
+    count: int | None = None,
     seed: int = 0,
     workers: int = 1,
     rate: float | None = None,
     step: float | None = None,
     corners: bool = False,
 ) -> Dataset:
-    """Simulate `count` sequences of a scene into the folder `out`; continues where an earlier run stopped.
+    """Simulate `count` sequences of a scene into the folder `out`; an interrupted run is continued.
 
-    `rate` in Hz and `step` in seconds default to the scene's own. With `corners`, those of the trained box besides, for
-    training.
+    Args:
+        scene: Name of a scene, for example "kick".
+        out: Folder to write to: new, empty, or with an unfinished data set of the same arguments.
+        count: Number of sequences; default: that of the scene's own data set.
+        seed: Seeds the parameters that are drawn and the splits.
+        workers: Number of processes. The data do not depend on it.
+        rate: Frames per second, in Hz; default: the scene's. Test sequences have four times as many.
+        step: Time step of the simulator in seconds; default: the scene's.
+        corners: Also simulate the corners of the parameter box, for the training split.
+
+    Returns:
+        The data set. Sequences that failed stay in its index, with the reason as their status.
+
+    Raises:
+        InputError: An unknown scene, a number out of range, or a folder with another data set.
     """
-    scene: Scene = get_scene(scene_name)
-    root = Path(out)
-    rate = rate or scene.schema.window.rate
-    step = step or scene.step
-    schema = replace(scene.schema, window=replace(scene.schema.window, rate=rate))
-    provenance = {"scene": scene_name, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
+    known = get_scene(scene)
+    count = known.count if count is None else count
+    if count < 1 or workers < 1 or seed < 0 or not (rate is None or 0.0 < rate < math.inf):
+        raise InputError("simulate: expected count and workers of at least 1, seed of at least 0, and a positive rate")
+    root, rate, step = Path(out), rate or known.schema.window.rate, step or known.step
+    plan = _plan(scene, known, count, seed, corners)
+    schema = replace(known.schema, window=replace(known.schema.window, rate=rate))
+    provenance = {"scene": scene, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
     provenance |= {"corners": True} if corners else {}
-    plan = [
-        Entry(f"{scene_name}_{index:05d}", split, parameters)
-        for index, (parameters, split) in enumerate(
-            zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
-        )
-    ]
-    if corners:
-        # in more than two dimensions hardly any drawn point is near one, and sliders reach them
-        plan += [Entry(f"{scene_name}_corner_{i:02d}", "train", at) for i, at in enumerate(scene.schema.corners())]
-    empty = Dataset(root, schema, (), folder_reader(root), scene.fixed, provenance)
+    empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
     done = _finished(root, plan, empty)
     todo = [entry for entry in plan if entry.name not in done]
-    progress = Progress(f"simulate {scene_name}", len(plan), done=len(done))
+    progress = Progress(f"simulate {scene}", len(plan), done=len(done))
 
     def index() -> Dataset:
         dataset = replace(empty, entries=tuple(done[e.name] for e in plan if e.name in done))
@@ -83,7 +90,7 @@ def simulate_dataset(
         return dataset
 
     root.mkdir(parents=True, exist_ok=True)
-    jobs = (delayed(_one)(scene_name, entry, root, rate, step) for entry in todo)
+    jobs = (delayed(_one)(scene, entry, root, rate, step) for entry in todo)
     finished: Any = Parallel(n_jobs=workers, return_as="generator_unordered")(jobs)
     for entry in finished:
         done[entry.name] = entry
@@ -91,3 +98,12 @@ def simulate_dataset(
         progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
     progress.close()
     return index()
+
+
+def _plan(name: str, scene: Scene, count: int, seed: int, corners: bool) -> list[Entry]:
+    drawn = zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
+    plan = [Entry(f"{name}_{index:05d}", split, parameters) for index, (parameters, split) in enumerate(drawn)]
+    if corners:
+        # in more than two dimensions hardly any drawn point is near a corner, but sliders reach them
+        plan += [Entry(f"{name}_corner_{i:02d}", "train", at) for i, at in enumerate(scene.schema.corners())]
+    return plan

@@ -10,7 +10,7 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.schema import Parameters, Window
-from odeform.simulation.runner import simulate_dataset
+from odeform.simulation.runner import simulate
 from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick
 from odeform.simulation.shell import SimulationError
@@ -29,7 +29,7 @@ def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path:
         (root / f"{name}.npz").unlink()
     kept = {path: path.stat().st_mtime_ns for path in root.glob("*.npz")}
     made = dataset.provenance
-    again = simulate_dataset("kick", root, made["count"], made["seed"], workers=1)
+    again = simulate("kick", root, made["count"], made["seed"], workers=1)
     assert len(kept) == made["count"] - 2
     assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     assert again.entries == dataset.entries
@@ -39,7 +39,7 @@ def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path:
 
 def test_another_process_makes_the_same_data(tmp_path: Path) -> None:
     """With all vertices: what this process makes coarser, others do not."""
-    made = simulate_dataset("kick", tmp_path, count=1, workers=2, rate=30.0, step=4e-3)
+    made = simulate("kick", tmp_path, count=1, workers=2, rate=30.0, step=4e-3)
     again = get_scene("kick").simulate(made.entries[0].parameters, rate=30.0, step=4e-3)
     assert again.vertices.shape == (31, 402, 3)
     assert np.array_equal(made.read(made.entries[0]).vertices, again.vertices)
@@ -58,8 +58,8 @@ def test_test_sequences_have_four_times_the_frames(dataset: Dataset) -> None:
 def test_corners_are_for_training(tmp_path: Path) -> None:
     """Besides what is drawn, which stays as it was."""
     corners = get_scene("kick").schema.corners()
-    drawn = simulate_dataset("kick", tmp_path / "drawn", count=1, rate=30.0, step=4e-3)
-    with_corners = simulate_dataset("kick", tmp_path / "both", count=1, rate=30.0, step=4e-3, corners=True)
+    drawn = simulate("kick", tmp_path / "drawn", count=1, rate=30.0, step=4e-3)
+    with_corners = simulate("kick", tmp_path / "both", count=1, rate=30.0, step=4e-3, corners=True)
     assert with_corners.entries[:1] == drawn.entries
     assert [entry.parameters for entry in with_corners.entries[1:]] == corners
     assert {entry.split for entry in with_corners.entries[1:]} == {"train"}
@@ -68,7 +68,7 @@ def test_corners_are_for_training(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("coarse")
 def test_frames_of_a_rate_asked_for(tmp_path: Path) -> None:
     """The schema says it: what is learned and scored are frames of this rate."""
-    made = simulate_dataset("kick", tmp_path, count=2, rate=30.0)
+    made = simulate("kick", tmp_path, count=2, rate=30.0)
     assert made.schema.window == Window(0.0, 1.0, 30.0)
     assert open_dataset(tmp_path) == made
     assert {e.split: len(made.read(e).times) for e in made.entries} == {"train": 31, "test": 121}
@@ -84,19 +84,19 @@ def test_what_failed_is_listed_and_left_alone(tmp_path: Path, monkeypatch: pytes
         return MotionSequence(np.arange(3) / rate, np.zeros((3, 4, 3)), np.array([[0, 1, 2]]), np.full(4, 0.25))
 
     monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=fragile))
-    made = simulate_dataset("kick", tmp_path, count=3)
+    made = simulate("kick", tmp_path, count=3)
     assert [e.status for e in made.entries] == ["ok", "it broke", "ok"]
     assert [e.name for e in made.select("all")] == ["kick_00000", "kick_00002"]
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["kick_00000.npz", "kick_00002.npz"]
-    assert simulate_dataset("kick", tmp_path, count=3) == made
+    assert simulate("kick", tmp_path, count=3) == made
     assert len(tried) == 3
 
 
 def test_refuses_a_folder_with_another_data_set(dataset: Dataset) -> None:
     with pytest.raises(InputError, match="another data set"):
-        simulate_dataset("kick", dataset.root, dataset.provenance["count"], seed=99)
+        simulate("kick", dataset.root, dataset.provenance["count"], seed=99)
 
 
 def test_unknown_scene(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="kick"):
-        simulate_dataset("throw", tmp_path, count=1)
+        simulate("throw", tmp_path, count=1)
