@@ -21,7 +21,7 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.models.baselines.point_network import Trial
 from odeform.predictor import Predictor, load
-from odeform.simulation.runner import simulate
+from odeform.simulation import runner
 from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
@@ -111,7 +111,7 @@ def dataset(made_once: MadeOnce) -> Dataset:
     def simulate(folder: Path) -> None:
         with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
             _coarsen(patch)
-            simulate("kick", folder, count=21, seed=3, workers=2)
+            runner.simulate("kick", folder, count=21, seed=3, workers=2)
 
     return open_dataset(made_once("kick", simulate))
 
