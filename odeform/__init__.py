@@ -1,7 +1,7 @@
 """ODeform: learned continuous motion of soft bodies."""
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.predictor import Predictor, load
 
 __all__ = ["InputError", "Predictor", "load", "read_geometry"]

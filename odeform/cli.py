@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from odeform.errors import InputError
+from odeform.formats.registry import motion_endings
 
 __all__ = ["main", "run_guarded"]
 
@@ -152,7 +153,8 @@ def _identify(args: argparse.Namespace) -> None:
 
 def _predict(args: argparse.Namespace) -> None:
     from odeform.formats.bundled import read_shape
-    from odeform.formats.motion_files import parse_times, write_motion
+    from odeform.formats.times import parse_times
+    from odeform.formats.writing import write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import Similarity
     from odeform.predictor import load
@@ -308,7 +310,7 @@ def _add_askers(command: Command) -> None:
 
     sub = command("predict", _predict, "predict one motion and write it to a file")
     sub.add_argument("checkpoint", metavar="CKPT")
-    sub.add_argument("--out", required=True, metavar="FILE", help=".npz, or .ply with {frame} in its name")
+    sub.add_argument("--out", required=True, metavar="FILE", help=motion_endings())
     sub.add_argument(
         "--geometry", metavar="FILE", help="a mesh, points or splats (bundled: volleyball), moved as the body"
     )

@@ -14,7 +14,8 @@ from odeform.cancellation import Cancelled, cancel_unless
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
-from odeform.formats.motion_files import write_motion
+from odeform.formats.registry import shape_formats
+from odeform.formats.writing import shape_at, write_motion, write_shape
 from odeform.types import Floats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import fit_from_json
@@ -225,15 +226,16 @@ class App:
         self._changed()
 
     def _export(self, path: Path) -> Path:
-        """The motion of the first model that is shown: a `.ply` of this moment, or all frames as `.npz`."""
+        """Write the motion of the first visible model: the current frame in formats of one shape, else all frames."""
         request = self.request()
         column = next((c for c in request.columns if c.shown and c.predictor), None)
         if column is None:
             raise InputError("export: no model is shown")
         motion = self.session.own_motion(column, request)
-        if path.suffix == ".ply":
-            write_motion(motion, np.array([request.time]), path.with_name(f"{path.stem}_{{frame}}.ply"), column.fit)
-            return path.with_name(f"{path.stem}_{0:05d}.ply")
+        if path.suffix in shape_formats():
+            path = path.with_stem(f"{path.stem}_{0:05d}")
+            write_shape(shape_at(motion, request.time, column.fit), path)
+            return path
         write_motion(motion, self.session.schema.window.times, path, column.fit)
         return path
 

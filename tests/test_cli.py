@@ -8,7 +8,7 @@ import trimesh
 from odeform.cli import main, run_guarded
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.formats.splat_inria import inria_bytes
 from odeform.geometry.shape import fit_to
 from odeform.predictor import Predictor, load

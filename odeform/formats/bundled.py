@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.geometry.region import Region, read_region
 from odeform.io import bundled
 from odeform.types import Geometry

@@ -20,7 +20,7 @@ from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.types import Floats, GaussianSplats
 
-__all__ = ["spz_bytes", "spz_splats"]
+__all__ = ["read_spz", "spz_bytes", "spz_splats"]
 
 Bytes = NDArray[np.uint8]
 
@@ -49,6 +49,11 @@ class Header(NamedTuple):
         """Bytes a splat of position, opacity, colour, scales, turn and further harmonics, in the order of the file."""
         position, turn = 6 if self.version == 1 else 9, 3 if self.version < 3 else 4
         return [position, 1, 3, 3, turn, 3 * ((self.degree + 1) ** 2 - 1)]
+
+
+def read_spz(path: Path, merge: bool) -> GaussianSplats:
+    """All splats of a file, x right, y down, z forward."""
+    return spz_splats(path.read_bytes(), path)
 
 
 def spz_splats(data: bytes, path: Path) -> GaussianSplats:

@@ -8,10 +8,12 @@ from pathlib import Path
 import viser
 
 from odeform.errors import InputError
+from odeform.formats.registry import motion_formats, shape_formats
 
 __all__ = ["EXPORTS", "RecordPanel"]
 
-EXPORTS = {"this moment (.ply)": ".ply", "the whole motion (.npz)": ".npz"}
+EXPORTS = {f"this moment ({suffix})": suffix for suffix in shape_formats()}
+EXPORTS |= {f"the whole motion ({suffix})": suffix for suffix in motion_formats() if suffix not in EXPORTS.values()}
 
 
 class RecordPanel:

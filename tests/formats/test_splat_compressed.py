@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.geometry.ellipsoids import covariances_from_axes
 from odeform.types import SH0, GaussianSplats
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.formats.splat_inria import inria_bytes
 from odeform.geometry.ellipsoids import covariances_from_axes
 from odeform.types import GaussianSplats

@@ -7,7 +7,7 @@ import pytest
 import zstandard
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.geometry.ellipsoids import covariances_from_axes
 from odeform.geometry.harmonics import harmonic_basis
 from odeform.types import SH0, GaussianSplats

@@ -16,7 +16,7 @@ import numpy as np
 from odeform.dataset.importers.naming import in_order, subfolders
 from odeform.dataset.importers.source import Found, Source
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.types import Faces, Frames, Mesh
 
 __all__ = ["TABLES", "mesh_source", "table_of"]

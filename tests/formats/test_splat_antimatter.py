@@ -2,13 +2,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
-from odeform.formats.splat_files import holds_splats
+from odeform.formats.reading import read_geometry
 from odeform.formats.splat_inria import inria_bytes
-from odeform.types import GaussianSplats
+from odeform.types import GaussianSplats, PointCloud
 
 SPLAT = np.dtype([("xyz", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("rot", "u1", 4)])
 
@@ -88,12 +88,9 @@ def test_refuses(tmp_path: Path) -> None:
         assert name in str(caught.value)
 
 
-def test_what_holds_splats(tmp_path: Path) -> None:
+def test_ply_with_splats_or_without(tmp_path: Path) -> None:
     splats = GaussianSplats(np.eye(3), np.tile(np.eye(3), (3, 1, 1)), np.zeros((3, 1, 3)), np.ones(3))
     (tmp_path / "A.PLY").write_bytes(inria_bytes(splats))
-    (tmp_path / "points.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n")
-    assert holds_splats(tmp_path / "A.PLY")
+    trimesh.PointCloud(np.eye(3)).export(tmp_path / "points.ply")
     assert len(read(tmp_path / "A.PLY").points) == 3
-    assert holds_splats(tmp_path / "a.SPZ")
-    assert not holds_splats(tmp_path / "points.ply")
-    assert not holds_splats(tmp_path / "a.obj")
+    assert isinstance(read_geometry(tmp_path / "points.ply"), PointCloud)

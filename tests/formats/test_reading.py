@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
+from odeform.formats.reading import read_geometry
 from odeform.types import Mesh, PointCloud
 
 SPHERE = trimesh.creation.icosphere(2, 0.3)

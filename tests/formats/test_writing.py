@@ -6,8 +6,9 @@ import pytest
 import trimesh
 
 from odeform.errors import InputError
-from odeform.formats.geometry_files import read_geometry
-from odeform.formats.motion_files import parse_times, write_motion
+from odeform.formats.reading import read_geometry
+from odeform.formats.times import parse_times
+from odeform.formats.writing import write_motion
 from odeform.geometry.harmonics import harmonic_basis
 from odeform.geometry.region import Sphere
 from odeform.geometry.rigid import rotation_from_vector

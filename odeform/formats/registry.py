@@ -1,0 +1,94 @@
+"""The file formats that can be read and written, by suffix. A format is one module and one line here.
+
+Modules are named, not imported: help texts and menus list the formats without loading them.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+__all__ = [
+    "FRAME",
+    "READERS",
+    "WRITERS",
+    "Reader",
+    "Writer",
+    "load_function",
+    "motion_endings",
+    "motion_formats",
+    "shape_formats",
+]  # fmt: skip
+
+FRAME = "{frame}"
+"""Placeholder of the frame number in the name of a file; such a name asks for one file per frame."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How a file becomes a geometry."""
+
+    description: str
+    read: str
+    """"module:function" with the signature `(path: Path, merge: bool) -> Geometry`; see `read_geometry` for `merge`.
+    Whatever it raises reaches the user as one `InputError`; sizes and values are validated by the caller."""
+
+
+@dataclass(frozen=True)
+class Writer:
+    """How geometries, whole motions, or both become a file."""
+
+    description: str
+    shape: str = ""
+    """"module:function" with the signature `(geometry: Geometry, path: Path) -> bytes`. It also writes motions, one
+    file per frame."""
+    motion: str = ""
+    """"module:function" with the signature `(file: IO[bytes], motion: Motion, times, fit) -> None`, as `write_motion`,
+    for all frames in one file."""
+
+
+READERS: dict[str, Reader] = {
+    ".glb": Reader("binary glTF scene, joined into one mesh", "odeform.formats.meshes:read_mesh"),
+    ".gltf": Reader("glTF scene, joined into one mesh", "odeform.formats.meshes:read_mesh"),
+    ".obj": Reader("Wavefront mesh", "odeform.formats.meshes:read_mesh"),
+    ".off": Reader("Object File Format mesh", "odeform.formats.meshes:read_mesh"),
+    ".ply": Reader("mesh, points, or Gaussian splats (INRIA or SuperSplat)", "odeform.formats.ply_files:read_ply"),
+    ".splat": Reader("Gaussian splats (antimatter15)", "odeform.formats.splat_antimatter:read_splat"),
+    ".spz": Reader("Gaussian splats (Niantic)", "odeform.formats.splat_spz:read_spz"),
+    ".stl": Reader("mesh", "odeform.formats.meshes:read_mesh"),
+    ".xyz": Reader("points, one per line", "odeform.formats.points:read_xyz"),
+}
+
+WRITERS: dict[str, Writer] = {
+    ".ply": Writer("mesh, points, or Gaussian splats", shape="odeform.formats.ply_files:ply_bytes"),
+    ".obj": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
+    ".stl": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
+    ".glb": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
+    ".npz": Writer("NumPy arrays of all frames", motion="odeform.formats.motion_npz:write_npz"),
+}
+
+
+def shape_formats() -> dict[str, str]:
+    """Suffix -> description of the formats that hold one geometry (`write_shape`)."""
+    return {suffix: writer.description for suffix, writer in WRITERS.items() if writer.shape}
+
+
+def motion_formats() -> dict[str, str]:
+    """Suffix -> description of the formats that hold a whole motion in one file (`write_motion`)."""
+    return {suffix: writer.description for suffix, writer in WRITERS.items() if writer.motion}
+
+
+def motion_endings() -> str:
+    """The names that `write_motion` takes, for help texts and errors."""
+    return f"{_either(motion_formats())}, or {_either(shape_formats())} with {FRAME} in the name (one file per frame)"
+
+
+def load_function(target: str) -> Callable[..., Any]:
+    """The function that "module:function" names."""
+    module, _, name = target.partition(":")
+    return getattr(import_module(module), name)
+
+
+def _either(names: Mapping[str, Any]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} or {last}" if first else last
