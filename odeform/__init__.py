@@ -2,6 +2,7 @@
 
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 
 __all__ = ["InputError", "Predictor", "load", "read_geometry"]

@@ -113,7 +113,7 @@ def _train(args: argparse.Namespace) -> None:
 def _evaluate(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
     from odeform.evaluation.metrics import evaluate
-    from odeform.predictor import load
+    from odeform.models.registry import load
 
     dataset, window = open_dataset(args.data), parse_window(args.window)
     models = {}
@@ -140,7 +140,7 @@ def _identify(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
     from odeform.identification.observation import View
     from odeform.identification.table import identify_split, report
-    from odeform.predictor import load
+    from odeform.models.registry import load
 
     if args.limit is not None and args.limit < 1:
         raise InputError(f"--limit: expected a positive number, got {args.limit}")
@@ -157,7 +157,7 @@ def _predict(args: argparse.Namespace) -> None:
     from odeform.formats.writing import write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import Similarity
-    from odeform.predictor import load
+    from odeform.models.registry import load
     from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
@@ -179,7 +179,7 @@ def _predict(args: argparse.Namespace) -> None:
 
 
 def _info(args: argparse.Namespace) -> None:
-    from odeform.predictor import open_checkpoint
+    from odeform.models.registry import open_checkpoint
 
     checkpoint = open_checkpoint(args.checkpoint)
     config = {k: v for k, v in checkpoint.config.items() if k != "trials"}
@@ -212,7 +212,7 @@ def _stress(args: argparse.Namespace) -> None:
         raise InputError(f"--cases: expected a positive number, got {args.cases}")
     if args.map:
         from odeform.io import atomic_write
-        from odeform.predictor import load_continuous
+        from odeform.models.registry import load_continuous
         from odeform.stress.stability import map_image, stability_map
 
         picture = io.BytesIO()

@@ -10,7 +10,7 @@ from odeform.cli import run_guarded
 from odeform.errors import InputError
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.recording.replay import TOLERANCE, replay

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.geometry.shape import Fit
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor
 from odeform.schema import Schema
 from odeform.types import Geometry
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from odeform.cancellation import Cancelled
 from odeform.errors import InputError
+from odeform.models.base import Predictor
+from odeform.models.registry import observations
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor, observations
 from odeform.schema import REACH as CONTINUED
 from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings

@@ -8,7 +8,7 @@ from typing import Any
 
 import odeform
 from odeform.errors import InputError
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.schema import Schema
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import fit_to_json

@@ -19,8 +19,9 @@ from threadpoolctl import threadpool_limits
 import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
+from odeform.models.base import Predictor
 from odeform.models.baselines.point_network import Trial
-from odeform.predictor import Predictor, load
+from odeform.models.registry import load
 from odeform.simulation import runner
 from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick as kick_scene

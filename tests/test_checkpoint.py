@@ -14,7 +14,8 @@ import torch
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint, write_checkpoint
 from odeform.errors import InputError
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.simulation.scene import get_scene
 
 MODELS = ("odeform", "pod-rbf", "nearest")

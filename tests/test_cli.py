@@ -11,7 +11,8 @@ from odeform.dataset.store import open_dataset
 from odeform.formats.reading import read_geometry
 from odeform.formats.splat_inria import inria_bytes
 from odeform.geometry.shape import fit_to
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.types import GaussianSplats
 
 

@@ -11,7 +11,7 @@ from odeform.benchmark.timing import typical
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.base import SolveStats
 from odeform.motion.evaluated_basis import STILL
-from odeform.motion.reduced_motion import ReducedMotion, Trajectory
+from odeform.motion.reduced_motion import ReducedMotion, Trajectory, as_reduced
 from odeform.motion.reduced_space import POSE
 from odeform.types import Floats
 
@@ -60,7 +60,7 @@ def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
 def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
     """Rows: the knob, ms for a frame as it is and with the knob, and the RMS error that it adds, in mm."""
     shape = round_cloud(POINTS, predictor)
-    motion = predictor.solve(shape)
+    motion = as_reduced(predictor.solve(shape))
     window = predictor.schema.window
     times = np.linspace(window.start, window.stop, FRAMES)
     moments = np.random.default_rng(3).uniform(window.start, window.stop, 40)
@@ -80,7 +80,7 @@ def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
     rigid = with_modes(motion, 0)
     rows.append(row("no local branch: a pose for a frame", rigid.pose, rigid.vertices(times)))
     few = round_cloud(POINTS // DECIMATION, predictor)
-    decimated = predictor.solve(few)
+    decimated = as_reduced(predictor.solve(few))
     followed = _followed(decimated.vertices(times), few.points, shape.points)
     rows.append(row(f"a {DECIMATION}th of the points, the others follow", decimated.vertices, followed))
 

@@ -17,8 +17,9 @@ from odeform.benchmark.timing import as_viewed, milliseconds, quantiles
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.models.odeform.model import ODeform
 from odeform.models.reduced_model import ReducedModel
+from odeform.models.registry import load_reduced
 from odeform.motion.evaluated_basis import evaluate_basis
-from odeform.predictor import load_reduced
+from odeform.motion.reduced_motion import as_reduced
 
 __all__ = ["bench", "report"]
 
@@ -31,7 +32,7 @@ def _latency(predictor: ReducedModel) -> dict[str, Any]:
     """Cold: a change of parameters, of the heading, which needs the basis anew. Warm: a time of a known motion."""
     shape, window = ball(POINTS, predictor), predictor.schema.window
     parameters = random_parameters(predictor, 60)
-    motions = [predictor.solve(shape, p) for p in parameters]
+    motions = [as_reduced(predictor.solve(shape, p)) for p in parameters]
     moments = np.random.default_rng(1).uniform(window.start, window.stop, 300).tolist()
     headings = np.random.default_rng(2).uniform(-np.pi, np.pi, 20)
     splats = predictor.solve(round_splats(SPLATS, predictor))

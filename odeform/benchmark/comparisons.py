@@ -13,11 +13,12 @@ from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
+from odeform.models.base import Predictor
 from odeform.models.baselines.odeform_per_point import OdeformPerPoint
 from odeform.models.odeform.model import ODeform
 from odeform.models.reduced_model import ReducedModel
+from odeform.models.registry import load
 from odeform.motion.reduced_space import motion_rmse
-from odeform.predictor import Predictor, load
 from odeform.solver.integrate import integrate
 from odeform.types import Floats, Geometry
 

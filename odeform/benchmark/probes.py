@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 
 from odeform.dataset.index import Dataset
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.schema import Parameters
 from odeform.types import GaussianSplats, Mesh, PointCloud, Points
 

@@ -11,6 +11,7 @@ from odeform.benchmark.probes import round_cloud
 from odeform.benchmark.timing import milliseconds, typical
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import evaluate_basis
+from odeform.motion.reduced_motion import as_reduced
 
 __all__ = ["least_ms", "limits", "scaling"]
 
@@ -59,7 +60,7 @@ def limits(predictor: ReducedModel) -> dict[str, Any]:
     From coordinates to points: a motion keeps the coordinates of the moments that it was asked for last.
     """
     gflops, gb_s = gemm_gflops(), memory_gb_s()
-    motion = predictor.solve(round_cloud(POINTS, predictor))
+    motion = as_reduced(predictor.solve(round_cloud(POINTS, predictor)))
     window = predictor.schema.window
     times = np.linspace(window.start, window.stop, FRAMES)
     modes = len(motion.evaluated.values)
@@ -83,7 +84,7 @@ def scaling(predictor: ReducedModel, sizes: Sequence[int]) -> list[dict[str, Any
     rows = []
     for points in sizes:
         shape = round_cloud(points, predictor)
-        motion = predictor.solve(shape)
+        motion = as_reduced(predictor.solve(shape))
         basis = float(milliseconds(lambda _, on=motion: evaluate_basis(on.geometry, on.space, 0.0), 1, warm=0)[0])
         solve = typical(lambda _, shape=shape: predictor.solve(shape), 20)
         decode = typical(lambda _, motion=motion: motion.vertices(moment), 30)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
-from odeform.predictor import Predictor, observations
+from odeform.models.base import Predictor
+from odeform.models.registry import observations
 from odeform.schema import Schema, Window
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, MotionSequence, Perpoint, Points

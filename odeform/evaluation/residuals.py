@@ -3,7 +3,8 @@
 import numpy as np
 
 from odeform.dataset.index import Dataset
-from odeform.predictor import Predictor, observations
+from odeform.models.base import Predictor
+from odeform.models.registry import observations
 from odeform.types import Arrays
 
 __all__ = ["validation_residuals"]

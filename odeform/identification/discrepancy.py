@@ -17,8 +17,8 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.identification.linear import Comparison, Linear
 from odeform.identification.observation import View, observe
+from odeform.models.base import Predictor
 from odeform.motion.reduced_space import POSE
-from odeform.predictor import Predictor
 from odeform.types import Floats, Ints, Times
 
 __all__ = ["NOMINAL", "TWO_SIDED", "Discrepancy", "calibrate"]

@@ -10,7 +10,7 @@ from odeform.identification.discrepancy import TWO_SIDED, Discrepancy
 from odeform.identification.fit import Fit, fit
 from odeform.identification.linear import Comparison
 from odeform.identification.observation import Observation
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.schema import Parameter
 from odeform.types import Floats
 

@@ -14,10 +14,10 @@ from jaxtyping import Float
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid, body_spin, rotation_from_vector, vector_from_rotation
 from odeform.identification.observation import Observation
+from odeform.models.base import Predictor
 from odeform.motion.evaluated_basis import evaluate_basis
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import POSE, to_canonical
-from odeform.predictor import Predictor
 from odeform.schema import Parameters, Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, PointCloud, Rotations, Times, Vectors

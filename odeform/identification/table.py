@@ -15,8 +15,8 @@ from odeform.errors import InputError
 from odeform.identification.discrepancy import NOMINAL, Discrepancy, calibrate
 from odeform.identification.identify import Identification, Identified, identify
 from odeform.identification.observation import Observation, View, observe
+from odeform.models.base import Predictor
 from odeform.parallel import parallel_map
-from odeform.predictor import Predictor
 from odeform.progress import Progress
 from odeform.schema import Parameter, Parameters
 

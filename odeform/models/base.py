@@ -1,4 +1,4 @@
-"""What all models that come from a checkpoint share: reading it, and what they check before they solve."""
+"""The base class of all models: parameters and a shape in, a motion out."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -15,41 +15,59 @@ from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
 
-__all__ = ["TrainedModel", "check_finite"]
+__all__ = ["Predictor", "check_finite"]
 
 
 def check_finite(geometry: Geometry) -> None:
-    """`InputError` for a shape that cannot be moved."""
+    """`InputError` for a shape without points, or with points that are not finite."""
     if not np.isfinite(geometry.points).all() or len(geometry.points) == 0:
         raise InputError("geometry: expected at least one point, all finite")
 
 
-class TrainedModel(ABC):
-    """A predictor of one scene."""
+class Predictor(ABC):
+    """A model of one scene, read from a checkpoint.
+
+    A subclass sets `model`, reads its arrays in `_read` and predicts in `_solve`; how it is trained stands with it
+    too (`odeform.models.registry`).
+    """
 
     model: str
+    """The name under which checkpoints and the command line know this class."""
     qualities: Mapping[str, SolverSettings] = {}
-    """Ways to integrate, by name; empty for models that leave no choice."""
+    """Solver settings by name (draft, balanced, reference); empty for models that do not integrate."""
     frontier: tuple[FrontierPoint, ...] = ()
-    """The ways to choose from, cheap to fine; empty for models that leave none, and in older checkpoints."""
+    """The measured solver settings, cheap to fine; empty for models without, and in older checkpoints."""
     rescales_input: bool = True
+    """Whether a foreign shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
     extrapolates: bool = True
+    """Whether motions continue beyond the trained window; otherwise only the window can be scored."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         try:
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
             self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
-            self._expected = ErrorBand(checkpoint.arrays) if "val.theta" in checkpoint.arrays else None
+            self._error_band = ErrorBand(checkpoint.arrays) if "val.theta" in checkpoint.arrays else None
             self._read(checkpoint)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
 
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
-        """Take what this model needs; KeyError where it is missing."""
+        """Take what this model needs; KeyError or ValueError where it is missing or wrong."""
 
     @abstractmethod
+    def _solve(
+        self,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
+    ) -> Motion:
+        """As `solve`, with everything filled in: all parameters, the settings (None for a model without qualities
+        that was given a quality by name), and the end in seconds, soft-clamped to what models are asked for."""
+
     def solve(
         self,
         geometry: Geometry | None = None,
@@ -58,34 +76,43 @@ class TrainedModel(ABC):
         until: float | None = None,
         observed: MotionSequence | None = None,
     ) -> Motion:
-        """The motion of `geometry` (default: the body the model was trained on) under `parameters`.
+        """The motion of `geometry` under `parameters`.
 
-        The geometry lies in the scene as at rest. Integrates to `until` seconds (default: the trained window); the
-        motion can be asked beyond and then goes on. Beyond what was trained motions fade: models see parameters and
-        times that `Schema.inputs` and `Window.soft_clamped` bound.
+        Args:
+            geometry: a shape of N points in metres, where it lies at rest in the scene; the trained body by default.
+            parameters: by name, in the units of `schema`; defaults for the others.
+            quality: the name of one of `qualities`, or solver settings.
+            until: seconds that are integrated at once (default: the trained window). Later times may be evaluated
+                too and continue the integration. Beyond the trained range parameters and times are soft-clipped
+                (`Schema.inputs`, `Window.soft_clamped`), so that motions stay bounded.
+            observed: the frames between which a model with `schema.needs_observations` interpolates.
+
+        Raises:
+            InputError: for a shape, parameter, quality or observation that this model cannot use.
         """
+        self._check_observed(observed)
+        window = self.schema.window
+        end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
+        shape = self.rest if geometry is None else geometry
+        return self._solve(shape, self.schema.complete(parameters), self._settings(quality), end, observed)
 
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
-        """(T, 2) mm RMSE at (T,) seconds, which half and nine in ten of unseen motions of the trained body keep to.
-
-        None where the checkpoint knows nothing of validation.
-        """
-        return None if self._expected is None else self._expected.at(self.schema.vector(parameters), times)
+        """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
+        within. None where the checkpoint holds no validation errors."""
+        return None if self._error_band is None else self._error_band.at(self.schema.vector(parameters), times)
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
-        """As it is: `solve` expects bodies where they lie in the scene."""
+        """A body at rest in the scene, in the frame in which `solve` expects it: here the scene's own."""
         return geometry
 
-    def _shape(self, geometry: Geometry | None, observed: MotionSequence | None) -> Geometry:
-        """The shape to move. `InputError` where observations are given that have no use, or lack that are needed."""
+    def _check_observed(self, observed: MotionSequence | None) -> None:
         if observed is not None and not self.schema.needs_observations:
             raise InputError(f"{self.model}: predicts from parameters alone and takes no observed frames")
         if observed is None and self.schema.needs_observations:
-            raise InputError(f"{self.model}: moves between observed frames, and none were given")
-        return self.rest if geometry is None else geometry
+            raise InputError(f"{self.model}: interpolates between observed frames, and none were given")
 
-    def _quality(self, quality: str | SolverSettings) -> SolverSettings | None:
-        """How to integrate; None for models without a choice, whatever is asked of them."""
+    def _settings(self, quality: str | SolverSettings) -> SolverSettings | None:
+        """None for a model without qualities that is given one by name."""
         if not self.qualities or isinstance(quality, SolverSettings):
             return quality if isinstance(quality, SolverSettings) else None
         if quality not in self.qualities:

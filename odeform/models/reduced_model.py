@@ -2,13 +2,9 @@
 
 from abc import abstractmethod
 from collections import OrderedDict
-from collections.abc import Mapping
-from typing import Any
-
-import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.base import TrainedModel, check_finite
+from odeform.models.base import Predictor, check_finite
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
 from odeform.motion.reduced_space import ReducedSpace
@@ -21,7 +17,7 @@ __all__ = ["ReducedModel"]
 CACHED = 4  # geometries (or headings) whose basis is kept
 
 
-class ReducedModel(TrainedModel):
+class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) comes from parameters."""
 
     def _read(self, checkpoint: Checkpoint) -> None:
@@ -44,18 +40,14 @@ class ReducedModel(TrainedModel):
         self._evaluated.move_to_end(key)
         return self._evaluated[key][1]
 
-    def solve(
+    def _solve(
         self,
-        geometry: Geometry | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        quality: str | SolverSettings = "balanced",
-        until: float | None = None,
-        observed: MotionSequence | None = None,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
     ) -> ReducedMotion:
-        shape = self._shape(geometry, observed)
-        complete: Parameters = self.schema.complete(parameters)
-        evaluated = self.evaluate_basis(shape, self.schema.azimuth(complete))
-        window = self.schema.window
-        span = float(window.soft_clamped(np.array(window.stop if until is None else until)))
-        trajectory = self._trajectory(self.schema.inputs(complete), evaluated, self._quality(quality), span)
-        return ReducedMotion(self.schema, complete, shape, self.space, evaluated, trajectory)
+        evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
+        trajectory = self._trajectory(self.schema.inputs(parameters), evaluated, settings, until)
+        return ReducedMotion(self.schema, parameters, geometry, self.space, evaluated, trajectory)

@@ -8,6 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from odeform.errors import InputError
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
@@ -15,7 +16,7 @@ from odeform.motion.reduced_space import ReducedSpace, rotation_of
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
-__all__ = ["Motion", "Trajectory"]
+__all__ = ["ReducedMotion", "Trajectory", "as_reduced"]
 
 SEVERAL = 4  # points that are turned as one: products with three rows leave most of a processor's width unused
 BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are turned
@@ -159,6 +160,13 @@ class ReducedMotion(Motion):
         rotation = turn @ self._to_canonical_axes
         flat = self.geometry.covariances.reshape(-1, 9) @ np.kron(rotation, rotation).T
         return flat.reshape(-1, 3, 3).astype(np.float32)
+
+
+def as_reduced(motion: Motion) -> ReducedMotion:
+    """The same motion, as one of reduced coordinates; `InputError` where it is of another kind."""
+    if not isinstance(motion, ReducedMotion):
+        raise InputError(f"expected a motion of reduced coordinates, got {type(motion).__name__}")
+    return motion
 
 
 def _turned(axes: Axes, rotation: Rotations) -> Axes:

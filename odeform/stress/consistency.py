@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.solver.integrate import SolverSettings
 from odeform.stress.cases import inside
 from odeform.stress.check import Check, Checks

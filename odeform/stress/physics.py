@@ -3,7 +3,7 @@
 import numpy as np
 
 from odeform.geometry.shape import surface_shares
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.simulation.objects.ball import GRAVITY
 from odeform.stress.cases import inside
 from odeform.stress.check import Check, Checks

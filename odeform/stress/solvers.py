@@ -7,6 +7,7 @@ from scipy.stats import rankdata
 
 from odeform.models.odeform.inference import Field
 from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_motion import as_reduced
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import LATER
 from odeform.solver.integrate import SolverSettings, integrate
@@ -61,7 +62,7 @@ def _divergence(model: ODeform, seed: int) -> float:
     schema, step = model.schema, SolverSettings("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
     times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
     drawn = inside(schema, 4 * DRAWS, seed)
-    motions = [model.solve(None, parameters, step).trajectory.reduced(times) for parameters in drawn]
+    motions = [as_reduced(model.solve(None, parameters, step)).trajectory.reduced(times) for parameters in drawn]
     deformed = np.max([np.linalg.norm(y[:, POSE:], axis=1) for y in motions], axis=0)
     diverged = deformed > 2.0 * deformed[times <= schema.window.stop].max()
     return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)

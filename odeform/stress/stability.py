@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from PIL import Image, ImageDraw
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.stress.cases import inside
 from odeform.types import Floats, Times
 

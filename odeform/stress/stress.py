@@ -11,9 +11,10 @@ import numpy as np
 
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
+from odeform.models.registry import load_reduced
 from odeform.parallel import parallel_map
-from odeform.predictor import Predictor, load_reduced
 from odeform.schema import Window
 from odeform.stress.cases import Case, draws, shapes, thinned
 from odeform.stress.check import Check, Checks

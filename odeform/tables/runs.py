@@ -17,7 +17,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.io import atomic_write
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform.progress import Progress
 from odeform.training.train import TrainRequest, rest_of, train, train_command
 

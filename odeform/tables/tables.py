@@ -12,7 +12,7 @@ from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
 from odeform.identification.table import identify_split
 from odeform.io import atomic_write
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import KEPT, run_cells

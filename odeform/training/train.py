@@ -25,7 +25,7 @@ from odeform.models.baselines.odeform_per_point import OdeformPerPoint
 from odeform.models.baselines.pod_rbf import fit_pod_rbf
 from odeform.models.baselines.rnn import Rnn
 from odeform.models.odeform.model import PREFIX
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform.simulation.scene import known_scenes
 from odeform.training.continuation import with_continuation
 from odeform.training.point_data import prepare_points

@@ -20,8 +20,8 @@ from odeform.benchmark.probes import ball, round_splats
 from odeform.benchmark.timing import milliseconds
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.store import bundled_datasets, open_dataset
+from odeform.models.base import Predictor
 from odeform.models.reduced_model import ReducedModel
-from odeform.predictor import Predictor
 from odeform.types import Floats
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import viser
 
 from odeform.errors import InputError
+from odeform.models.base import Predictor
 from odeform.models.frontier import cheapest_within_error, finest_within_budget
-from odeform.predictor import Predictor
 
 __all__ = ["QualityPanel", "quality_names"]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 import odeform
 from odeform.errors import InputError
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import Faces, Geometry, Mesh, PointCloud, Points
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.recording.provenance import versions

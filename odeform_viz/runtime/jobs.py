@@ -92,7 +92,7 @@ def simulate_here(send: Send, scene: str, parameters: dict[str, float], rate: fl
 
 def map_here(send: Send, checkpoint: str) -> np.ndarray:
     """(H, W, 3) pixels: where a model is stable, within the window and beyond."""
-    from odeform.predictor import load_continuous
+    from odeform.models.registry import load_continuous
     from odeform.stress.stability import map_image, stability_map
 
     return np.asarray(map_image(stability_map(load_continuous(checkpoint), moments=(0.5, 1.0, 3.0))))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from odeform.benchmark.ablations import with_modes
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 
 TIMES = np.array([0.0, 0.03, 0.4])
 

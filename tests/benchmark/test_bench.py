@@ -6,7 +6,7 @@ import pytest
 from odeform.benchmark import ablations, bench, comparisons, precision, roofline
 from odeform.cli import main
 from odeform.dataset.index import Dataset
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 
 full_ladder, full_load = precision.ladder, comparisons.load
 

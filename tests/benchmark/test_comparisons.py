@@ -4,8 +4,8 @@ import pytest
 
 from odeform.benchmark import comparisons
 from odeform.benchmark.precision import find_places
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor
 
 
 @pytest.fixture

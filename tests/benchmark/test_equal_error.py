@@ -5,8 +5,8 @@ import pytest
 
 from odeform.benchmark import equal_error
 from odeform.dataset.index import Dataset
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor
 from odeform.simulation.scene import get_scene
 
 

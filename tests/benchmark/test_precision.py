@@ -7,8 +7,8 @@ from odeform.benchmark.precision import Place, find_places, ladder, measure
 from odeform.benchmark.probes import nearest_sequences
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor
 from odeform.solver.integrate import SolverSettings
 
 

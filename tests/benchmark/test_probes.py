@@ -2,7 +2,7 @@ import numpy as np
 
 from odeform.benchmark.probes import ball, nearest_sequences, random_parameters, round_splats
 from odeform.dataset.index import Dataset
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 
 
 def test_round_shapes_lie_where_the_body_does(predictors: dict[str, Predictor]) -> None:

@@ -1,7 +1,7 @@
 import pytest
 
 from odeform.benchmark.roofline import least_ms, scaling
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 
 
 def test_the_slower_of_arithmetic_and_memory_binds() -> None:

@@ -7,7 +7,7 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import Scores, evaluate
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import MotionSequence
 
 ALL = np.ones(3, dtype=bool)

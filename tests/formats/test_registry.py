@@ -14,8 +14,8 @@ from odeform.formats.registry import READERS, WRITERS, Reader, Writer, load_func
 from odeform.formats.writing import write_motion, write_shape
 from odeform.geometry.primitives import octasphere
 from odeform.geometry.shape import Fit
+from odeform.models.base import Predictor
 from odeform.motion.base import Motion
-from odeform.predictor import Predictor
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh, PointCloud
 
 BALL = octasphere(0.1, 3)

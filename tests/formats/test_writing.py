@@ -14,7 +14,7 @@ from odeform.geometry.region import Sphere
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.shape import fit_to
 from odeform.geometry.similarity import Similarity
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, PointCloud
 
 

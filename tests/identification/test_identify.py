@@ -7,7 +7,8 @@ from odeform.identification.discrepancy import Discrepancy
 from odeform.identification.identify import Identification, identify
 from odeform.identification.linear import derivatives, parameters_of
 from odeform.identification.observation import Observation
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.solver.integrate import SolverSettings
 from odeform.types import PointCloud
 

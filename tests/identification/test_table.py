@@ -11,7 +11,7 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.identification.discrepancy import calibrate
 from odeform.identification.table import identify_split
-from odeform.predictor import load
+from odeform.models.registry import load
 
 
 @pytest.fixture(scope="module")

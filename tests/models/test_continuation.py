@@ -7,10 +7,10 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
+from odeform.models.base import Predictor
 from odeform.models.continuation import PREFIX, ContinuedTrajectory, Dynamics
 from odeform.models.odeform.model import ODeform
 from odeform.motion.base import SolveStats
-from odeform.predictor import Predictor
 from odeform.schema import REACH, Schema, Window
 from odeform.training.continuation import fit_dynamics
 from odeform.types import Floats

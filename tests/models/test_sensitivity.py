@@ -3,7 +3,7 @@ import pytest
 
 from odeform.models.frontier import EXACT
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform.solver.integrate import SolverSettings
 
 TIMES = np.array([0.004, 0.02, 0.11, 0.4, 0.93])

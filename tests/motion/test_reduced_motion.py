@@ -11,11 +11,12 @@ from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
 from odeform.geometry.rigid import rotation_z
 from odeform.geometry.shape import surface_shares
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
+from odeform.models.registry import load
 from odeform.motion.basis import DisplacementBasis
 from odeform.motion.local_frames import BOUND
 from odeform.motion.reduced_motion import ReducedMotion
-from odeform.predictor import Predictor, load
 from odeform.solver.integrate import SolverSettings
 from odeform.types import GaussianSplats, Mesh, PointCloud
 

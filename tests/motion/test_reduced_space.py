@@ -7,8 +7,8 @@ import trimesh
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
+from odeform.models.base import Predictor
 from odeform.motion.reduced_space import POSE, ReducedSpace, decompose, make_space, rotation_of, to_canonical
-from odeform.predictor import Predictor
 from odeform.types import Mesh, MotionSequence
 
 HEADING = 0.9

@@ -14,10 +14,11 @@ import pytest
 from odeform.cli import main
 from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import rotation_from_vector
+from odeform.models.base import Predictor
 from odeform.models.odeform.inference import LatentTrajectory
 from odeform.models.odeform.model import ODeform
+from odeform.models.registry import load
 from odeform.motion.reduced_motion import ReducedMotion
-from odeform.predictor import Predictor, load
 from odeform.solver import tableau
 from odeform.stress import cases as cases_module
 from odeform.stress import consistency, convergence, physics, solvers, stress

@@ -8,7 +8,8 @@ import pytest
 
 from odeform.formats.bundled import bundled_shapes, read_shape, region_beside
 from odeform.geometry.shape import fit_to
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.synthetic import volleyball
 from odeform.types import GaussianSplats
 

@@ -9,7 +9,7 @@ import pytest
 from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import KEPT, Cell, Result, run_cells

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.base import Predictor
 from odeform.models.continuation import Dynamics
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor
 from odeform.training import continuation
 from odeform.training.continuation import fit_dynamics, foretold, with_continuation
 from odeform.types import Floats

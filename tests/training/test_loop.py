@@ -11,8 +11,9 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
+from odeform.models.base import Predictor
 from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
-from odeform.predictor import Predictor, load
+from odeform.models.registry import load
 from odeform.simulation.scene import get_scene
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.training.config import TrainConfig

@@ -9,8 +9,8 @@ import pytest
 from odeform.dataset.store import open_dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.odeform.model import ODeform
+from odeform.models.registry import load
 from odeform.motion.reduced_space import POSE
-from odeform.predictor import load
 from odeform.training import pruning
 from odeform.training.pruning import FINE, LARGE, needed_modes, without_modes
 from odeform.types import Floats

@@ -7,9 +7,9 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import prepare
+from odeform.models.base import Predictor
 from odeform.models.frontier import FrontierPoint
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor
 from odeform.solver.integrate import SolverSettings
 from odeform.training import qualities
 from odeform.training.qualities import choose_qualities, measure_frontier

@@ -10,7 +10,7 @@ from browsing import CHROMIUM, FLAGS
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column

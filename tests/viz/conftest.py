@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns

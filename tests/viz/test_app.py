@@ -9,7 +9,8 @@ import pytest
 
 from odeform import InputError
 from odeform.cancellation import check_cancelled
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column

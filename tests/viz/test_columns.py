@@ -6,8 +6,8 @@ import pytest
 
 from odeform import InputError
 from odeform.dataset.index import Dataset
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor
 from odeform_viz.columns import MOST, Column, Columns
 from odeform_viz.panels.compare import sweep
 

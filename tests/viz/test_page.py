@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from browsing import Tab, needs_chromium, open_tab, until
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform_viz.columns import Column
 
 pytestmark = needs_chromium

@@ -7,7 +7,8 @@ import pytest
 from browsing import Tab, needs_chromium, open_tab, until
 
 from odeform.dataset.store import open_dataset
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform_viz.columns import Column, truth_column
 
 pytestmark = needs_chromium

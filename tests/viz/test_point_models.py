@@ -9,9 +9,10 @@ import pytest
 from odeform.cancellation import Cancelled, cancel_unless
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.motion.point_motion import PointMotion
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor, load
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import moment_in_words
 from odeform_viz.session import Session, ViewRequest

@@ -8,8 +8,8 @@ import pytest
 from odeform import InputError
 from odeform.dataset.index import Dataset
 from odeform.geometry.shape import fit_to
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words

@@ -11,7 +11,7 @@ import viser
 
 from odeform.geometry.region import Box, Sphere
 from odeform.geometry.similarity import UPRIGHT, Similarity
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, PointCloud
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient

@@ -11,7 +11,7 @@ from odeform import InputError
 from odeform.geometry.region import Sphere
 from odeform.geometry.shape import fit_to
 from odeform.geometry.similarity import UPRIGHT, Similarity
-from odeform.predictor import load
+from odeform.models.registry import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
 from odeform_viz.session import DisplayOptions, ViewRequest

@@ -17,7 +17,7 @@ from odeform.errors import InputError
 from odeform.geometry.shape import surface_shares
 from odeform.models.authors.file import MODEL
 from odeform.models.authors.network import Networks, normalisation
-from odeform.models.base import TrainedModel
+from odeform.models.base import Predictor
 from odeform.motion.base import SolveStats
 from odeform.motion.basis import DisplacementBasis
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -62,7 +62,7 @@ class _EvaluatedFrames(EvaluatedBasis):
         raise InputError("released: a latent for each point tells nothing of gradients; expected a mesh or points")
 
 
-class AuthorsModel(TrainedModel):
+class AuthorsModel(Predictor):
     """A network of the paper's authors: shapes are predicted, not displacements, so that P(0) is only nearly P0.
 
     A geometry is taken as it is, in metres and in its own frame: the world adds the offset that is predicted.
@@ -93,27 +93,25 @@ class AuthorsModel(TrainedModel):
                 self._seated.popitem(last=False)
         return self._seated[key][1]
 
-    def solve(
+    def _solve(
         self,
-        geometry: Geometry | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        quality: str | SolverSettings = "balanced",
-        until: float | None = None,
-        observed: MotionSequence | None = None,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
     ) -> ReducedMotion:
-        """The motion of `geometry`, in its own frame (default: a ball), under `parameters`.
+        """The geometry, in its own frame (default: a ball), is its own reference of normalisation.
 
-        It is its own reference of normalisation. Always the trained frames, one step each, whatever the quality and
-        however long: off them the network's answer would be another. `InputError` for splats.
+        Always one step per trained frame, for any quality and end: other frames would change the network's answer.
         """
-        shape = self._shape(geometry, observed)
-        if isinstance(shape, GaussianSplats):
-            raise InputError("released: a latent for each point does not tell how splats deform; expected a mesh")
-        if len(shape.points) < 2 or not np.isfinite(shape.points).all() or np.ptp(shape.points, axis=0).max() <= 0.0:
-            raise InputError("geometry: expected at least two points apart, all finite")
-        complete = self.schema.complete(parameters)
+        if isinstance(geometry, GaussianSplats):
+            raise InputError("released: cannot deform splats; expected a mesh or points")
+        points = geometry.points
+        if len(points) < 2 or not np.isfinite(points).all() or np.ptp(points, axis=0).max() <= 0.0:
+            raise InputError("geometry: expected at least two distinct points, all finite")
         begin = time.perf_counter()
-        offsets, frames = self._frames(shape, complete)
+        offsets, frames = self._frames(geometry, parameters)
         rate, steps = self.schema.window.rate, len(self._times) - 1
         stats = SolveStats(
             f"RK4 (3/8 rule) on the trained {rate:g} Hz grid, cubic between its frames",
@@ -125,8 +123,8 @@ class AuthorsModel(TrainedModel):
             lambda: None,
         )
         trajectory = _Frames(self._times, offsets, stats)
-        evaluated = _place(shape, frames)
-        return ReducedMotion(self.schema, complete, shape, evaluated.space, evaluated, trajectory)
+        evaluated = _place(geometry, frames)
+        return ReducedMotion(self.schema, parameters, geometry, evaluated.space, evaluated, trajectory)
 
     def _offset(self, parameters: Parameters) -> Float[np.ndarray, " 3"]:
         """(3,) metres at first."""

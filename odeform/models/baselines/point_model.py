@@ -1,6 +1,5 @@
 """What all models that move each point by itself share: how they are kept and read, and how they solve."""
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
-from odeform.models.base import TrainedModel, check_finite
+from odeform.models.base import Predictor, check_finite
 from odeform.models.baselines.arithmetic import Net, Numpy, layer_shapes
 from odeform.models.baselines.point_network import PointNet
 from odeform.models.baselines.point_trajectories import FramedPoints, MomentaryPoints
@@ -23,7 +22,7 @@ __all__ = ["PointModel", "point_checkpoint"]
 PREFIX = "net."
 
 
-class PointModel(TrainedModel):
+class PointModel(Predictor):
     """A predictor of where each point goes."""
 
     network: PointNet
@@ -45,22 +44,20 @@ class PointModel(TrainedModel):
         seen, theta = self.frame.seen(rest), self.schema.inputs(parameters)
         return self.trajectory(self.net, self.network, self.frame, self.schema.window, seen, theta)
 
-    def solve(
+    def _solve(
         self,
-        geometry: Geometry | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        quality: str | SolverSettings = "balanced",
-        until: float | None = None,
-        observed: MotionSequence | None = None,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
     ) -> PointMotion:
-        shape = self._shape(geometry, observed)
-        check_finite(shape)
-        if isinstance(shape, GaussianSplats):
-            raise InputError(f"{self.model}: moves meshes and points, and has no gradient to take splats along")
-        complete = self.schema.complete(parameters)
-        rest = to_canonical(shape.points, np.array(self.frame.anchor), self.schema.azimuth(complete))
-        moved, body = (self._trajectory(x, complete, observed) for x in (rest, self._probes.points))
-        return PointMotion(self.schema, complete, shape, self.frame, self.mean, self._probes, moved, body)
+        check_finite(geometry)
+        if isinstance(geometry, GaussianSplats):
+            raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
+        rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
+        moved, body = (self._trajectory(x, parameters, observed) for x in (rest, self._probes.points))
+        return PointMotion(self.schema, parameters, geometry, self.frame, self.mean, self._probes, moved, body)
 
 
 def point_checkpoint(

@@ -9,7 +9,7 @@ from authors import Authors
 from odeform.cli import main
 from odeform.errors import InputError
 from odeform.models.authors.file import read_authors_checkpoint
-from odeform.predictor import open_checkpoint
+from odeform.models.registry import open_checkpoint
 
 
 class Malicious:

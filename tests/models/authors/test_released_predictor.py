@@ -8,7 +8,7 @@ import odeform
 from odeform.errors import InputError
 from odeform.geometry.primitives import octasphere
 from odeform.models.authors import layers
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 KINDS = [("mlp", 1), ("pemlp", 1), ("pointnet", 3), ("pointnet_bn", 3), ("mlp", 3), ("pointnet_bn", 1)]

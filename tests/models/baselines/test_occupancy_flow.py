@@ -9,8 +9,8 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.models.baselines.occupancy_flow import OccupancyFlow
+from odeform.models.registry import load, observations
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import load, observations
 from odeform.training.train import TrainRequest, train
 from odeform.types import MotionSequence, PointCloud
 

@@ -3,9 +3,9 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.base import Predictor
 from odeform.models.baselines.nearest import fit_nearest
 from odeform.models.baselines.pod_rbf import fit_pod_rbf
-from odeform.predictor import Predictor
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,12 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_z
+from odeform.models.base import Predictor
 from odeform.models.baselines.arithmetic import Net, Numpy, layer_shapes
 from odeform.models.baselines.point_model import PointModel
 from odeform.models.baselines.point_network import Trial, sum_of
 from odeform.models.baselines.point_trajectories import rows_of
-from odeform.predictor import Predictor, load
+from odeform.models.registry import load
 from odeform.training.point_data import PointData, prepare_points
 from odeform.training.points import Budget, Torch, fit_points, initial_weights
 from odeform.training.train import POINTS

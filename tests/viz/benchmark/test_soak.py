@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.soak import soak
 from odeform_viz.columns import Column, truth_column

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.parameters import OWN, presets, samples_svg, slider_range, slider_step

@@ -10,7 +10,8 @@ import pytest
 import trimesh
 
 from odeform.dataset.store import open_dataset
-from odeform.predictor import Predictor, load
+from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, truth_column

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from odeform.dataset.store import open_dataset
+from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
-from odeform.predictor import Predictor, load
+from odeform.models.registry import load
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.types import MotionSequence
 from odeform_viz.app import App

@@ -13,8 +13,8 @@ import odeform
 from odeform.checkpoint import bundled_checkpoints, write_checkpoint
 from odeform.dataset.store import open_dataset
 from odeform.geometry.shape import fit_to
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.predictor import Predictor
 from odeform.types import GaussianSplats, Mesh
 from odeform_viz.cli import main
 from odeform_viz.columns import Column, truth_column

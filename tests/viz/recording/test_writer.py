@@ -12,7 +12,7 @@ import rerun as rr
 
 from odeform import InputError
 from odeform.geometry.shape import fit_to
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import PointCloud
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import shape_from

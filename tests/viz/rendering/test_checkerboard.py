@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import Mesh
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform_viz.rendering.error_colors import BANDS, Spread, bands_of, levels_of, scale_for
 
 

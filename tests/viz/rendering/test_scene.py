@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import viser
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.rendering.scene import SceneView

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import viser
 
-from odeform.predictor import Predictor
+from odeform.models.base import Predictor
 from odeform.types import PointCloud
 from odeform_viz.rendering.error_colors import BANDS, levels_of
 from odeform_viz.rendering.shapes import show_shape

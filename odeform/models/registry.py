@@ -1,0 +1,83 @@
+"""All models by name, and how one is loaded from a checkpoint."""
+
+import importlib
+from pathlib import Path
+
+from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
+from odeform.errors import InputError
+from odeform.models.authors.file import ENDING, read_authors_checkpoint
+from odeform.models.base import Predictor
+from odeform.models.reduced_model import ReducedModel
+from odeform.schema import Schema
+from odeform.types import MotionSequence
+
+__all__ = ["MODELS", "load", "load_continuous", "load_reduced", "model_class", "observations", "open_checkpoint"]
+
+MODELS: dict[str, str] = {
+    "odeform": "odeform.models.odeform.model:ODeform",
+    "odeform-per-point": "odeform.models.baselines.odeform_per_point:OdeformPerPoint",
+    "node": "odeform.models.baselines.node:Node",
+    "rnn": "odeform.models.baselines.rnn:Rnn",
+    "direct": "odeform.models.baselines.direct:Direct",
+    "occupancy-flow": "odeform.models.baselines.occupancy_flow:OccupancyFlow",
+    "pod-rbf": "odeform.models.baselines.pod_rbf:PodRbf",
+    "nearest": "odeform.models.baselines.nearest:Nearest",
+    "released": "odeform.models.authors.predictor:AuthorsModel",
+}
+"""Name in checkpoints -> "module:class", imported when first used."""
+
+
+def model_class(name: str) -> type[Predictor]:
+    """The class of a registered model; `InputError` for any other name."""
+    if name not in MODELS:
+        raise InputError(f"unknown model {name!r}: expected one of {', '.join(MODELS)}")
+    module, _, attribute = MODELS[name].partition(":")
+    return getattr(importlib.import_module(module), attribute)
+
+
+def open_checkpoint(name: str | Path) -> Checkpoint:
+    """A checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE or
+    SCENE/MODEL. `InputError` for anything else."""
+    path = resolve_checkpoint(str(name))
+    if path.suffix.lower() == ENDING:
+        return read_authors_checkpoint(path)
+    return read_checkpoint(path)
+
+
+def load(name: str | Path) -> Predictor:
+    """A predictor from a checkpoint's path, or from a bundled checkpoint's name (SCENE or SCENE/MODEL).
+
+    `InputError` for a file that is no checkpoint, or whose model is unknown.
+    """
+    checkpoint = open_checkpoint(name)
+    try:
+        model = model_class(checkpoint.model)
+    except InputError as error:
+        raise InputError(f"checkpoint {name}: {error}") from None
+    return model(checkpoint)
+
+
+def load_continuous(name: str | Path) -> Predictor:
+    """As `load`; `InputError` for a network that only knows its training frames."""
+    predictor = load(name)
+    if not predictor.extrapolates:
+        raise InputError(
+            f"checkpoint {name}: {predictor.model} is tied to its training frames; expected an ODeform checkpoint"
+        )
+    return predictor
+
+
+def load_reduced(name: str | Path) -> ReducedModel:
+    """As `load`; `InputError` for a model that is not of reduced coordinates."""
+    predictor = load(name)
+    if not isinstance(predictor, ReducedModel):
+        raise InputError(f"checkpoint {name}: expected a model of reduced coordinates, got {predictor.model}")
+    return predictor
+
+
+def observations(schema: Schema, record: MotionSequence) -> MotionSequence | None:
+    """The frames of a recording that a model of this schema is given, at its window's rate; None for most models."""
+    if not schema.needs_observations:
+        return None
+    step = float(record.times[1] - record.times[0])
+    return record.until(schema.window.stop, max(round(1.0 / (schema.window.rate * step)), 1))
