@@ -38,8 +38,9 @@ from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.runtime.server import open_server
 from odeform_viz.runtime.worker import Worker
-from odeform_viz.session import DisplayOptions, Frame, Session, ViewRequest, same_motions
+from odeform_viz.session import Session
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
+from odeform_viz.view import DisplayOptions, Frame, ViewRequest, same_motions
 
 __all__ = ["App"]
 
@@ -213,25 +214,25 @@ class App:
         schema = self.session.schema
         state = state_from_json(data, schema.scene)
         fit = fit_from_json(state.shape, self._body) if state.shape else None
-        self.columns.restart(columns_of(state, schema))
+        self.columns.replace_all(columns_of(state, schema))
         self._shape.set(fit)
         for note in state.notes:
             self._say(note)
         self._parameters.set(state.parameters)
         if self._quality:
             self._quality.set(state.quality)
-        self._compare.set(state.overlay, state.heat)
-        self._follow.value = state.follow
+        self._compare.set(state.display.overlay, state.display.error_colors)
+        self._follow.value = state.display.follow
         self._playback.jump(state.time)
         self._changed()
 
     def _export(self, path: Path) -> Path:
         """Write the motion of the first visible model: the current frame in formats of one shape, else all frames."""
         request = self.request()
-        column = next((c for c in request.columns if c.shown and c.predictor), None)
+        column = next((c for c in request.columns if c.visible and c.predictor), None)
         if column is None:
             raise InputError("export: no model is shown")
-        motion = self.session.own_motion(column, request)
+        motion = self.session.new_motion(column, request)
         if path.suffix in shape_formats():
             path = path.with_stem(f"{path.stem}_{0:05d}")
             write_shape(shape_at(motion, request.time, column.fit), path)
@@ -266,8 +267,10 @@ class App:
         shown = self._shown
         if shown is None or request != shown.request or looks != self._looks or shown.pending:
             # who scrubs is shown the others at each moment; who plays moves on by itself, and would never see the rest
-            met = shown is not None and (request == shown.request or (self.clock.playing and shown.follows(request)))
-            self._show(self.session.frame(request, whole=met), looks)
+            met = shown is not None and (
+                request == shown.request or (self.clock.playing and shown.differs_in_time_only(request))
+            )
+            self._show(self.session.frame(request, include_slow=met), looks)
         elif not self._settled:
             self._settled = True
             self._describe(shown)
@@ -277,7 +280,7 @@ class App:
 
     def _show(self, frame: Frame, looks: DisplayOptions) -> None:
         # colours keep their scale over the whole motion, so it has to be known first
-        self._heat = self._scale(frame) if looks.heat else None
+        self._heat = self._scale(frame) if looks.error_colors else None
         self._settled = self._shown is not None and same_motions(frame, self._shown)
         self._scene.publish(frame, looks, self._heat)
         self._shown, self._looks = frame, looks

@@ -1,4 +1,4 @@
-"""What stands side by side: models under the sliders, models pinned at parameters of their own, the truth."""
+"""The columns of the page: models under the sliders, models pinned at parameters of their own, and the truth."""
 
 import itertools
 import threading
@@ -15,30 +15,30 @@ from odeform.types import Geometry
 
 __all__ = ["Column", "Columns", "truth_column"]
 
-MOST = 12  # columns; more than that nobody tells apart
+MOST = 12  # columns; nobody can tell more of them apart
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One motion beside the others: of a model or a record, of a shape, at the sliders or `pinned`."""
+    """One motion among others: of a model or a recorded sequence, under the sliders or `pinned` at parameters."""
 
     label: str
     source: Predictor | RecordedMotion
     geometry: Geometry
     pinned: Mapping[str, float] | None = None
     origin: str = ""
-    """The checkpoint's name or path as it was asked for, or DATASET/NAME of a record; empty for what was made here."""
+    """The checkpoint's name or path as the user gave it, or DATASET/NAME of a sequence; empty if it is in no file."""
     fit: Fit | None = None
-    """How a shape that was not trained came to lie where the body does; None for the body itself."""
-    shown: bool = True
+    """How a loaded shape was fitted to the trained body; None for the trained body itself."""
+    visible: bool = True
     key: int = -1
-    """Given by `Columns`; the same while a column is shown and hidden."""
-    place: int = -1
-    """Given by `Columns`: the lowest that no other model has, for a colour of its own while it lasts."""
+    """Assigned by `Columns`; constant while a column is hidden, shown or given another shape."""
+    color_index: int = -1
+    """Assigned by `Columns`: the lowest that no other model has, so that each keeps a color of its own."""
 
     @property
     def foreign(self) -> bool:
-        """Whether the shape is another than the body that was trained."""
+        """Whether the shape is not the trained body."""
         return self.fit is not None
 
     @property
@@ -51,7 +51,7 @@ class Column:
 
 
 class Columns:
-    """The columns at hand, changed by callbacks of any thread and read as snapshots."""
+    """The current columns: changed by callbacks on any thread, read as immutable snapshots."""
 
     def __init__(self, schema: Schema) -> None:
         self._schema = schema
@@ -63,50 +63,60 @@ class Columns:
     def all(self) -> tuple[Column, ...]:
         return self._columns
 
+    @property
+    def truth(self) -> Column | None:
+        """The recorded sequence, if there is one."""
+        return next((column for column in self._columns if column.truth), None)
+
     def add(self, *columns: Column) -> None:
-        """At the end; labels already taken are numbered. A record replaces the one before: there is one truth."""
+        """Append columns. Labels already taken are numbered; a sequence replaces the one before.
+
+        `InputError` for a model of another scene, or for too many columns.
+        """
         with self._lock:
             kept = list(self._columns)
             for column in columns:
-                lacks = self._lacks(column)
+                missing = self._missing_parameters(column)
                 if column.truth is not None:
                     kept = [c for c in kept if c.truth is None]
-                note = f" (no {', '.join(lacks)})" if lacks else ""
+                note = f" (no {', '.join(missing)})" if missing else ""
                 label = column.label if note in column.label else column.label + note
-                taken = {c.place for c in kept if c.predictor}
-                place = next(n for n in itertools.count() if n not in taken)
+                taken = {c.color_index for c in kept if c.predictor}
+                color_index = next(n for n in itertools.count() if n not in taken)
                 label = _unused(label, {c.label for c in kept})
-                kept.append(replace(column, label=label, key=next(self._keys), place=place))
+                kept.append(replace(column, label=label, key=next(self._keys), color_index=color_index))
             if len(kept) > MOST:
                 raise InputError(f"{len(kept)} columns: expected at most {MOST}; remove some first")
             self._columns = tuple(kept)
 
-    def _lacks(self, column: Column) -> list[str]:
-        """The sliders that a model does not heed. `InputError` for another scene."""
+    def _missing_parameters(self, column: Column) -> list[str]:
+        """The sliders that have no effect on a model. `InputError` for a model of another scene."""
         schema = column.source.schema
         if schema.scene != self._schema.scene:
-            raise InputError(f"cannot compare {column.label}: it is of scene {schema.scene}, not {self._schema.scene}")
-        heeded = {p.name for p in schema.parameters}
-        return [p.name for p in self._schema.parameters if p.name not in heeded]
+            raise InputError(
+                f"cannot compare {column.label}: its scene is {schema.scene}, expected {self._schema.scene}"
+            )
+        own = {p.name for p in schema.parameters}
+        return [p.name for p in self._schema.parameters if p.name not in own]
 
     def remove(self, key: int) -> None:
         with self._lock:
             self._columns = tuple(c for c in self._columns if c.key != key)
 
-    def restart(self, columns: Sequence[Column]) -> None:
-        """Other columns in place of all; unchanged if one of them is refused."""
+    def replace_all(self, columns: Sequence[Column]) -> None:
+        """Replace all columns, with new keys. `InputError` as `add`; then nothing has changed."""
         fresh = Columns(self._schema)
         fresh._keys = self._keys
         fresh.add(*columns)
         with self._lock:
             self._columns = fresh._columns
 
-    def show(self, key: int, shown: bool) -> None:
+    def set_visible(self, key: int, visible: bool) -> None:
         with self._lock:
-            self._columns = tuple(replace(c, shown=shown) if c.key == key else c for c in self._columns)
+            self._columns = tuple(replace(c, visible=visible) if c.key == key else c for c in self._columns)
 
-    def reshape(self, fit: Fit | None) -> None:
-        """Another shape for all models; None for the body that each was trained on."""
+    def set_shape(self, fit: Fit | None) -> None:
+        """Give all models another shape; None for the body that each was trained on."""
         with self._lock:
             self._columns = tuple(
                 replace(c, geometry=fit.geometry if fit else c.predictor.rest, fit=fit) if c.predictor else c
@@ -115,7 +125,7 @@ class Columns:
 
     @classmethod
     def of(cls, columns: Sequence[Column]) -> "Columns":
-        """`InputError` for models of different scenes."""
+        """Columns of the first one's scene. `InputError` for models of different scenes."""
         out = cls(columns[0].source.schema)
         out.add(*columns)
         return out
@@ -127,7 +137,10 @@ def _unused(label: str, taken: set[str]) -> str:
 
 
 def truth_column(origin: str) -> Column:
-    """A sequence by DATASET/NAME: of a folder, of a packed file, or of a scene's bundled copy."""
+    """The sequence DATASET/NAME of a folder, a packed file, or a scene's bundled data set.
+
+    `InputError` where there is no such data set or sequence.
+    """
     root, _, name = origin.rpartition("/")
     dataset = open_dataset(root or ".")
     entry = next((e for e in dataset.select("all") if e.name == name.removesuffix(".npz")), None)

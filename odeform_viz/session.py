@@ -1,12 +1,10 @@
-"""What the user requests, and what is then to be seen. Knows predictors and motions, no GUI types."""
+"""Computes what a request asks for, and keeps motions until their inputs change. Knows no GUI types."""
 
 import json
 import math
 import threading
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,176 +12,62 @@ from odeform.cancellation import Cancelled
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
-from odeform.motion.base import Motion, SolveStats
+from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import REACH as CONTINUED
 from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, GaussianSplats, Geometry, MotionSequence, Perpoint, Points, Times, Vector
+from odeform.types import GaussianSplats, Geometry, MotionSequence, Points, Times
 from odeform_viz.columns import Column
+from odeform_viz.view import INVISIBLE, REACH, ColumnFrame, Curves, Error, Frame, ViewRequest
 
-__all__ = [
-    "INVISIBLE",
-    "REACH",
-    "ColumnFrame",
-    "Curves",
-    "DisplayOptions",
-    "Error",
-    "Frame",
-    "Session",
-    "ViewRequest",
-    "same_motions",
-    "visible_deformation",
-]
+__all__ = ["Session", "settings_of", "visible_deformation"]
 
-INVISIBLE = 1e-4  # m; a third of a pixel of a ball of 0.1 m that is 720 pixels high
-SUNK = 5e-3  # m below the floor; the simulator itself lets a ball in by up to 3 mm
-REACH = 1.0 + CONTINUED  # trained windows that one can look at: as far as models go on
-SLOW = 0.1  # s to a motion's first moment; who takes longer does not hold up the others
+SLOW = 0.1  # s from a new motion to its first frame; slower columns are computed after the others
+
+SolveInputs = tuple[Mapping[str, float], str | SolverSettings, RecordedMotion | None]
+"""What a motion depends on besides the shape: parameters, quality, and the record that observed frames come from."""
 
 
-@dataclass(frozen=True)
-class ViewRequest:
-    """Everything that decides what is shown."""
+def settings_of(predictor: Predictor, quality: str) -> str | SolverSettings:
+    """The quality as `predictor.solve` takes it; "balanced" where the predictor does not know the name.
 
-    parameters: Mapping[str, float]
-    time: float
-    quality: str
-    """Of all integrations: a name, or a setting as JSON."""
-    columns: tuple[Column, ...]
-
-
-@dataclass(frozen=True)
-class DisplayOptions:
-    """How columns are shown: one over the other or in a row, errors in colours, the camera at the body's side."""
-
-    overlay: bool = False
-    heat: bool = True
-    follow: bool = True
-
-
-@dataclass(frozen=True, eq=False)
-class Error:
-    """How far a prediction is from the truth at one moment: `distances` (N,) metres at the truth's vertices."""
-
-    distances: Perpoint
-    rmse_mm: float
-    """Over all coordinates, as is `mae_mm`."""
-    mae_mm: float
-    worst: int
-    """The vertex that is farthest off."""
-    where: Vector
-    """(3,) metres: where the truth has it."""
-
-    @property
-    def worst_mm(self) -> float:
-        return 1e3 * float(self.distances[self.worst])
-
-
-@dataclass(frozen=True, eq=False)
-class ColumnFrame:
-    """One column at one moment: the `pose` (4, 4), and what it moves.
-
-    `points` (N, 3) is the body deformed where it rests, `covariances` (N, 3, 3) in m^2 those of its splats, if it is
-    made of any; None where the deformation is too small to be seen, and the pose says it all. `depth` is how far the
-    body is below the floor, in metres. `error` is that against the truth, where there is one of these parameters.
+    `InputError` for JSON that describes no solver settings.
     """
-
-    column: Column
-    motion: Motion | RecordedMotion
-    points: Floats | None
-    covariances: Floats | None
-    pose: Floats
-    depth: float
-    error: Error | None
-
-    @property
-    def stats(self) -> SolveStats:
-        return self.motion.stats
-
-    @property
-    def sunk(self) -> bool:
-        return self.depth > SUNK
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """All visible columns at one moment, in the order of the request.
-
-    Columns that cannot meet it are `refused`, with a reason; `pending` are the labels of those still to be computed.
-    """
-
-    request: ViewRequest
-    columns: tuple[ColumnFrame, ...]
-    refused: tuple[str, ...] = ()
-    pending: tuple[str, ...] = ()
-
-    def follows(self, request: ViewRequest) -> bool:
-        """Whether this is of a request that differs in time alone."""
-        return replace(request, time=self.request.time) == self.request
-
-    @cached_property
-    def truth(self) -> ColumnFrame | None:
-        return next((shown for shown in self.columns if shown.column.truth), None)
-
-    @cached_property
-    def still(self) -> Geometry | None:
-        """What stands still about the columns."""
-        fits = (shown.column.fit for shown in self.columns if shown.column.fit)
-        return next((fit.still for fit in fits if fit.still), None)
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """A motion over time: `times` (T,) s, `height` of the centre in m, `turn` in degrees, RMS `deformation`, pooled
-    `error` and the `expected` one that nine in ten motions keep to in mm, the last two None where nothing is known."""
-
-    times: Times
-    height: Times
-    turn: Times
-    deformation: Times
-    error: Times | None
-    expected: Times | None
-
-
-Asked = tuple[Mapping[str, float], str | SolverSettings, RecordedMotion | None]
-"""Of a model: parameters, quality, and the record that it is given frames of."""
-
-
-def same_motions(one: Frame, other: Frame) -> bool:
-    """Whether two frames differ in time alone."""
-    return [shown.motion for shown in one.columns] == [shown.motion for shown in other.columns]
-
-
-def quality_of(source: Predictor, requested: str) -> str | SolverSettings:
-    """The settings that a model takes; those that do not know the name, or do not integrate, take their default."""
-    if requested.startswith("{") and source.qualities:
+    if quality.startswith("{") and predictor.qualities:
         try:
-            return SolverSettings(**json.loads(requested))
+            return SolverSettings(**json.loads(quality))
         except (ValueError, TypeError) as error:
-            raise InputError(f"quality: expected a name or the setting of a solver, got {requested}: {error}") from None
-    return requested if requested in source.qualities else "balanced"
+            raise InputError(f"quality: expected a name or solver settings, got {quality}: {error}") from None
+    return quality if quality in predictor.qualities else "balanced"
 
 
-def _given(source: Predictor, record: RecordedMotion | None) -> MotionSequence | None:
-    return None if record is None else observations(source.schema, record.sequence)
+def visible_deformation(motion: Motion | RecordedMotion, time: float) -> Points | None:
+    """(N, 3) metres: the deformed body without its pose; None where the deformation is too small to be visible."""
+    if motion.deformation_bound(time) < INVISIBLE:
+        return None
+    points = motion.deformed(time)
+    # the bound adds up the modes as if all were largest at one point, so the displacements decide
+    moved = points - motion.geometry.points
+    return None if np.einsum("ni,ni->n", moved, moved).max() < INVISIBLE**2 else points
 
 
 class Session:
-    """Columns under one set of parameters and one time. Integrates only when parameters or quality change.
+    """The motions of all columns. Integrates only when parameters, shape or quality change, never for a new time.
 
-    The worker asks for frames while callbacks ask for a peak or an export: one at a time.
+    Thread-safe: the worker asks for frames while callbacks ask for a peak or an export.
     """
 
     def __init__(self, schema: Schema) -> None:
         self.schema = schema
         self._lock = threading.RLock()
-        self._solved: dict[tuple[int, int], tuple[Asked, Motion]] = {}
+        # by column: its motion of the shape that is displayed, and its motion of the truth's body
+        self._displayed: dict[int, tuple[SolveInputs, Motion]] = {}
+        self._compared: dict[int, tuple[SolveInputs, Motion]] = {}
         self._curves: dict[int, tuple[object, object, Curves]] = {}
-        self._took: dict[int, float] = {}  # s, by column: to a moment of its last new motion
+        self._seconds: dict[int, float] = {}  # by column: from its last new motion to the first frame of it
 
     def parameters(self, column: Column, request: ViewRequest) -> Mapping[str, float]:
-        """Those that a column stands for."""
+        """The parameters of a column: pinned, or those of the sliders."""
         return column.pinned if column.pinned is not None else request.parameters
 
     def motion(self, column: Column, request: ViewRequest) -> Motion | RecordedMotion:
@@ -192,94 +76,131 @@ class Session:
         if isinstance(source, RecordedMotion):
             return source
         with self._lock:
-            return self._solve(column, source, 0, column.geometry, request)
+            return self._solve(self._displayed, column, source, column.geometry, request)
 
-    def own_motion(self, column: Column, request: ViewRequest) -> Motion:
-        """The motion of a model, for long work beside the page: nobody else asks it or waits for it."""
+    def new_motion(self, column: Column, request: ViewRequest) -> Motion:
+        """A motion of a model that is not shared with the viewer: for long work outside of the lock."""
         source = column.predictor
         assert source is not None
-        parameters, quality, record = self._asked(column, source, request)
+        parameters, quality, record = self._inputs(column, source, request)
         with self._lock:
-            return source.solve(column.geometry, parameters, quality, observed=_given(source, record))
-
-    def _asked(self, column: Column, source: Predictor, request: ViewRequest) -> Asked:
-        """Parameters and quality that a model knows, and the record that it is given frames of."""
-        parameters = source.schema.known(self.parameters(column, request))
-        return parameters, quality_of(source, request.quality), self._observed(column, source, request)
-
-    def _solve(self, column: Column, source: Predictor, use: int, geometry: Geometry, request: ViewRequest) -> Motion:
-        asked = self._asked(column, source, request)
-        known = self._solved.get((column.key, use))
-        if known is None or known[0] != asked or known[1].geometry is not geometry:
-            parameters, quality, record = asked
-            motion = source.solve(geometry, parameters, quality, observed=_given(source, record))
-            known = self._solved[column.key, use] = (asked, motion)
-        return known[1]
-
-    def _waits(self, column: Column, request: ViewRequest) -> bool:
-        """Whether a column is to be computed after the others."""
-        if column.predictor is None or self._took.get(column.key, 0.0) < SLOW:
-            return False
-        known = self._solved.get((column.key, 0))
-        asked = self._asked(column, column.predictor, request)
-        return known is None or known[0] != asked or known[1].geometry is not column.geometry
-
-    def _observed(self, column: Column, source: Predictor, request: ViewRequest) -> RecordedMotion | None:
-        """The record that a model moves between frames of; None for models that need none."""
-        if not source.schema.needs_observations:
-            return None
-        record = next((c.source for c in request.columns if isinstance(c.source, RecordedMotion)), None)
-        if record is None or not record.of(self.parameters(column, request)):
-            raise InputError(f"{column.label} moves between observed frames: expected the truth of these parameters")
-        return record
-
-    def _of_truth(self, column: Column, source: Predictor, truth: RecordedMotion, request: ViewRequest) -> Motion:
-        """What a model makes of the body of the record."""
-        known = source.schema.known(self.parameters(column, request))
-        return self._solve(column, source, 1, source.to_body_frame(truth.geometry, known), request)
+            return source.solve(column.geometry, parameters, quality, observed=_observed_frames(source, record))
 
     def truth_of(self, column: Column, request: ViewRequest) -> RecordedMotion | None:
-        """The record among the columns, where it is of this column's parameters and body."""
-        truth = next((c.source for c in request.columns if c.shown and isinstance(c.source, RecordedMotion)), None)
+        """The visible record, if it has the column's parameters and the column the trained body."""
+        truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
         if truth is None or column.truth is not None or not truth.of(self.parameters(column, request)):
             return None
         return None if column.foreign else truth
 
-    def frame(self, request: ViewRequest, whole: bool = True) -> Frame:
-        """What is to be seen; only visible columns are computed. `InputError` for requests that none of them can meet.
+    def frame(self, request: ViewRequest, include_slow: bool = True) -> Frame:
+        """Compute the visible columns. `InputError` for a request that none of them can meet.
 
-        Unless it is to be `whole`, columns that took long when they last had a new motion to compute are left pending.
+        Without `include_slow`, columns that need a new motion and took long for their last one are left pending.
         """
         if not np.isfinite(request.time) or request.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {request.time}")
-        kept = {column.key for column in request.columns}
         with self._lock:
-            self._solved = {at: motion for at, motion in self._solved.items() if at[0] in kept}
-            self._curves = {key: curves for key, curves in self._curves.items() if key in kept}
-            self._took = {key: took for key, took in self._took.items() if key in kept}
-            shown, refused, pending = [], [], []
-            for column in (column for column in request.columns if column.shown):
+            self._forget_all_but({column.key for column in request.columns})
+            computed, refused, pending = [], [], []
+            for column in (column for column in request.columns if column.visible):
                 try:
-                    if whole or not self._waits(column, request):
-                        shown.append(self._timed(column, request))
+                    if include_slow or not self._is_slow(column, request):
+                        computed.append(self._timed(column, request))
                     else:
                         pending.append(column.label)
                 except InputError as error:
                     refused.append(str(error))
-            if refused and not (shown or pending):
+            if refused and not (computed or pending):
                 raise InputError(refused[0])
-            return Frame(request, tuple(shown), tuple(refused), tuple(pending))
+            return Frame(request, tuple(computed), tuple(refused), tuple(pending))
+
+    @property
+    def curve_times(self) -> Times:
+        """(T,) seconds: the frames of the trained window, continued to the end of the time slider."""
+        window = self.schema.window
+        return window.start + np.arange(round(REACH * (window.stop - window.start) * window.rate) + 1) / window.rate
+
+    def curves(self, shown: ColumnFrame, request: ViewRequest) -> Curves:
+        """The curves of a column's motion; computed once for each motion."""
+        truth = self.truth_of(shown.column, request)
+        with self._lock:
+            known = self._curves.get(shown.column.key)
+            if known is None or known[0] is not shown.motion or known[1] is not truth:
+                made = self._make_curves(shown, truth, request)
+                known = self._curves[shown.column.key] = (shown.motion, truth, made)
+            return known[2]
+
+    def largest_deformation(self, request: ViewRequest) -> float:
+        """Seconds within the trained window at which the first visible column is deformed most."""
+        column = next((column for column in request.columns if column.visible), None)
+        if column is None:
+            return request.time
+        window = self.schema.window
+        times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
+        with self._lock:
+            return float(times[np.argmax(self.motion(column, request).deformation_rms(times))])
+
+    def _forget_all_but(self, keys: set[int]) -> None:
+        for cache in (self._displayed, self._compared, self._curves, self._seconds):
+            for key in cache.keys() - keys:
+                del cache[key]
+
+    def _inputs(self, column: Column, source: Predictor, request: ViewRequest) -> SolveInputs:
+        parameters = source.schema.known(self.parameters(column, request))
+        return parameters, settings_of(source, request.quality), self._observed(column, source, request)
+
+    def _observed(self, column: Column, source: Predictor, request: ViewRequest) -> RecordedMotion | None:
+        """The record that a model interpolates; None for models that need none."""
+        if not source.schema.needs_observations:
+            return None
+        record = next((c.source for c in request.columns if isinstance(c.source, RecordedMotion)), None)
+        if record is None or not record.of(self.parameters(column, request)):
+            raise InputError(f"{column.label} interpolates observed frames: expected a truth of these parameters")
+        return record
+
+    def _solve(
+        self,
+        cache: dict[int, tuple[SolveInputs, Motion]],
+        column: Column,
+        source: Predictor,
+        geometry: Geometry,
+        request: ViewRequest,
+    ) -> Motion:
+        inputs = self._inputs(column, source, request)
+        known = cache.get(column.key)
+        if known is None or known[0] != inputs or known[1].geometry is not geometry:
+            parameters, quality, record = inputs
+            motion = source.solve(geometry, parameters, quality, observed=_observed_frames(source, record))
+            known = cache[column.key] = (inputs, motion)
+        return known[1]
+
+    def _predicted_truth(
+        self, column: Column, source: Predictor, truth: RecordedMotion, request: ViewRequest
+    ) -> Motion:
+        """The model's motion of the record's body, vertex by vertex."""
+        parameters = source.schema.known(self.parameters(column, request))
+        geometry = source.to_body_frame(truth.geometry, parameters)
+        return self._solve(self._compared, column, source, geometry, request)
+
+    def _is_slow(self, column: Column, request: ViewRequest) -> bool:
+        """Whether a column needs a new motion, and took long for its last one."""
+        if column.predictor is None or self._seconds.get(column.key, 0.0) < SLOW:
+            return False
+        known = self._displayed.get(column.key)
+        inputs = self._inputs(column, column.predictor, request)
+        return known is None or known[0] != inputs or known[1].geometry is not column.geometry
 
     def _timed(self, column: Column, request: ViewRequest) -> ColumnFrame:
-        before, begin = self._solved.get((column.key, 0)), time.perf_counter()
+        before, begin = self._displayed.get(column.key), time.perf_counter()
         try:
             frame = self._column(column, request)
         except Cancelled:
-            self._solved.pop((column.key, 0), None)
-            self._took[column.key] = math.inf
+            self._displayed.pop(column.key, None)
+            self._seconds[column.key] = math.inf
             raise
-        if self._solved.get((column.key, 0)) is not before:
-            self._took[column.key] = time.perf_counter() - begin
+        if self._displayed.get(column.key) is not before:
+            self._seconds[column.key] = time.perf_counter() - begin
         return frame
 
     def _column(self, column: Column, request: ViewRequest) -> ColumnFrame:
@@ -300,7 +221,7 @@ class Session:
         truth = self.truth_of(column, request)
         if truth is None or truth.extrapolates(request.time) or column.predictor is None:
             return None
-        predicted = self._of_truth(column, column.predictor, truth, request).vertices(request.time)
+        predicted = self._predicted_truth(column, column.predictor, truth, request).vertices(request.time)
         true = truth.vertices(request.time)
         off = np.subtract(predicted, true, dtype=float)
         distances = np.linalg.norm(off, axis=1)
@@ -308,55 +229,24 @@ class Session:
         rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
         return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
 
-    @property
-    def times(self) -> Times:
-        """The moments of curves: the frames of the window, and on to where one can look."""
-        window = self.schema.window
-        return window.start + np.arange(round(REACH * (window.stop - window.start) * window.rate) + 1) / window.rate
-
-    def curves(self, shown: ColumnFrame, request: ViewRequest) -> Curves:
-        """Of the whole motion that a column shows; made once for each."""
-        truth = self.truth_of(shown.column, request)
-        with self._lock:
-            known = self._curves.get(shown.column.key)
-            if known is None or known[0] is not shown.motion or known[1] is not truth:
-                made = self._make_curves(shown, truth, request)
-                known = self._curves[shown.column.key] = (shown.motion, truth, made)
-            return known[2]
-
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, request: ViewRequest) -> Curves:
-        motion, times = shown.motion, self.times
+        motion, times, predictor = shown.motion, self.curve_times, shown.column.predictor
         poses = motion.pose(times)
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
-        turn = np.degrees(np.arccos(np.clip((np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
-        error = expected = None
-        if shown.column.predictor is not None:
-            band = shown.column.predictor.error_band(motion.parameters, times)
-            expected = None if band is None else band[:, 1]
-        if truth is not None and shown.column.predictor is not None:
-            predicted = self._of_truth(shown.column, shown.column.predictor, truth, request)
+        cosine = (np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0
+        rotation = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        error = band = None
+        if predictor is not None:
+            both = predictor.error_band(motion.parameters, times)
+            band = None if both is None else both[:, 1]
+        if truth is not None and predictor is not None:
+            predicted = self._predicted_truth(shown.column, predictor, truth, request)
             off = predicted.vertices(times) - truth.vertices(times)
             error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
-        return Curves(times, height, turn, 1e3 * motion.deformation_rms(times), error, expected)
-
-    def largest_deformation(self, request: ViewRequest) -> float:
-        """The time within the trained window at which the first visible column is deformed most."""
-        column = next((column for column in request.columns if column.shown), None)
-        if column is None:
-            return request.time
-        window = self.schema.window
-        times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
-        with self._lock:
-            return float(times[np.argmax(self.motion(column, request).deformation_rms(times))])
+        return Curves(times, height, rotation, 1e3 * motion.deformation_rms(times), error, band)
 
 
-def visible_deformation(motion: Motion | RecordedMotion, time: float) -> Points | None:
-    """(N, 3) metres, the deformation alone; None where it cannot be seen, and a pose says all."""
-    if motion.deformation_bound(time) < INVISIBLE:
-        return None
-    points = motion.deformed(time)
-    # the bound takes every mode to be at its largest at the same point
-    moved = points - motion.geometry.points
-    return None if np.einsum("ni,ni->n", moved, moved).max() < INVISIBLE**2 else points
+def _observed_frames(source: Predictor, record: RecordedMotion | None) -> MotionSequence | None:
+    return None if record is None else observations(source.schema, record.sequence)

@@ -29,7 +29,8 @@ from odeform_viz.benchmark.soak import soak
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 from odeform_viz.rendering.scene import SceneView
-from odeform_viz.session import DisplayOptions, Session, ViewRequest
+from odeform_viz.session import Session
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 __all__ = ["drag", "fly", "scrub_splats", "stages"]
 

@@ -158,7 +158,7 @@ def _is_calm(app: App) -> bool:
         len(columns) == 1
         and columns[0].predictor is not None
         and columns[0].pinned is None
-        and columns[0].shown
+        and columns[0].visible
         and columns[0].geometry is columns[0].predictor.rest
         and not app.clock.playing
         and request.time == MOMENT

@@ -27,7 +27,7 @@ def sweep(column: Column, parameters: Mapping[str, float], schema: Schema, swept
     for index in range(SWEEP):
         at = {**parameters, swept.name: swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0)}
         label = f"{swept.name} {at[swept.name]:.3g} {swept.unit}"
-        out.append(replace(column, label=label, pinned=at, shown=True))
+        out.append(replace(column, label=label, pinned=at, visible=True))
     return out
 
 
@@ -127,12 +127,12 @@ class ComparePanel:
         before = self._columns.all
         self._columns.add(*sweep(self._first(), self._parameters(), self._schema, swept))
         for column in before:
-            self._columns.show(column.key, False)
+            self._columns.set_visible(column.key, False)
 
     def _remove_hidden(self) -> None:
         first = self._first()
         for column in self._columns.all:
-            if not column.shown and column is not first:
+            if not column.visible and column is not first:
                 self._columns.remove(column.key)
 
     def refresh(self) -> None:
@@ -145,23 +145,23 @@ class ComparePanel:
             with self._folder:
                 for key, column in at_hand.items():
                     if key not in self._boxes:
-                        box = self._server.gui.add_checkbox(column.label, column.shown, hint="show this column")
+                        box = self._server.gui.add_checkbox(column.label, column.visible, hint="show this column")
                         box.on_update(self._ticked(key))
-                        self._boxes[key], self._known[key] = box, column.shown
-                    elif self._known[key] != column.shown:
+                        self._boxes[key], self._known[key] = box, column.visible
+                    elif self._known[key] != column.visible:
                         # only then: a hand may just have ticked it, and its request is yet to be read
-                        self._boxes[key].value = self._known[key] = column.shown
+                        self._boxes[key].value = self._known[key] = column.visible
             self._clear.visible = self._removable()
 
     def _removable(self) -> bool:
-        return any(not c.shown for c in self._columns.all if c is not self._first())
+        return any(not c.visible for c in self._columns.all if c is not self._first())
 
     def _ticked(self, key: int) -> Callable[[viser.GuiEvent], Coroutine[None, None, None]]:
         async def show(event: viser.GuiEvent) -> None:
             # a coroutine reads the request at once where the message came in, before `refresh` says what is still shown
             if event.client_id is not None:
                 self._known[key] = bool(event.target.value)
-                self._columns.show(key, self._known[key])
+                self._columns.set_visible(key, self._known[key])
                 self._clear.visible = self._removable()
                 self._changed()
 

@@ -8,7 +8,7 @@ import viser
 from odeform.errors import InputError
 from odeform.schema import Window
 from odeform_viz.runtime.clock import Clock
-from odeform_viz.session import REACH
+from odeform_viz.view import REACH
 
 __all__ = ["PlaybackPanel"]
 

@@ -7,7 +7,7 @@ import viser
 
 from odeform.schema import Window
 from odeform.types import Floats
-from odeform_viz.session import REACH, Curves
+from odeform_viz.view import REACH, Curves
 
 __all__ = ["PlotPanel", "plots_svg"]
 
@@ -25,7 +25,7 @@ ERROR = ("error", "error RMS, mm (dashed: 9 in 10)")
 
 def _quantities(lines: Sequence[Line], turns: bool) -> list[tuple[str, str]]:
     wanted = [q for q in QUANTITIES if q[0] != "turn" or turns]
-    known = any(c.error is not None or c.expected is not None for _, _, c in lines)
+    known = any(c.error is not None or c.error_band is not None for _, _, c in lines)
     return [*wanted, ERROR] if known else wanted
 
 
@@ -53,7 +53,9 @@ def _plot(index: int, name: str, title: str, lines: Sequence[Line], window: Wind
     span = REACH * (window.stop - window.start)
     values = [(color, getattr(c, name), "") for _, color, c in lines if getattr(c, name) is not None]
     if name == "error":
-        values += [(color, c.expected, ' stroke-dasharray="3 2"') for _, color, c in lines if c.expected is not None]
+        values += [
+            (color, c.error_band, ' stroke-dasharray="3 2"') for _, color, c in lines if c.error_band is not None
+        ]
     top = _top([v for _, v, _ in values])
     trained = wide / REACH
     x = np.linspace(0.0, wide, len(lines[0][2].times)) if lines else np.zeros(0)
@@ -136,7 +138,7 @@ class PlotPanel:
     def show(self, lines: list[Line], moment: float) -> None:
         if [id(c) for _, _, c in lines] != [id(c) for _, _, c in self._lines]:
             self._lines = lines
-            self._turns = any(float(c.turn.max()) > 1.0 for _, _, c in lines)
+            self._turns = any(float(c.rotation.max()) > 1.0 for _, _, c in lines)
             self._curves.content = plots_svg(lines, self._window, self._turns)
             self._panel.set_width(WIDTH * max(len(_quantities(lines, self._turns)), 3) + 40)
         self._cursor.content = cursor_svg(lines, self._window, self._turns, moment)

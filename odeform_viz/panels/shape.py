@@ -102,7 +102,7 @@ class ShapePanel:
         self._fit = fit
         if fit is not None and guessed:
             self._guess = fit.place.factor
-        self._columns.reshape(fit)
+        self._columns.set_shape(fit)
         self._show()
         self._changed()
 

@@ -7,7 +7,7 @@ import viser
 
 from odeform.motion.base import Motion
 from odeform_viz.rendering.error_colors import BANDS
-from odeform_viz.session import ColumnFrame, Frame
+from odeform_viz.view import ColumnFrame, Frame
 
 __all__ = ["MomentPanel", "StatusPanel", "describe", "moment_in_words"]
 
@@ -15,7 +15,7 @@ __all__ = ["MomentPanel", "StatusPanel", "describe", "moment_in_words"]
 def moment_in_words(frame: Frame) -> str:
     """Where the moment lies, and what is wrong: below the floor, or not to be shown."""
     words = [_place_in_time(frame)]
-    if sunk := [shown.column.label for shown in frame.columns if shown.sunk]:
+    if sunk := [shown.column.label for shown in frame.columns if shown.below_floor]:
         deepest = max(shown.depth for shown in frame.columns)
         words.append(f"⚠ **{', '.join(sunk)}**: {1e3 * deepest:.0f} mm below the floor")
     words += [f"… **{label}** is being computed" for label in frame.pending]

@@ -15,7 +15,8 @@ from odeform.types import Faces, Geometry, Mesh, PointCloud, Points
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.recording.provenance import versions
 from odeform_viz.recording.reader import Recording, read_recording
-from odeform_viz.session import Session, ViewRequest
+from odeform_viz.session import Session
+from odeform_viz.view import ViewRequest
 
 __all__ = ["TOLERANCE", "Checked", "check_recording", "replay"]
 

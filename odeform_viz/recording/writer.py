@@ -24,7 +24,7 @@ from odeform_viz.recording.provenance import provenance_of, versions
 from odeform_viz.recording.reader import END, FORMAT, HEADER, MOTION, PROVENANCE, REQUEST, REST, SHOWN, WORLD
 from odeform_viz.rendering.scene import color_of
 from odeform_viz.rendering.shapes import Color
-from odeform_viz.session import ColumnFrame, Frame
+from odeform_viz.view import ColumnFrame, Frame
 
 __all__ = ["Recorder"]
 

@@ -11,7 +11,7 @@ from odeform.types import Floats, GaussianSplats, Geometry
 from odeform_viz.columns import Column
 from odeform_viz.rendering.error_colors import Spread
 from odeform_viz.rendering.shapes import Color, show_shape
-from odeform_viz.session import INVISIBLE, ColumnFrame, DisplayOptions, Frame
+from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions, Frame
 
 __all__ = ["SceneView", "color_of"]
 
@@ -24,7 +24,7 @@ GHOST = 0.45  # opacity of all but the first where columns overlap
 
 def color_of(column: Column) -> Color:
     """A model's by its place, the truth grey."""
-    return TRUTH if column.truth else COLORS[column.place % len(COLORS)]
+    return TRUTH if column.truth else COLORS[column.color_index % len(COLORS)]
 
 
 class _ColumnView:
@@ -192,7 +192,7 @@ class SceneView:
         with self._server.atomic():
             self._match(frame)
             self._show_still(frame)
-            row = [column.key for column in frame.request.columns if column.shown]
+            row = [column.key for column in frame.request.columns if column.visible]
             several = len(row) > 1
             for shown in frame.columns:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
@@ -251,5 +251,5 @@ class SceneView:
 def title_of(shown: ColumnFrame) -> str:
     """What stands above a column: its name, its error, and what is wrong."""
     error = f" · {shown.error.rmse_mm:.2f} mm" if shown.error else ""
-    sunk = " · below the floor" if shown.sunk else ""
+    sunk = " · below the floor" if shown.below_floor else ""
     return f"{shown.column.label}{error}{sunk}"

@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from odeform_viz.view import Frame, ViewRequest
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
@@ -13,7 +14,7 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.recording.writer import Recorder
-from odeform_viz.session import Frame, Session, ViewRequest
+from odeform_viz.session import Session
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
 Record = Callable[..., list[Frame]]

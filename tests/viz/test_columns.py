@@ -39,9 +39,9 @@ def test_labels_and_keys_are_distinct_and_last(kick: Predictor) -> None:
     columns = Columns.of([_column(kick)] * 3)
     assert [c.label for c in columns.all] == ["odeform", "odeform #2", "odeform #3"]
     keys = [c.key for c in columns.all]
-    columns.show(keys[1], False)
+    columns.set_visible(keys[1], False)
     assert [c.key for c in columns.all] == keys
-    assert [c.shown for c in columns.all] == [True, False, True]
+    assert [c.visible for c in columns.all] == [True, False, True]
     columns.remove(keys[0])
     assert [c.key for c in columns.all] == keys[1:]
 

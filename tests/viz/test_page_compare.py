@@ -45,7 +45,7 @@ def test_columns_are_compared_with_the_truth(compared: Tab) -> None:
     compared.button("Pin these parameters").click()
     assert compared.says("odeform at mass")
     compared.button("Sweep it in 5 columns").click()
-    assert until(lambda: sum(c.shown for c in app.columns.all) == 5)
+    assert until(lambda: sum(c.visible for c in app.columns.all) == 5)
     compared.button("Remove hidden columns").click()
     assert until(lambda: len(app.columns.all) == 6)
     assert compared.errors == []

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from odeform_viz.view import ViewRequest
 
 from odeform.cancellation import Cancelled, cancel_unless
 from odeform.dataset.index import Dataset
@@ -15,7 +16,7 @@ from odeform.motion.point_motion import PointMotion
 from odeform.motion.recorded import RecordedMotion
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import moment_in_words
-from odeform_viz.session import Session, ViewRequest
+from odeform_viz.session import Session
 
 
 @pytest.fixture(scope="module")
@@ -40,20 +41,20 @@ def test_all_side_by_side_with_the_truth(models: dict[str, Predictor], truth: Re
         assert column.stats.status == "ok"
         curves = session.curves(column, request)
         assert np.isfinite(curves.deformation).all()
-        assert curves.expected is not None
+        assert curves.error_band is not None
         assert session.frame(request).columns[1].motion is frame.columns[1].motion
 
 
 def test_between_frames_needs_a_truth_of_these_parameters(models: dict[str, Predictor], truth: RecordedMotion) -> None:
     flow = Column("flow", models["occupancy-flow"], models["occupancy-flow"].rest)
     session = Session(truth.schema)
-    with pytest.raises(InputError, match="expected the truth"):
+    with pytest.raises(InputError, match="expected a truth"):
         session.frame(ViewRequest(session.schema.complete({}), 0.4, "balanced", Columns.of([flow]).all))
     both = Columns.of([Column("truth", truth, truth.geometry), flow]).all
     frame = session.frame(ViewRequest(session.schema.complete({"mass": 0.55}), 0.4, "balanced", both))
     assert [shown.column.label for shown in frame.columns] == ["truth"]  # one that refuses stops no other
-    assert frame.refused == ("flow moves between observed frames: expected the truth of these parameters",)
-    assert "flow moves between observed frames" in moment_in_words(frame)
+    assert frame.refused == ("flow interpolates observed frames: expected a truth of these parameters",)
+    assert "flow interpolates observed frames" in moment_in_words(frame)
 
 
 def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,20 +65,20 @@ def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypa
     request = ViewRequest(session.schema.complete({"mass": 0.5}), 0.4, "balanced", columns)
     asked = iter([True] * 10)
     with pytest.raises(Cancelled), cancel_unless(lambda: next(asked, False)):  # a newer request comes meanwhile
-        session.frame(request, whole=False)
+        session.frame(request, include_slow=False)
     # what was given up is left for later, and the page says so
-    first = session.frame(request, whole=False)
+    first = session.frame(request, include_slow=False)
     assert [shown.column.label for shown in first.columns] == ["fast"]
     assert first.pending == ("node",)
     assert "node** is being computed" in moment_in_words(first)
-    assert first.follows(replace(request, time=0.5))
+    assert first.differs_in_time_only(replace(request, time=0.5))
     whole = session.frame(request)
     assert [shown.column.label for shown in whole.columns] == ["fast", "node"]
     assert not whole.pending
     # once there, it is shown at any time
-    assert not session.frame(replace(request, time=0.5), whole=False).pending
+    assert not session.frame(replace(request, time=0.5), include_slow=False).pending
     monkeypatch.setattr("odeform_viz.session.SLOW", 0.0)
     moved = replace(request, parameters={**request.parameters, "mass": 0.6})
-    assert not first.follows(moved)
+    assert not first.differs_in_time_only(moved)
     # the motion that took least is slow now too
-    assert session.frame(moved, whole=False).pending == ("fast", "node")
+    assert session.frame(moved, include_slow=False).pending == ("fast", "node")

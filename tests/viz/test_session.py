@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from odeform_viz.view import INVISIBLE, ViewRequest
 
 from odeform import InputError
 from odeform.dataset.index import Dataset
@@ -13,7 +14,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
-from odeform_viz.session import INVISIBLE, Session, ViewRequest, visible_deformation
+from odeform_viz.session import Session, visible_deformation
 
 
 @pytest.fixture
@@ -54,7 +55,7 @@ def test_hidden_columns_are_not_computed(
         monkeypatch.setattr(
             column.source, "solve", lambda *a, _s=solve, _c=column.label, **k: (asked.append(_c), _s(*a, **k))[1]
         )
-    shown = tuple(replace(column, shown=index == 1) for index, column in enumerate(view_request.columns))
+    shown = tuple(replace(column, visible=index == 1) for index, column in enumerate(view_request.columns))
     frame = session.frame(replace(view_request, columns=shown))
     assert asked == [view_request.columns[1].label]
     assert [column.column.label for column in frame.columns] == asked

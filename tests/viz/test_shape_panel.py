@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 from odeform.geometry.region import Box, Sphere
 from odeform.geometry.similarity import UPRIGHT, Similarity
@@ -20,7 +21,7 @@ from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.panels.part import region_like
 from odeform_viz.rendering.gizmos import RegionGizmo
 from odeform_viz.rendering.scene import SceneView
-from odeform_viz.session import DisplayOptions, Session, ViewRequest
+from odeform_viz.session import Session
 
 BALL, REST = 24_000, 27_482  # splats of the bundled scene
 
@@ -76,7 +77,7 @@ def test_what_stands_still_is_sent_once_for_all_columns(
     assert {handle.name for handle in moved} == {name for name, count in made if count == BALL}
     assert not view._floor.visible
     # back to the trained body: it goes, and the floor of the viewer is there again
-    columns.reshape(None)
+    columns.set_shape(None)
     view.publish(session.frame(replace(request, columns=columns.all)), DisplayOptions(), None)
     assert view._still is None
     assert view._floor.visible

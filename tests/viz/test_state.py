@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 from odeform import InputError
 from odeform.geometry.region import Sphere
@@ -14,7 +15,6 @@ from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.models.registry import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
-from odeform_viz.session import DisplayOptions, ViewRequest
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
 
 SCENE = "mass-elastic"
@@ -29,33 +29,33 @@ def view_request() -> ViewRequest:
     columns = Columns.of([Column("odeform", model, model.rest, origin=SCENE)])
     columns.add(Column("heavy", model, model.rest, origin=SCENE, pinned={**at, "mass": 0.9}))
     columns.add(truth_column(f"{SCENE}/mass-elastic_00001"))
-    columns.show(columns.all[0].key, False)
+    columns.set_visible(columns.all[0].key, False)
     return ViewRequest(at, 0.271, "draft", columns.all)
 
 
 def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
-    looks = DisplayOptions(overlay=True, heat=False)
+    looks = DisplayOptions(overlay=True, error_colors=False)
     state = state_from_json(state_to_json(capture(SCENE, view_request, looks)), SCENE)
     columns = columns_of(state, view_request.columns[0].source.schema)
     again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks)
     assert again == state
     assert [c.label for c in columns] == ["odeform", "heavy", "truth"]
-    assert [c.shown for c in columns] == [False, True, True]
+    assert [c.visible for c in columns] == [False, True, True]
 
 
 @pytest.mark.parametrize(
     ("broken", "said"),
     [
-        (lambda s: b"\x00\xff", "not a file"),
+        (lambda s: b"\x00\xff", "not a state file"),
         (lambda s: json.dumps({**s, "odeform_state": 7}).encode(), "format 1"),
         (lambda s: json.dumps({**s, "scene": "kick"}).encode(), "kick"),
         (lambda s: json.dumps({**s, "surplus": 1}).encode(), "surplus"),
         (lambda s: json.dumps({**s, "columns": [{"origin": "x"}]}).encode(), "expected origin"),
         (lambda s: json.dumps({k: v for k, v in s.items() if k != "time"}).encode(), "time"),
-        (lambda s: json.dumps({**s, "time": "soon"}).encode(), "not a file"),
+        (lambda s: json.dumps({**s, "time": "soon"}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "time": float("nan")}).encode(), "time in seconds"),
-        (lambda s: json.dumps({**s, "columns": [7]}).encode(), "not a file"),
-        (lambda s: json.dumps({**s, "columns": []}).encode(), "no model under the sliders"),
+        (lambda s: json.dumps({**s, "columns": [7]}).encode(), "not a state file"),
+        (lambda s: json.dumps({**s, "columns": []}).encode(), "a model under the sliders"),
         (lambda s: json.dumps([s]).encode(), "format 1"),
     ],
 )

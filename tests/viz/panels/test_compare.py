@@ -54,12 +54,12 @@ def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
     client.set("parameter", "bending")
     client.click("Sweep it in 5 columns")
     assert client.until(lambda: f"/world/column_{5}/body/part_0" in client.nodes)
-    assert [c.shown for c in app.columns.all] == [False] + 5 * [True]
+    assert [c.visible for c in app.columns.all] == [False] + 5 * [True]
     assert _labels(app)[1] == "bending 0.3 N m"
     for label in _labels(app)[1:]:
         client.set(label, False)
     client.set("odeform", True)
-    assert client.until(lambda: [c.shown for c in app.columns.all] == [True] + 5 * [False])
+    assert client.until(lambda: [c.visible for c in app.columns.all] == [True] + 5 * [False])
     client.click("Remove hidden columns")
     assert client.until(lambda: _labels(app) == ["odeform"])
     assert client.until(lambda: not any(n.startswith("/world/column_5") for n in client.nodes))
@@ -67,7 +67,7 @@ def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
     client.set("parameter", "nonsense")
     client.click("Sweep it in 5 columns")
     assert client.until(lambda: any("parameter: expected" in said for said in client.said))
-    assert [c.shown for c in app.columns.all] == [True]
+    assert [c.visible for c in app.columns.all] == [True]
 
 
 def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
@@ -76,7 +76,7 @@ def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
     rival.solve = lambda *given, **named: (asked.append(1), solve(*given, **named))[1]  # pyright: ignore
     app, client = serve(Column("odeform", kick, kick.rest), Column("rival", rival, rival.rest))
     client.set("rival", False)
-    assert client.until(lambda: not app.columns.all[1].shown)
+    assert client.until(lambda: not app.columns.all[1].visible)
     client.collect(0.5)
     asked.clear()
     client.set("mass (kg)", 0.9)
@@ -105,7 +105,7 @@ def test_too_many_columns_are_refused(kicked: Kicked) -> None:
         client.collect(0.7)
     assert client.until(lambda: any(f"at most {MOST}" in said for said in client.said))
     assert len(app.columns.all) == 11
-    assert any(c.shown for c in app.columns.all)
+    assert any(c.visible for c in app.columns.all)
 
 
 def test_a_column_keeps_its_colour_and_shares_it_with_no_other(kicked: Kicked) -> None:

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from odeform_viz.view import ViewRequest
 
 from odeform.models.base import Predictor
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.plots import Line, cursor_svg, plots_svg
-from odeform_viz.session import Session, ViewRequest
+from odeform_viz.session import Session
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def line(drop: Predictor) -> Line:
 
 
 def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
-    line = (*line[:2], replace(line[2], expected=None))
+    line = (*line[:2], replace(line[2], error_band=None))
     svg = plots_svg([line, line], drop.schema.window, turns=False)
     assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error RMS", svg) == [
         "height of the centre",

@@ -10,7 +10,7 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels.quality import WITHIN_MM, WITHIN_MS, quality_names
-from odeform_viz.session import quality_of
+from odeform_viz.session import settings_of
 
 
 def chosen(app: App) -> dict[str, object]:
@@ -70,5 +70,5 @@ def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
 def test_settings_without_sense_are_refused(kick: Predictor) -> None:
     for requested in ("{", '{"method": "rk5", "step": 1}', '{"step": 0.1}', '{"method": "rk4", "step": "x"}'):
         with pytest.raises(ValueError, match=r"quality|solver"):
-            quality_of(kick, requested)
-    assert quality_of(kick, "unknown") == "balanced"
+            settings_of(kick, requested)
+    assert settings_of(kick, "unknown") == "balanced"

@@ -33,13 +33,13 @@ def test_the_state_of_the_page_goes_round(serve: Callable[..., View], drop: Pred
     client.set("pod-rbf", False)
     client.set("overlay", True)
     client.set("quality", "draft")
-    assert client.until(lambda: len(app.columns.all) == 4 and not app.columns.all[1].shown)
+    assert client.until(lambda: len(app.columns.all) == 4 and not app.columns.all[1].visible)
     client.collect(0.5)
     client.click("Save state")
     assert client.until(lambda: STATE in client.downloads)
     client.collect(0.3)
     saved = client.downloads[STATE]
-    labels = [(c.label, c.shown, c.pinned) for c in app.columns.all]
+    labels = [(c.label, c.visible, c.pinned) for c in app.columns.all]
 
     client.set("reset", "all")
     client.set("overlay", False)
@@ -51,7 +51,7 @@ def test_the_state_of_the_page_goes_round(serve: Callable[..., View], drop: Pred
     assert client.until(lambda: app.clock.time() == 0.3)
     assert client.until(lambda: client.controls["overlay"].value and client.controls["quality"].value == "draft")
     # the state keeps the truth behind the models
-    assert sorted((c.label, c.shown, c.pinned) for c in app.columns.all) == sorted(labels)
+    assert sorted((c.label, c.visible, c.pinned) for c in app.columns.all) == sorted(labels)
     assert app._parameters.parameters() == pytest.approx(json.loads(saved)["parameters"])
     assert client.until(lambda: "now off the truth by" in client.text())
 

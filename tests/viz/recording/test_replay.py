@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from odeform_viz.view import Frame
 
 import odeform
 from odeform.checkpoint import bundled_checkpoints, write_checkpoint
@@ -20,7 +21,6 @@ from odeform_viz.cli import main
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.recording.reader import read_recording
 from odeform_viz.recording.replay import check_recording
-from odeform_viz.session import Frame
 
 Record = Callable[..., list[Frame]]
 
@@ -146,7 +146,8 @@ import os, signal, sys, time
 import odeform
 from odeform_viz.columns import Column, Columns
 from odeform_viz.recording.writer import Recorder
-from odeform_viz.session import Session, ViewRequest
+from odeform_viz.session import Session
+from odeform_viz.view import ViewRequest
 kick = odeform.load("kick")
 session, columns = Session(kick.schema), Columns.of([Column("odeform", kick, kick.rest, origin="kick")]).all
 recorder = Recorder(sys.argv[1])

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
+from odeform_viz.view import Frame, ViewRequest
 
 from odeform import InputError
 from odeform.geometry.shape import fit_to
@@ -19,7 +20,7 @@ from odeform_viz.fitting import shape_from
 from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.reader import read_recording
 from odeform_viz.recording.writer import Recorder
-from odeform_viz.session import Frame, Session, ViewRequest
+from odeform_viz.session import Session
 
 Record = Callable[..., list[Frame]]
 
@@ -137,10 +138,10 @@ def test_another_shape_is_another_form_and_hidden_columns_are_cleared(kick: Pred
     session, recorder = Session(kick.schema), Recorder(path)
     request = ViewRequest(kick.schema.complete({}), 0.02, "balanced", columns.all)
     recorder.log(session.frame(request))
-    columns.show(1, False)
+    columns.set_visible(1, False)
     recorder.log(session.frame(replace(request, columns=columns.all)))
-    columns.show(1, True)
-    columns.reshape(fit_to(PointCloud(kick.rest.points[:50]), kick.rest))
+    columns.set_visible(1, True)
+    columns.set_shape(fit_to(PointCloud(kick.rest.points[:50]), kick.rest))
     recorder.log(session.frame(replace(request, columns=columns.all)))
     recorder.close()
     recording = read_recording(path)
