@@ -19,12 +19,16 @@ STYLE = (
     ".at text{text-anchor:end;stroke:#fff;stroke-width:2.5px;paint-order:stroke}"
 )
 """Of the moment, which is sent with every frame."""
-QUANTITIES = (("height", "height of the centre, m"), ("turn", "turn, degrees"), ("deformation", "deformation RMS, mm"))
+QUANTITIES = (
+    ("height", "height of the centre, m"),
+    ("rotation", "rotation, degrees"),
+    ("deformation", "deformation RMS, mm"),
+)
 ERROR = ("error", "error RMS, mm (dashed: 9 in 10)")
 
 
 def _quantities(lines: Sequence[Line], turns: bool) -> list[tuple[str, str]]:
-    wanted = [q for q in QUANTITIES if q[0] != "turn" or turns]
+    wanted = [q for q in QUANTITIES if q[0] != "rotation" or turns]
     known = any(c.error is not None or c.error_band is not None for _, _, c in lines)
     return [*wanted, ERROR] if known else wanted
 

@@ -25,12 +25,12 @@ def line(drop: Predictor) -> Line:
 def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
     line = (*line[:2], replace(line[2], error_band=None))
     svg = plots_svg([line, line], drop.schema.window, turns=False)
-    assert re.findall(r"height of the centre|turn, degrees|deformation RMS|error RMS", svg) == [
+    assert re.findall(r"height of the centre|rotation, degrees|deformation RMS|error RMS", svg) == [
         "height of the centre",
         "deformation RMS",
     ]
     assert svg.count('stroke="rgb(206, 78, 26)"') == 4
-    assert "turn, degrees" in plots_svg([line], drop.schema.window, turns=True)
+    assert "rotation, degrees" in plots_svg([line], drop.schema.window, turns=True)
 
 
 def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, drop: Predictor) -> None:
