@@ -6,7 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from odeform_viz.view import Frame, ViewRequest
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
@@ -15,6 +14,7 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.recording.writer import Recorder
 from odeform_viz.session import Session
+from odeform_viz.view import Frame, ViewRequest
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
 Record = Callable[..., list[Frame]]

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from odeform_viz.view import ViewRequest
 
 from odeform.cancellation import Cancelled, cancel_unless
 from odeform.dataset.index import Dataset
@@ -17,6 +16,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import moment_in_words
 from odeform_viz.session import Session
+from odeform_viz.view import ViewRequest
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 from authors import TETRAHEDRON, Authors, write_sequence
-from odeform_viz.view import ViewRequest
 
 from odeform.cli import main
 from odeform.dataset.importers.importing import import_dataset
@@ -18,6 +17,7 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Columns, truth_column
 from odeform_viz.session import Session
+from odeform_viz.view import ViewRequest
 
 Serve = Callable[..., tuple[App, LoopbackClient]]
 

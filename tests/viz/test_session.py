@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from odeform_viz.view import INVISIBLE, ViewRequest
 
 from odeform import InputError
 from odeform.dataset.index import Dataset
@@ -15,6 +14,7 @@ from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe, moment_in_words
 from odeform_viz.session import Session, visible_deformation
+from odeform_viz.view import INVISIBLE, ViewRequest
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 import viser
-from odeform_viz.view import DisplayOptions, ViewRequest
 
 from odeform.geometry.region import Box, Sphere
 from odeform.geometry.similarity import UPRIGHT, Similarity
@@ -22,6 +21,7 @@ from odeform_viz.panels.part import region_like
 from odeform_viz.rendering.gizmos import RegionGizmo
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 BALL, REST = 24_000, 27_482  # splats of the bundled scene
 

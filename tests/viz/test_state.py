@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from odeform_viz.view import DisplayOptions, ViewRequest
 
 from odeform import InputError
 from odeform.geometry.region import Sphere
@@ -16,6 +15,7 @@ from odeform.models.registry import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 SCENE = "mass-elastic"
 MODEL = {"origin": SCENE, "label": "m", "pinned": None, "shown": True, "truth": False}

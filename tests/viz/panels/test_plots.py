@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from odeform_viz.view import ViewRequest
 
 from odeform.models.base import Predictor
 from odeform_viz.app import App
@@ -13,6 +12,7 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.plots import Line, cursor_svg, plots_svg
 from odeform_viz.session import Session
+from odeform_viz.view import ViewRequest
 
 
 @pytest.fixture(scope="module")

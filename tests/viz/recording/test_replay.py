@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from odeform_viz.view import Frame
 
 import odeform
 from odeform.checkpoint import bundled_checkpoints, write_checkpoint
@@ -21,6 +20,7 @@ from odeform_viz.cli import main
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.recording.reader import read_recording
 from odeform_viz.recording.replay import check_recording
+from odeform_viz.view import Frame
 
 Record = Callable[..., list[Frame]]
 

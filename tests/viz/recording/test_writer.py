@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
-from odeform_viz.view import Frame, ViewRequest
 
 from odeform import InputError
 from odeform.geometry.shape import fit_to
@@ -21,6 +20,7 @@ from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.reader import read_recording
 from odeform_viz.recording.writer import Recorder
 from odeform_viz.session import Session
+from odeform_viz.view import Frame, ViewRequest
 
 Record = Callable[..., list[Frame]]
 

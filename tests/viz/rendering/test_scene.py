@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import viser
-from odeform_viz.view import DisplayOptions, ViewRequest
 
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
+from odeform_viz.view import DisplayOptions, ViewRequest
 
 
 def test_splats_are_sent_as_they_deform_and_as_given_at_rest(kick: Predictor, monkeypatch: pytest.MonkeyPatch) -> None:
