@@ -17,6 +17,7 @@ from odeform.errors import InputError
 from odeform.formats.registry import shape_formats
 from odeform.formats.writing import shape_at, write_motion, write_shape
 from odeform.types import Floats
+from odeform_viz.colors import color_of
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import fit_from_json
 from odeform_viz.panels.compare import ComparePanel
@@ -32,7 +33,7 @@ from odeform_viz.panels.status import MomentPanel, StatusPanel
 from odeform_viz.panels.truth import TruthPanel
 from odeform_viz.recording.writer import Recorder
 from odeform_viz.rendering.error_colors import scale_for
-from odeform_viz.rendering.scene import SceneView, color_of
+from odeform_viz.rendering.scene import SceneView
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
 from odeform_viz.runtime.notices import Notices
@@ -92,7 +93,7 @@ class App:
     def _build(self, columns: Sequence[Column]) -> None:
         schema, gui, wake = self.session.schema, self.server.gui, self._worker.wake
         self.clock = Clock(schema.window.start, schema.window.stop)
-        say = self._say = Notices(self.server).say
+        say = self._say = Notices(self.server).show
         self._playback = PlaybackPanel(self.server, schema.window, self.clock, wake, self._largest, say)
         self._moment = MomentPanel(self.server)
         tabs = gui.add_tab_group()
@@ -249,7 +250,7 @@ class App:
             if self._shape.arranging:
                 # what one drags is where the first column is, which then is where all are
                 looks = replace(looks, overlay=True)
-            with cancel_unless(lambda: self._worker.undisturbed):
+            with cancel_unless(lambda: self._worker.up_to_date):
                 self._meet(request, looks)
         except Cancelled:
             return 0.0

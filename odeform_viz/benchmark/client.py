@@ -51,7 +51,7 @@ class LoopbackClient:
         self._commands: dict[str, str] = {}
         self.received = 0
         """Bytes so far."""
-        self.said: list[str] = []
+        self.notifications: list[str] = []
         """Notifications, the newest last."""
         self.nodes: set[str] = set()
         """Names of the scene's nodes."""
@@ -145,7 +145,7 @@ class LoopbackClient:
         if kind == "RegisterCommandMessage":
             self._commands[props["label"]] = message["uuid"]
         elif kind == "NotificationShowMessage":
-            self.said.append(props["body"])
+            self.notifications.append(props["body"])
         elif kind == "GuiUpdateMessage":
             self._update(message["uuid"], message["updates"])
         elif kind == "GuiRemoveMessage":

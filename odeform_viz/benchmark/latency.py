@@ -102,7 +102,7 @@ def drag(models: list[Predictor], truth: Column | None, port: int, messages: int
     node = f"/world/column_{len(columns) - 1}/body/part_{len(parts) - 1}"
     others = truth.source.parameters if truth is not None and truth.truth else {}  # pyright: ignore[reportAttributeAccessIssue]
     motions = (model.solve(shape, {**others, slider.name: v}) for v in values)
-    expected = np.stack([parts[-1].of(motion.deformed(moment))[0] for motion in motions])
+    expected = np.stack([parts[-1].vertices(motion.deformed(moment))[0] for motion in motions])
 
     with _serving(columns, port, moment) as client:
 

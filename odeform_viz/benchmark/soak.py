@@ -85,7 +85,7 @@ def soak(app: App, port: int, requests: int, folder: Path, rate: float = 40.0, p
             client.downloads.clear()  # the browser's, not the viewer's
             gc.collect()
             resident.append(_resident_mb())
-        refused = len(client.said)
+        refused = len(client.notifications)
     return Soak(requests, refused, tuple(errors), tuple(fresh), tuple(resident), time.monotonic() - begin)
 
 
@@ -176,7 +176,7 @@ def _until_newest(client: LoopbackClient, app: App) -> float:
     node = f"/world/column_{column.key}/body/part_0"
     expected = visible_deformation(column.predictor.solve(column.geometry, {slider.name: float(values[-1])}), MOMENT)
     assert expected is not None, "a moment at which every ball is flattened"
-    wanted = checkerboard_parts(column.predictor.rest)[0].of(expected)
+    wanted = checkerboard_parts(column.predictor.rest)[0].vertices(expected)
     for value in values:
         client.set(f"{slider.name} ({slider.unit})", float(value))
     newest, begin = math.inf, time.monotonic()

@@ -9,7 +9,7 @@ from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
-from odeform_viz.rendering.gizmos import PlaceGizmo, Vantage
+from odeform_viz.rendering.gizmos import CameraFocus, TransformGizmo
 
 __all__ = ["AlignmentPanel"]
 
@@ -32,7 +32,7 @@ class AlignmentPanel:
         self._hold, self._turn, self._put, self._changed = hold, turn, put, changed
         self._fit: Fit | None = None
         self._guess = 1.0
-        self._gizmo, self._vantage = PlaceGizmo(server, self._dragged), Vantage(server)
+        self._gizmo, self._camera = TransformGizmo(server, self._dragged), CameraFocus(server)
         gui = server.gui
         self._folder = gui.add_folder("Alignment", expand_by_default=False, visible=False)
         with self._folder:
@@ -62,7 +62,7 @@ class AlignmentPanel:
     @property
     def dragging(self) -> bool:
         """Whether arrows and rings are on show."""
-        return self._gizmo.shown
+        return self._gizmo.visible
 
     def _toggled(self) -> None:
         self._show_gizmo()
@@ -71,16 +71,16 @@ class AlignmentPanel:
     def _show_gizmo(self) -> None:
         if self._fit is not None and self._drag.value:
             self._hold()
-            appears = not self._gizmo.shown
+            appears = not self._gizmo.visible
             self._gizmo.show(self._fit)
             if not appears:
                 return  # the view may have been turned to reach another ring
             points = np.asarray(self._fit.geometry.points, dtype=float)
             low, high = points.min(axis=0), points.max(axis=0)
-            self._vantage.look(0.5 * (low + high), 1.2 * float((high - low).max()))
+            self._camera.look_at(0.5 * (low + high), 1.2 * float((high - low).max()))
         else:
             self._gizmo.hide()
-            self._vantage.back()
+            self._camera.restore()
 
     def _upright(self) -> None:
         if self._up.value in UPRIGHT:

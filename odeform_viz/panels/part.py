@@ -8,7 +8,7 @@ import viser
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit, together
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
-from odeform_viz.rendering.gizmos import RegionGizmo, Vantage, reach_of
+from odeform_viz.rendering.gizmos import CameraFocus, RegionGizmo, half_extent
 
 __all__ = ["PartPanel", "region_like"]
 
@@ -30,7 +30,7 @@ class PartPanel:
         `changed` is called when a region comes up."""
         self._whole, self._use, self._changed = whole, use, changed
         self._fit: Fit | None = None
-        self._gizmo, self._vantage = RegionGizmo(server, self._count), Vantage(server)
+        self._gizmo, self._camera = RegionGizmo(server, self._count), CameraFocus(server)
         gui = server.gui
         self._folder = gui.add_folder("Part that moves", expand_by_default=False, visible=False)
         with self._folder:
@@ -55,7 +55,7 @@ class PartPanel:
     def show(self, fit: Fit | None) -> None:
         """What moves now; None for the body that was trained."""
         self._gizmo.hide()
-        self._vantage.back()
+        self._camera.restore()
         self._fit = fit
         self._folder.visible = fit is not None
         self._kind.value = _kind_of(fit.region) if fit else KINDS[0]
@@ -84,7 +84,7 @@ class PartPanel:
         else:
             self._edges.value = tuple(np.round(100.0 * np.asarray(region.size) / extent, 1))
         shown = region.moved(fit.place)
-        self._vantage.look(shown.centre, 3.0 * reach_of(shown))
+        self._camera.look_at(shown.centre, 3.0 * half_extent(shown))
         self._gizmo.show(shown)
         self._choosing(True)
         self._count()
@@ -128,7 +128,7 @@ def region_like(known: Region | None, kind: str, fit: Fit) -> Region:
     if isinstance(known, Sphere):
         # upright where the shape lies
         return Box(known.centre, np.full(3, 2.0 * known.radius), fit.place.rotation.T)
-    return Sphere(known.centre, reach_of(known))
+    return Sphere(known.centre, half_extent(known))
 
 
 def _kind_of(region: Region | None) -> str:

@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import viser
 
-from odeform_viz.runtime.jobs import Job, map_here
+from odeform_viz.runtime.jobs import Job, stability_image
 
 __all__ = ["StabilityPanel"]
 
@@ -25,7 +25,7 @@ class StabilityPanel:
         self._button = server.gui.add_button("Map stability")
         self._button.on_click(lambda _: self._start())
         self._picture = server.gui.add_image(np.full((1, 1, 3), 255, dtype=np.uint8), format="png", visible=False)
-        self._job = Job(map_here, (origin,), self._done, self._failed)
+        self._job = Job(stability_image, (origin,), self._done, self._failed)
 
     def _start(self) -> None:
         with self._lock:

@@ -13,7 +13,7 @@ from odeform.schema import Schema
 from odeform.simulation.scene import known_scenes
 from odeform.types import MotionSequence
 from odeform_viz.columns import Column, Columns
-from odeform_viz.runtime.jobs import Job, simulate_here, simulator_installed
+from odeform_viz.runtime.jobs import Job, simulate_motion, simulator_installed
 
 __all__ = ["TruthPanel", "entry_label", "other_physics"]
 
@@ -159,7 +159,7 @@ class TruthPanel:
             if self._job is not None and self._job.running:
                 return
             self._working(True)
-            self._job = Job(simulate_here, arguments, self._simulated, self._failed, self._progress)
+            self._job = Job(simulate_motion, arguments, self._simulated, self._failed, self._progress)
             self._job.start()
 
     def _simulated(self, sequence: MotionSequence) -> None:

@@ -19,11 +19,10 @@ from odeform.geometry.normals import vertex_normals
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Points
+from odeform_viz.colors import Color, color_of, paler
 from odeform_viz.columns import Column
 from odeform_viz.recording.provenance import provenance_of, versions
 from odeform_viz.recording.reader import END, FORMAT, HEADER, MOTION, PROVENANCE, REQUEST, REST, SHOWN, WORLD
-from odeform_viz.rendering.scene import color_of
-from odeform_viz.rendering.shapes import Color
 from odeform_viz.view import ColumnFrame, Frame
 
 __all__ = ["Recorder"]
@@ -230,8 +229,7 @@ def _look(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
 def _octants(points: Points, color: Color) -> np.ndarray:
     """(N, 3) the colour and a paler one in turn about the centre: a body of one colour hides how it turns."""
     odd = np.prod(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), axis=1) > 0.0
-    own = np.array(color, dtype=float)
-    return np.where(odd[:, None], own, 0.45 * own + 0.55 * 235.0).astype(np.uint8)
+    return np.where(odd[:, None], color, paler(color)).astype(np.uint8)
 
 
 def _blueprint(forms: Iterable[_Form]) -> rrb.Blueprint:

@@ -1,4 +1,4 @@
-"""A pattern on a mesh that shows how it turns: its octants in turn, cut cleanly whatever its triangles."""
+"""A checkerboard on a mesh, which makes its rotation visible: alternating octants, cut exactly along their planes."""
 
 from dataclasses import dataclass
 
@@ -9,35 +9,38 @@ from odeform.types import Faces, Floats, Ints, Mesh, Points
 
 __all__ = ["Part", "checkerboard_parts"]
 
-ON = 1e-6  # of the body's size; a vertex so near a plane lies in it
+TOLERANCE = 1e-6  # of the mesh's size; vertices this close to a plane count as lying in it
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Some octants of a mesh: its `faces` (F, 3) index vertices that `mix` (M, N) makes of the mesh's (N, 3)."""
+    """Some octants of a mesh: `faces` (F, 3) index the part's own M vertices.
 
-    mix: sparse.csr_array
+    The vertices are a linear combination of the N of the mesh: `weights` (M, N), each row summing to 1.
+    """
+
+    weights: sparse.csr_array
     faces: Ints
 
-    def of(self, points: Points) -> Points:
-        """(M, 3) where the part's vertices are when the mesh's are at `points` (N, 3)."""
-        return self.mix @ points
+    def vertices(self, points: Points) -> Points:
+        """The part's vertices (M, 3) for mesh vertices `points` (N, 3), in their units."""
+        return self.weights @ points
 
 
 def checkerboard_parts(mesh: Mesh) -> list[Part]:
-    """A mesh in two parts, octants about its centre in turn. A body of one colour hides how it turns."""
+    """Split a mesh into two parts of alternating octants around its centre; empty parts are left out."""
     points = np.asarray(mesh.points, dtype=float)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    near = ON * float(np.ptp(points, axis=0).max())
-    mix, faces = _identity(len(points)), mesh.faces
+    tolerance = TOLERANCE * float(np.ptp(points, axis=0).max())
+    weights, faces = _identity(len(points)), mesh.faces
     for axis in range(3):
-        height = mix @ (points[:, axis] - centre[axis])
-        mix, faces = _cut(mix, faces, np.where(np.abs(height) < near, 0.0, height))
-    odd = np.prod((mix @ points)[faces].mean(axis=1) - centre, axis=1) > 0.0
+        height = weights @ (points[:, axis] - centre[axis])
+        weights, faces = _cut(weights, faces, np.where(np.abs(height) < tolerance, 0.0, height))
+    odd = np.prod((weights @ points)[faces].mean(axis=1) - centre, axis=1) > 0.0
     parts = []
     for chosen in (faces[odd], faces[~odd]):
         used, local = np.unique(chosen, return_inverse=True)
-        parts.append(Part(mix[used], local.reshape(-1, 3)))
+        parts.append(Part(weights[used], local.reshape(-1, 3)))
     return [part for part in parts if len(part.faces)]
 
 
@@ -46,29 +49,28 @@ def _identity(count: int) -> sparse.csr_array:
     return sparse.csr_array((np.ones(count, dtype=np.float32), (each, each)), shape=(count, count))
 
 
-def _cut(mix: sparse.csr_array, faces: Faces, height: Floats) -> tuple[sparse.csr_array, Ints]:
-    """Split the faces that cross height (N,) zero, with new vertices on their edges."""
+def _cut(weights: sparse.csr_array, faces: Faces, height: Floats) -> tuple[sparse.csr_array, Ints]:
+    """Split the faces that cross `height` (N,) zero, with new vertices on their edges."""
     side = np.sign(height[faces])
     crossed = (side.min(axis=1) < 0.0) & (side.max(axis=1) > 0.0)
     if not crossed.any():
-        return mix, faces
-    # the vertex to turn to the front: one that lies in the plane, else the one that is alone on its side
+        return weights, faces
+    # rotate each face so that its first vertex lies in the plane, or else is the only one on its side
     first = np.where(
         (side == 0.0).any(axis=1), (side == 0.0).argmax(axis=1), (side == -side.sum(axis=1)[:, None]).argmax(axis=1)
     )
-    turned = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)[crossed]
-    edges = np.concatenate([turned[:, [0, 1]], turned[:, [0, 2]], turned[:, [1, 2]]])
+    rotated = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)[crossed]
+    edges = np.concatenate([rotated[:, [0, 1]], rotated[:, [0, 2]], rotated[:, [1, 2]]])
     edges = np.unique(np.sort(edges[height[edges].prod(axis=1) < 0.0], axis=1), axis=0)
     share = (height[edges[:, 0]] / (height[edges[:, 0]] - height[edges[:, 1]])).astype(np.float32)
-    fresh = sparse.diags_array(1.0 - share) @ mix[edges[:, 0]] + sparse.diags_array(share) @ mix[edges[:, 1]]
-    count = len(height)
-    number = {(a, b): count + index for index, (a, b) in enumerate(edges.tolist())}
+    added = sparse.diags_array(1.0 - share) @ weights[edges[:, 0]] + sparse.diags_array(share) @ weights[edges[:, 1]]
+    number = {(a, b): len(height) + index for index, (a, b) in enumerate(edges.tolist())}
     pieces = [faces[~crossed]]
-    for a, b, c in turned.tolist():
+    for a, b, c in rotated.tolist():
         if height[a] == 0.0:
             m = number[min(b, c), max(b, c)]
             pieces.append(np.array([[a, b, m], [a, m, c]]))
         else:
             m, n = number[min(a, b), max(a, b)], number[min(a, c), max(a, c)]
             pieces.append(np.array([[a, m, n], [m, b, c], [m, c, n]]))
-    return sparse.csr_array(sparse.vstack([mix, fresh])), np.concatenate(pieces)
+    return sparse.csr_array(sparse.vstack([weights, added])), np.concatenate(pieces)

@@ -1,4 +1,4 @@
-"""An error on a surface: bands of a colour scale, each a part of the mesh."""
+"""Errors on a surface as bands of a colour scale. Each band is a mesh of its own."""
 
 import numpy as np
 from jaxtyping import Float
@@ -6,9 +6,9 @@ from scipy.spatial import KDTree
 
 from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
-__all__ = ["BANDS", "Spread", "bands_of", "levels_of", "scale_for"]
+__all__ = ["BANDS", "NearestInterpolation", "band_indices", "scale_for", "split_into_bands"]
 
-# eight even samples of viridis: even steps to the eye, also in grey and to the colour-blind
+# eight even samples of viridis: perceptually uniform, also in greyscale and for colour-blind readers
 BANDS = (
     (68, 1, 84),
     (70, 50, 127),
@@ -19,32 +19,36 @@ BANDS = (
     (159, 218, 58),
     (253, 231, 37),
 )
-NEAR = 3
+NEIGHBORS = 3
 
 
-class Spread:
-    """Carries values at some points (N, 3) of a surface to others (M, 3) on it: means of the nearest, by distance."""
+class NearestInterpolation:
+    """Interpolates values from points `source` (N, 3) to points `target` (M, 3), both on one surface.
 
-    def __init__(self, given: Points, wanted: Points) -> None:
-        distance, self._index = KDTree(given).query(wanted, k=min(NEAR, len(given)))
-        share = 1.0 / np.maximum(distance, 1e-9)
-        self._share: Float[np.ndarray, "wanted near"] = share / share.sum(axis=1, keepdims=True)
+    Each value is the mean of the three nearest, weighted by inverse distance.
+    """
+
+    def __init__(self, source: Points, target: Points) -> None:
+        distance, self._index = KDTree(source).query(target, k=min(NEIGHBORS, len(source)))
+        weights = 1.0 / np.maximum(distance, 1e-9)
+        self._weights: Float[np.ndarray, "target near"] = weights / weights.sum(axis=1, keepdims=True)
 
     def __call__(self, values: Perpoint) -> Perpoint:
-        return (self._share * values[self._index]).sum(axis=1)
+        """Values (M,) at the targets for `values` (N,) at the sources."""
+        return (self._weights * values[self._index]).sum(axis=1)
 
 
-def levels_of(values: Perpoint, top: float) -> Ints:
-    """(N,) the band of each value, the last open above `top`."""
+def band_indices(values: Perpoint, top: float) -> Ints:
+    """The band (N,) of each value. The last band also holds values above `top`."""
     return np.clip((values / top * len(BANDS)).astype(int), 0, len(BANDS) - 1)
 
 
-def bands_of(values: Perpoint, faces: Faces, top: float) -> list[tuple[Ints, Ints] | None]:
-    """A mesh by the band that each face's mean value falls in.
+def split_into_bands(values: Perpoint, faces: Faces, top: float) -> list[tuple[Ints, Ints] | None]:
+    """Split the faces of a mesh by the band of their mean value.
 
-    For each band the vertices (M,) it uses and its faces (F, 3) among them; None where it is empty.
+    For each band: the vertices (M,) that it uses, and its faces (F, 3) indexing these; None for an empty band.
     """
-    level = levels_of(values[faces].mean(axis=1), top)
+    level = band_indices(values[faces].mean(axis=1), top)
     parts: list[tuple[Ints, Ints] | None] = []
     for band in range(len(BANDS)):
         chosen = faces[level == band]
@@ -54,9 +58,9 @@ def bands_of(values: Perpoint, faces: Faces, top: float) -> list[tuple[Ints, Int
 
 
 def scale_for(errors_mm: Floats) -> float:
-    """A round top of the scale, in mm, for RMS errors over time: 1, 2 or 5 times a power of ten.
+    """A round upper end of the colour scale, in mm, for RMS errors over time: 1, 2 or 5 times a power of ten.
 
-    Three times the largest RMS over the coordinates holds nearly all points at the worst moment.
+    It is at least three times the largest error, so that nearly all points stay below it even at the worst time.
     """
     largest = 3.0 * float(np.nanmax(errors_mm, initial=0.0))
     if largest <= 0.0:

@@ -1,4 +1,4 @@
-"""What one drags in the scene: a region that chooses a part, and a shape that is put into place."""
+"""Handles that the user drags in the scene: a region that selects a part, and the transform of a shape."""
 
 from collections.abc import Callable
 
@@ -10,117 +10,124 @@ from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import Fit
 from odeform.geometry.similarity import Similarity
 from odeform.types import Floats, Rotations, Vector
+from odeform_viz.colors import HANDLE
 
-__all__ = ["PlaceGizmo", "RegionGizmo", "Vantage", "reach_of"]
+__all__ = ["CameraFocus", "RegionGizmo", "TransformGizmo", "half_extent"]
 
-COLOR = (214, 96, 48)
-GHOST = 4000  # points that show where a shape is being put
-ASIDE = np.array([-0.85, -0.62, 0.62])  # where things are looked at from
-PANEL = np.array([0.16, -0.28, 0.0])  # what the panel covers: look past it
+PREVIEW_POINTS = 4000  # drawn while a shape is being dragged
+DIRECTION = np.array([-0.85, -0.62, 0.62])  # from the target to the camera
+PANEL = np.array([0.16, -0.28, 0.0])  # shifts the view away from the control panel
 
 
-class Vantage:
-    """Moves the cameras of all pages to see something whole, and back."""
+class CameraFocus:
+    """Moves the cameras of all clients to a target, and back to where they were."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._before: dict[int, tuple[Floats, Floats]] = {}
+        self._saved: dict[int, tuple[Floats, Floats]] = {}
 
-    def look(self, centre: Vector, reach: float) -> None:
-        """At a place, from as far as shows `reach` metres around it."""
+    def look_at(self, centre: Vector, radius: float) -> None:
+        """Show `radius` metres around `centre` (3,)."""
         for key, client in self._server.get_clients().items():
-            self._before.setdefault(key, (client.camera.position, client.camera.look_at))
-            _move(client, centre + (ASIDE + PANEL) * 3.0 * reach, centre + PANEL * reach)
+            self._saved.setdefault(key, (client.camera.position, client.camera.look_at))
+            _move(client, centre + (DIRECTION + PANEL) * 3.0 * radius, centre + PANEL * radius)
 
-    def back(self) -> None:
+    def restore(self) -> None:
+        """Move the cameras back to where they were before `look_at`."""
         for key, client in self._server.get_clients().items():
-            if key in self._before:
-                _move(client, *self._before[key])
-        self._before.clear()
+            if key in self._saved:
+                _move(client, *self._saved[key])
+        self._saved.clear()
 
 
 def _move(client: viser.ClientHandle, position: Floats, look_at: Floats) -> None:
     with client.atomic():
-        # the position first: it takes what is looked at along
+        # position first: setting it also translates the target
         client.camera.position = position
         client.camera.look_at = look_at
 
 
 class RegionGizmo:
-    """A sphere or a box with arrows to drag it by, in the scene's metres."""
+    """A sphere or a box with arrows to drag it by, in the metres of the scene."""
 
     ROOT = "/world/region"
 
     def __init__(self, server: viser.ViserServer, moved: Callable[[], None]) -> None:
-        """`moved` is called whenever a hand has moved it."""
+        """`moved` is called whenever the user drags the region."""
         self._server, self._moved = server, moved
-        self._shown: tuple[Region, viser.TransformControlsHandle] | None = None
+        self._visible: tuple[Region, viser.TransformControlsHandle] | None = None
 
     def show(self, region: Region) -> None:
-        """In place of the one before."""
+        """Show a region instead of the previous one."""
         sphere = isinstance(region, Sphere)
         with self._server.atomic():
             self.hide()
             controls = self._server.scene.add_transform_controls(
                 self.ROOT,
-                scale=2.5 * reach_of(region),
+                scale=2.5 * half_extent(region),
                 disable_rotations=sphere,
                 position=region.centre,
                 wxyz=vtf.SO3.from_matrix(np.eye(3) if sphere else region.rotation).wxyz,
             )
-            # edges alone: a veil, however thin, would hide the splats behind it
-            at, scene = f"{self.ROOT}/edges", self._server.scene
+            # wireframe: any transparent surface would hide the splats behind it
+            node, scene = f"{self.ROOT}/edges", self._server.scene
             if sphere:
-                scene.add_icosphere(at, region.radius, COLOR, subdivisions=2, wireframe=True, cast_shadow=False)
+                scene.add_icosphere(node, region.radius, HANDLE, subdivisions=2, wireframe=True, cast_shadow=False)
             else:
-                scene.add_box(at, COLOR, region.size, wireframe=True, cast_shadow=False)
-            self._shown = region, controls
+                scene.add_box(node, HANDLE, region.size, wireframe=True, cast_shadow=False)
+            self._visible = region, controls
         controls.on_update(lambda _: self._moved())
 
     def hide(self) -> None:
-        if self._shown is not None:
-            self._shown[1].remove()
-            self._shown = None
+        if self._visible is not None:
+            self._visible[1].remove()
+            self._visible = None
 
     @property
     def region(self) -> Region | None:
-        """As it now lies; None while hidden."""
-        if self._shown is None:
+        """The region as dragged; None while hidden."""
+        if self._visible is None:
             return None
-        region, controls = self._shown
+        region, controls = self._visible
         centre = np.asarray(controls.position, dtype=float)
         if isinstance(region, Sphere):
             return Sphere(centre, region.radius)
         return Box(centre, region.size, _rotation(controls))
 
 
-class PlaceGizmo:
-    """Arrows and rings about a fitted shape, with a ghost of it that goes along until the hand lets go."""
+class TransformGizmo:
+    """Arrows and rings around a fitted shape. A preview of its points moves with them until the user lets go."""
 
     ROOT = "/world/place"
 
     def __init__(self, server: viser.ViserServer, moved: Callable[[Similarity], None]) -> None:
-        """`moved` is called with the motion, in the scene's metres, when a hand has let go."""
+        """`moved` is called with the rigid motion, in the metres of the scene, when a drag ends."""
         self._server, self._moved = server, moved
         self._controls: viser.TransformControlsHandle | None = None
 
     @property
-    def shown(self) -> bool:
+    def visible(self) -> bool:
         return self._controls is not None
 
     def show(self, fit: Fit) -> None:
+        """Show arrows and rings around the moving part of a fit."""
         points = np.asarray(fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)
         start, size = 0.5 * (low + high), float((high - low).max())
         with self._server.atomic():
             self.hide()
             controls = self._server.scene.add_transform_controls(self.ROOT, scale=1.6 * size, position=start)
-            ghost = np.random.default_rng(0).permutation(points - start)[:GHOST].astype(np.float32)
+            preview = np.random.default_rng(0).permutation(points - start)[:PREVIEW_POINTS].astype(np.float32)
             self._server.scene.add_point_cloud(
-                f"{self.ROOT}/ghost", ghost, COLOR, point_size=0.004 * size, point_shape="circle", precision="float32"
+                f"{self.ROOT}/preview",
+                preview,
+                HANDLE,
+                point_size=0.004 * size,
+                point_shape="circle",
+                precision="float32",
             )
             self._controls = controls
-        foot = start - [0.0, 0.0, fit.lift]  # what is lifted is moved where it stands
+        foot = start - [0.0, 0.0, fit.lift]  # a lifted shape is moved where it stands
 
         def dragged(event: viser.TransformControlsEvent) -> None:
             if event.phase == "end":
@@ -135,8 +142,8 @@ class PlaceGizmo:
             self._controls = None
 
 
-def reach_of(region: Region) -> float:
-    """Metres from its centre to its farthest side."""
+def half_extent(region: Region) -> float:
+    """Metres from the centre of a region to its farthest face."""
     return region.radius if isinstance(region, Sphere) else 0.5 * float(np.max(region.size))
 
 

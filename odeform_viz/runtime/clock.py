@@ -1,4 +1,4 @@
-"""The moment that is shown: played, paused, stepped."""
+"""Playback time: play, pause, seek, speed, loop."""
 
 import threading
 import time
@@ -8,9 +8,9 @@ __all__ = ["Clock"]
 
 
 class Clock:
-    """Maps wall time to the motion's time. Plays from `start` to `stop`, where it loops or halts.
+    """Maps wall-clock time to the time of a motion, in seconds. Plays from `start` to `stop`, then loops or stops.
 
-    `now` is a monotonic clock in seconds, given for tests.
+    `now` is a monotonic clock in seconds; tests pass their own. All methods are thread-safe.
     """
 
     def __init__(self, start: float, stop: float, now: Callable[[], float] = time.monotonic) -> None:
@@ -27,45 +27,48 @@ class Clock:
         return self._playing
 
     def time(self) -> float:
-        """The moment shown now, in seconds of the motion."""
+        """The current time of the motion, in s."""
         with self._lock:
             return self._time()
 
     def _time(self) -> float:
         if not self._playing:
             return self._anchor
-        moment = self._anchor + self._speed * (self._now() - self._anchor_wall)
-        # played from beyond the end, the motion runs on to wherever the user had gone
+        current = self._anchor + self._speed * (self._now() - self._anchor_wall)
+        # a user may seek beyond `stop`; playback then ends where they went
         end = max(self.stop, self._anchor)
-        if moment < end:
-            return moment
+        if current < end:
+            return current
         if not self.loop:
             self._playing, self._anchor = False, end
             return end
         span = max(self.stop - self.start, 1e-9)
-        self._set(self.start + (moment - end) % span)
+        self._set(self.start + (current - end) % span)
         return self._anchor
 
-    def _set(self, moment: float) -> None:
-        self._anchor, self._anchor_wall = moment, self._now()
+    def _set(self, current: float) -> None:
+        self._anchor, self._anchor_wall = current, self._now()
 
     def play(self) -> None:
+        """Start playing, from `start` if at or beyond `stop`."""
         with self._lock:
             if not self._playing:
                 self._set(self.start if self._anchor >= self.stop else self._anchor)
                 self._playing = True
 
     def pause(self) -> None:
+        """Stop at the current time."""
         with self._lock:
             self._anchor = self._time()
             self._playing = False
 
-    def seek(self, moment: float) -> None:
+    def seek(self, time: float) -> None:
+        """Jump to `time` in s, which may lie beyond `stop`; playback goes on if it was playing."""
         with self._lock:
-            self._set(moment)
+            self._set(time)
 
     def set_speed(self, speed: float) -> None:
-        """Seconds of motion in a second of wall time."""
+        """Set the seconds of motion per second of wall-clock time, without a jump."""
         with self._lock:
             self._set(self._time())
             self._speed = speed

@@ -1,4 +1,4 @@
-"""Long work in a process of its own: progress, result, cancel. The page stays alive, whatever the work does."""
+"""Long work in a process of its own, with progress, result and cancellation. The page stays responsive meanwhile."""
 
 import importlib.util
 import multiprocessing
@@ -13,17 +13,18 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.types import MotionSequence
 
-__all__ = ["Job", "map_here", "simulate_here", "simulator_installed"]
+__all__ = ["Job", "Report", "simulate_motion", "simulator_installed", "stability_image"]
 
-Send = Callable[[float], None]
+Report = Callable[[float], None]
+"""Called with the fraction of the work that is done, 0 to 1."""
 
 
 @dataclass
 class Job:
-    """Runs `work(send, *args)`, an importable function that calls `send` with its share done.
+    """Runs `work(report, *args)` in a new process; `work` must be importable, its arguments and result picklable.
 
-    `progress` is called with that share; at the end one of `done` with the result or `failed` with one line. All are
-    called from a thread of the job's own, never again after `cancel`.
+    `progress` is called with the fraction done, then one of `done` with the result or `failed` with a message of one
+    line. All are called from a thread of the job, and not after `cancel`.
     """
 
     work: Callable[..., Any]
@@ -32,12 +33,13 @@ class Job:
     failed: Callable[[str], None]
     progress: Callable[[float], None] = lambda _: None
     running: bool = field(default=False, init=False)
-    """Until the result is in, or cancelled."""
+    """Until the result has arrived or the job is cancelled."""
     _cancelled: threading.Event = field(default_factory=threading.Event, init=False)
 
     def start(self) -> None:
+        """Start the process; returns at once."""
         self.running = True
-        # a fresh interpreter: this one has threads, whose locks a fork would copy as they happen to be
+        # spawn, not fork: this process has threads, and a fork would copy their locks in any state
         context = multiprocessing.get_context("spawn")
         self._inbox, outbox = context.Pipe(duplex=False)
         self._process = context.Process(target=_run, args=(outbox, self.work, self.args), daemon=True)
@@ -47,6 +49,7 @@ class Job:
         self._thread.start()
 
     def cancel(self) -> None:
+        """Terminate the process. No callback follows."""
         self._cancelled.set()
         self._process.terminate()
         self.running = False
@@ -70,7 +73,7 @@ class Job:
 
 def _run(outbox: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
     try:
-        result = work(lambda share: outbox.send(("progress", share)), *args)
+        result = work(lambda fraction: outbox.send(("progress", fraction)), *args)
     except KeyboardInterrupt:
         return
     except Exception as error:
@@ -80,18 +83,19 @@ def _run(outbox: Connection, work: Callable[..., Any], args: tuple[Any, ...]) ->
 
 
 def simulator_installed() -> bool:
+    """Whether MuJoCo is installed; it is not imported."""
     return importlib.util.find_spec("mujoco") is not None
 
 
-def simulate_here(send: Send, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
-    """One motion of a scene under these parameters: the truth of that setting."""
+def simulate_motion(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
+    """Simulate one motion of a scene under `parameters` (SI units), sampled at `rate` in Hz."""
     from odeform.simulation.scene import get_scene
 
-    return get_scene(scene).simulate(parameters, rate=rate, report=send)
+    return get_scene(scene).simulate(parameters, rate=rate, report=report)
 
 
-def map_here(send: Send, checkpoint: str) -> np.ndarray:
-    """(H, W, 3) pixels: where a model is stable, within the window and beyond."""
+def stability_image(report: Report, checkpoint: str) -> np.ndarray:
+    """The stability plot of a model, (H, W, 3) pixels: where it is stable, within the trained window and beyond."""
     from odeform.models.registry import load_continuous
     from odeform.stress.stability import map_image, stability_map
 

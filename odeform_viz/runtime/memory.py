@@ -1,4 +1,4 @@
-"""Memory that was freed goes back to the system. Only glibc needs to be told; elsewhere nothing happens."""
+"""Returns freed memory to the operating system. glibc needs to be asked; elsewhere these functions do nothing."""
 
 import ctypes
 import sys
@@ -6,18 +6,18 @@ import time
 
 __all__ = ["MallocTrimmer", "share_arenas"]
 
-ARENA_MAX = -8  # glibc's name for the option
-SELDOM = 2.0  # s
+M_ARENA_MAX = -8  # option of mallopt
+INTERVAL = 2.0  # s
 
 
 def share_arenas(count: int = 2) -> None:
-    """Let threads that come share `count` heaps: each of the dozens that call back would keep one of its own."""
+    """Let threads started later share `count` malloc arenas; each of viser's many threads would keep its own."""
     if (libc := _glibc()) is not None:
-        libc.mallopt(ARENA_MAX, count)
+        libc.mallopt(M_ARENA_MAX, count)
 
 
 class MallocTrimmer:
-    """Gives freed memory back, at most every two seconds; takes some milliseconds, outside of Python's lock."""
+    """Returns freed memory at most every two seconds; takes some milliseconds, without holding the GIL."""
 
     def __init__(self) -> None:
         self._libc = _glibc()
@@ -25,7 +25,7 @@ class MallocTrimmer:
 
     def __call__(self) -> None:
         now = time.monotonic()
-        if self._libc is not None and now - self._last > SELDOM:
+        if self._libc is not None and now - self._last > INTERVAL:
             self._last = now
             self._libc.malloc_trim(0)
 

@@ -1,4 +1,4 @@
-"""Messages that no frame may wipe out: what a click could not do, and why."""
+"""Notifications in the page: what a click could not do, and why. New frames do not remove them."""
 
 import threading
 import time
@@ -7,23 +7,24 @@ import viser
 
 __all__ = ["Notices"]
 
-SHOWN = 10.0  # s
-AGAIN = 2.0  # s within which the same words are not said twice
+VISIBLE = 10.0  # s
+REPEAT = 2.0  # s within which the same message is not shown again
 
 
 class Notices:
-    """Says a message to everybody who looks."""
+    """Shows messages to all clients."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._lock = threading.Lock()
-        self._last = ("", -AGAIN)
+        self._last = ("", -REPEAT)
 
-    def say(self, message: str) -> None:
+    def show(self, message: str) -> None:
+        """Show a message for ten seconds."""
         with self._lock:
             now = time.monotonic()
-            if message == self._last[0] and now - self._last[1] < AGAIN:
+            if message == self._last[0] and now - self._last[1] < REPEAT:
                 return
             self._last = (message, now)
         for client in self._server.get_clients().values():
-            client.add_notification("That did not work", message, auto_close_seconds=SHOWN, color="orange")
+            client.add_notification("That did not work", message, auto_close_seconds=VISIBLE, color="orange")

@@ -1,4 +1,4 @@
-"""viser's server: on the port that was asked for or none, in our dress, and safe to talk to from any thread."""
+"""viser's server on a given port, with the page's theme, safe to use from any thread."""
 
 import asyncio
 import contextlib
@@ -9,17 +9,18 @@ import sys
 import viser
 
 from odeform.errors import InputError
+from odeform_viz.colors import HANDLE
 
 __all__ = ["open_server"]
 
-SWITCH = 2e-4  # s after which a thread that waits for the interpreter gets it
+SWITCH_INTERVAL = 2e-4  # s after which a waiting thread gets the GIL
 
 
 class _LoopEvent(asyncio.Event):
-    """Set on the event loop alone.
+    """An event that only the event loop can set.
 
-    viser 1.1 sets the event of its outgoing messages from whatever thread has one, which iterates over the loop's
-    waiters as they change ("deque mutated during iteration"), and then again on the loop, which is all it takes.
+    viser 1.1 sets the event of its outgoing messages from any thread, which iterates over the loop's waiters while they
+    change ("deque mutated during iteration"), and then again on the loop, which is enough.
     """
 
     def set(self) -> None:
@@ -29,11 +30,11 @@ class _LoopEvent(asyncio.Event):
 
 
 def open_server(host: str, port: int, title: str) -> viser.ViserServer:
-    """`InputError` for a port that is taken."""
+    """Start a server. `InputError` if the port cannot be used; port 0 takes a free one."""
     _require_free(host, port)
-    # a worker's many short numpy calls would keep the interpreter from the socket's thread for 5 ms at a time
-    sys.setswitchinterval(SWITCH)
-    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner of its own
+    # a worker's many short numpy calls would keep the GIL from the socket's thread for 5 ms at a time
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
         server = viser.ViserServer(host=host, port=port, verbose=False)
     server._websock_server.get_message_buffer().message_event = _LoopEvent()
     server.gui.configure_theme(
@@ -41,14 +42,14 @@ def open_server(host: str, port: int, title: str) -> viser.ViserServer:
         control_width="medium",
         show_logo=False,
         show_share_button=False,
-        brand_color=(214, 96, 48),
+        brand_color=HANDLE,
     )
     server.gui.set_panel_label(title)
     return server
 
 
 def _require_free(host: str, port: int) -> None:
-    """Viser would silently take the next port."""
+    """Refuse a port in use: viser would silently take the next one."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,4 +1,4 @@
-"""One thread that serves the newest request. Callbacks only wake it, so nothing stale is ever shown."""
+"""A thread that serves the newest request. Callbacks only wake it, so it never serves an outdated request."""
 
 import sys
 import threading
@@ -9,9 +9,10 @@ __all__ = ["Worker"]
 
 
 class Worker:
-    """Calls `serve` whenever woken, however often that was while it was busy: once, with the newest state.
+    """Calls `serve` after `wake`; calls to `wake` while it is busy are merged into one.
 
-    `serve` returns the seconds after which it wants to be called again, or None to sleep until woken.
+    `serve` returns the seconds until it wants to be called again, or None to sleep until woken. An exception in it is
+    printed once, and the thread goes on.
     """
 
     def __init__(self, serve: Callable[[], float | None]) -> None:
@@ -21,19 +22,21 @@ class Worker:
         self._thread = threading.Thread(target=self._loop, name="odeform-worker", daemon=True)
 
     def start(self) -> None:
+        """Start the thread, with a first call of `serve`."""
         self._awake.set()
         self._thread.start()
 
     def wake(self) -> None:
+        """Ask for a call of `serve`, from any thread."""
         self._awake.set()
 
     @property
-    def undisturbed(self) -> bool:
-        """Whether nothing has been requested for since this round began."""
+    def up_to_date(self) -> bool:
+        """Whether `wake` has not been called since the current call of `serve` began."""
         return not self._awake.is_set()
 
     def stop(self) -> None:
-        """Finish the round under way and end the thread."""
+        """Finish the current call of `serve` and end the thread; waits at most 5 s."""
         self._running = False
         self._awake.set()
         if self._thread.is_alive():
@@ -41,17 +44,17 @@ class Worker:
 
     def _loop(self) -> None:
         pause: float | None = None
-        said = ""
+        printed = ""
         while True:
             self._awake.wait(pause)
-            self._awake.clear()  # before reading the requests: one that comes later wakes the next round
+            self._awake.clear()  # before reading the request: a later one wakes the next round
             if not self._running:
                 return
             try:
                 pause = self._serve()
             except Exception:
-                # must not end the session: the last good frame stays. Said once, not 30 times a second
+                # the session goes on with the last good frame; printed once, not 30 times a second
                 error = traceback.format_exc()
-                if error != said:
+                if error != printed:
                     print(error, file=sys.stderr)
-                said, pause = error, None
+                printed, pause = error, None

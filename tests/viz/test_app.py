@@ -51,7 +51,7 @@ def test_a_slider_moves_the_mesh(app: App, kick: Predictor, port: int, label: st
         client.set(label, value)
         shown = client.wait_vertices(BODY)
     expected = kick.solve(kick.rest, {label.split()[0]: value}).deformed(0.02)
-    np.testing.assert_array_equal(shown, checkerboard_parts(kick.rest)[0].of(expected))
+    np.testing.assert_array_equal(shown, checkerboard_parts(kick.rest)[0].vertices(expected))
 
 
 def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predictor, port: int) -> None:
@@ -65,7 +65,7 @@ def test_after_a_storm_of_messages_the_last_wish_is_shown(app: App, kick: Predic
         while (vertices := client.wait_vertices(BODY, 1.0)) is not None:
             last = vertices
     expected = kick.solve(kick.rest, {"mass": float(values[-1])}).deformed(0.03)
-    np.testing.assert_array_equal(last, checkerboard_parts(kick.rest)[0].of(expected))
+    np.testing.assert_array_equal(last, checkerboard_parts(kick.rest)[0].vertices(expected))
 
 
 def test_values_that_no_slider_sends_leave_the_last_frame_and_a_message(app: App, port: int) -> None:
@@ -115,7 +115,7 @@ def test_two_people_at_one_slider_see_the_newest(app: App, kick: Predictor, port
             while (vertices := client.wait_vertices(BODY, 0.7)) is not None:
                 last[index] = vertices
         assert one.controls["mass (kg)"].value == two.controls["mass (kg)"].value == 0.55
-    expected = checkerboard_parts(kick.rest)[0].of(kick.solve(kick.rest, {"mass": 0.55}).deformed(0.03))
+    expected = checkerboard_parts(kick.rest)[0].vertices(kick.solve(kick.rest, {"mass": 0.55}).deformed(0.03))
     for vertices in last:
         np.testing.assert_array_equal(vertices, expected)
 

@@ -17,7 +17,7 @@ from odeform_viz.runtime import jobs
 def test_wishes_over_all_panels_break_nothing(
     drop: Predictor, port: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(truth, "simulate_here", _quick)
+    monkeypatch.setattr(truth, "simulate_motion", _quick)
     rival = load("mass-elastic/pod-rbf")
     columns = [
         Column("odeform", drop, drop.rest, origin="mass-elastic"),
@@ -34,5 +34,5 @@ def test_wishes_over_all_panels_break_nothing(
     assert result.requests == 300
 
 
-def _quick(send: jobs.Send, *_: object) -> None:
+def _quick(send: jobs.Report, *_: object) -> None:
     raise RuntimeError("no simulator in this test")

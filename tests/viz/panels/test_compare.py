@@ -8,8 +8,8 @@ from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.colors import MODELS, color_of
 from odeform_viz.columns import MOST, Column
-from odeform_viz.rendering.scene import COLORS, color_of
 
 Kicked = tuple[App, LoopbackClient]
 Serve = Callable[..., Kicked]
@@ -28,7 +28,7 @@ def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
     assert client.controls["pod-rbf"].value is True
     client.set("model", "nonsense")
     client.click("Add model")
-    assert client.until(lambda: any("model: expected one of" in said for said in client.said))
+    assert client.until(lambda: any("model: expected one of" in said for said in client.notifications))
     assert _labels(app) == ["odeform", "pod-rbf"]
 
 
@@ -66,7 +66,7 @@ def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
     assert client.until(lambda: "bending 0.3 N m" not in client.controls)
     client.set("parameter", "nonsense")
     client.click("Sweep it in 5 columns")
-    assert client.until(lambda: any("parameter: expected" in said for said in client.said))
+    assert client.until(lambda: any("parameter: expected" in said for said in client.notifications))
     assert [c.visible for c in app.columns.all] == [True]
 
 
@@ -89,12 +89,12 @@ def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
 
 def test_overlaid_columns_stand_in_one_place_by_box_and_by_key(serve: Serve, kick: Predictor) -> None:
     app, client = serve(Column("one", kick, kick.rest), Column("two", kick, kick.rest))
-    places = [view._place for _, view in app._scene._views.values()]
-    assert places[0].position[1] != places[1].position[1]
+    one, two = (view for _, view in app._scene._views.values())
+    assert one.lane != two.lane
     client.set("overlay", True)
-    assert client.until(lambda: places[0].position[1] == places[1].position[1])
+    assert client.until(lambda: one.lane == two.lane)
     client.press("Columns overlaid or in a row")
-    assert client.until(lambda: places[0].position[1] != places[1].position[1])
+    assert client.until(lambda: one.lane != two.lane)
     assert client.until(lambda: client.controls["overlay"].value is False)
 
 
@@ -103,7 +103,7 @@ def test_too_many_columns_are_refused(kicked: Kicked) -> None:
     for _ in range(3):
         client.click("Sweep it in 5 columns")
         client.collect(0.7)
-    assert client.until(lambda: any(f"at most {MOST}" in said for said in client.said))
+    assert client.until(lambda: any(f"at most {MOST}" in said for said in client.notifications))
     assert len(app.columns.all) == 11
     assert any(c.visible for c in app.columns.all)
 
@@ -118,7 +118,7 @@ def test_a_column_keeps_its_colour_and_shares_it_with_no_other(kicked: Kicked) -
     client.collect(0.3)
     client.click("Remove hidden columns")
     assert client.until(lambda: len(app.columns.all) == 2)
-    assert color_of(app.columns.all[1]) == color_of(third) == COLORS[2]
+    assert color_of(app.columns.all[1]) == color_of(third) == MODELS[2]
     client.click("Pin these parameters")
     assert client.until(lambda: len(app.columns.all) == 3)
-    assert {color_of(c) for c in app.columns.all} == set(COLORS[:3])
+    assert {color_of(c) for c in app.columns.all} == set(MODELS[:3])

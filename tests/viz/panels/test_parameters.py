@@ -47,8 +47,8 @@ def test_what_no_hand_could_reach_is_refused_and_reset_helps(
     assert client.until(lambda: "mass: expected a finite number from" in client.text())
     for button in ("Pin these parameters", "Sweep it in 5 columns", "Save state"):
         client.click(button)
-        assert client.until(lambda: bool(client.said))
-        client.said.clear()
+        assert client.until(lambda: bool(client.notifications))
+        client.notifications.clear()
     assert len(app.columns.all) == 1
     client.set("reset", "mass")
     assert client.until(lambda: "expected a finite number" not in client.text())

@@ -61,7 +61,7 @@ def test_play_is_a_button_and_a_key_and_says_what_it_would_do(kicked: Kicked) ->
 def test_speed_is_that_of_the_list_or_refused(kicked: Kicked) -> None:
     app, client = kicked
     client.set("speed", "nonsense")
-    assert client.until(lambda: any("speed" in said for said in client.said))
+    assert client.until(lambda: any("speed" in said for said in client.notifications))
     client.set("speed", "1/50")
     client.set("loop", False)
     client.click("Play")
@@ -74,7 +74,7 @@ def test_speed_is_that_of_the_list_or_refused(kicked: Kicked) -> None:
 def test_moments_off_the_slider_are_refused(kicked: Kicked, moment: float) -> None:
     app, client = kicked
     client.set("time (s)", moment)
-    assert client.until(lambda: any("time: expected" in said for said in client.said))
+    assert client.until(lambda: any("time: expected" in said for said in client.notifications))
     assert app.clock.time() == 0.03
     assert client.until(lambda: client.controls["time (s)"].value == 0.03)
     client.set("go to", "nonsense")

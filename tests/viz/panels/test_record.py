@@ -61,7 +61,7 @@ def test_a_broken_state_changes_nothing(dropped: View, content: bytes) -> None:
     app, client = dropped
     before = app.columns.all
     client.upload("Restore state", "state.json", content)
-    assert client.until(lambda: any(said.startswith("state:") for said in client.said))
+    assert client.until(lambda: any(said.startswith("state:") for said in client.notifications))
     assert app.columns.all == before
     assert app.clock.time() == 0.3
 
@@ -87,10 +87,10 @@ def test_without_a_model_or_a_known_format_there_is_nothing_to_download(dropped:
     client.set("odeform", False)
     client.collect(0.3)
     client.click("Download")
-    assert client.until(lambda: "export: no model is shown" in client.said)
+    assert client.until(lambda: "export: no model is shown" in client.notifications)
     client.set("what", "nonsense")
     client.click("Download")
-    assert client.until(lambda: any("export: expected one of" in said for said in client.said))
+    assert client.until(lambda: any("export: expected one of" in said for said in client.notifications))
     assert client.downloads == {}
 
 

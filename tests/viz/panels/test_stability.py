@@ -6,15 +6,15 @@ import pytest
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels import stability
-from odeform_viz.runtime.jobs import Send
+from odeform_viz.runtime.jobs import Report
 
 
-def small(send: Send, checkpoint: str) -> np.ndarray:
+def small(report: Report, checkpoint: str) -> np.ndarray:
     assert checkpoint == "kick"
     return np.zeros((4, 6, 3), dtype=np.uint8)
 
 
-def broken(send: Send, checkpoint: str) -> np.ndarray:
+def broken(report: Report, checkpoint: str) -> np.ndarray:
     raise RuntimeError("no such model")
 
 

@@ -19,32 +19,32 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels import truth
 from odeform_viz.panels.truth import NONE, OTHER, entry_label, other_physics
-from odeform_viz.runtime.jobs import Send
+from odeform_viz.runtime.jobs import Report
 
 View = tuple[App, LoopbackClient]
 ENTRIES = open_dataset("mass-elastic").select("test")
 
 
-def coarse(send: Send, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
+def coarse(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     """A kick of a quarter of the vertices; in this module, for the job's process to find it."""
     assert scene == "kick"
-    return replace(kick_scene.SCENE, step=2e-3).simulate(parameters, rate=rate, report=send, segments=4)
+    return replace(kick_scene.SCENE, step=2e-3).simulate(parameters, rate=rate, report=report, segments=4)
 
 
-def at_rest(send: Send, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
+def at_rest(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     rest = load(scene).rest
     frames = np.tile(rest.points, (3, 1, 1))
     weights = np.full(len(rest.points), 1.0 / len(rest.points), dtype=np.float32)
     return MotionSequence(np.arange(3) / rate, frames, rest.faces, weights, parameters)
 
 
-def endless(send: Send, scene: str, parameters: dict[str, float], rate: float) -> None:
+def endless(report: Report, scene: str, parameters: dict[str, float], rate: float) -> None:
     for step in range(10_000):
-        send(step / 10_000)
+        report(step / 10_000)
         time.sleep(0.01)
 
 
-def failing(send: Send, scene: str, parameters: dict[str, float], rate: float) -> None:
+def failing(report: Report, scene: str, parameters: dict[str, float], rate: float) -> None:
     raise RuntimeError("the ball burst")
 
 
@@ -78,7 +78,7 @@ def test_the_truth_goes_and_what_is_not_in_the_list_is_refused(dropped: View) ->
     client.set("test sequence", entry_label(ENTRIES[0], app.session.schema))
     assert client.until(lambda: len(app.columns.all) == 2)
     client.set("test sequence", "nonsense")
-    assert client.until(lambda: any("test sequence: expected one of the list" in said for said in client.said))
+    assert client.until(lambda: any("test sequence: expected one of the list" in said for said in client.notifications))
     assert len(app.columns.all) == 2
     assert client.until(lambda: client.controls["test sequence"].value.startswith("1:"))
     client.set("test sequence", NONE)
@@ -95,7 +95,7 @@ def test_the_list_names_the_truth_that_was_opened_otherwise(serve: Callable[...,
 
 
 def test_simulate_this_shows_its_progress_and_then_the_truth(kicked: View, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "simulate_here", coarse)
+    monkeypatch.setattr(truth, "simulate_motion", coarse)
     app, client = kicked
     client.set("mass (kg)", 0.6)
     client.collect(0.5)
@@ -115,7 +115,7 @@ def test_simulate_this_shows_its_progress_and_then_the_truth(kicked: View, monke
 
 
 def test_a_simulation_can_be_cancelled(kicked: View, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "simulate_here", endless)
+    monkeypatch.setattr(truth, "simulate_motion", endless)
     app, client = kicked
     client.click("Simulate this")
     assert client.until(lambda: app._truth._bar.value > 0.0, 30.0)
@@ -130,18 +130,18 @@ def test_a_simulation_can_be_cancelled(kicked: View, monkeypatch: pytest.MonkeyP
 
 
 def test_a_failing_simulation_says_why_until_the_next(kicked: View, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "simulate_here", failing)
+    monkeypatch.setattr(truth, "simulate_motion", failing)
     app, client = kicked
     client.click("Simulate this")
     assert client.until(lambda: "**The simulation failed**: the ball burst" in client.text(), 30.0)
-    monkeypatch.setattr(truth, "simulate_here", endless)
+    monkeypatch.setattr(truth, "simulate_motion", endless)
     client.click("Simulate this")
     assert client.until(lambda: "the ball burst" not in client.text())
     app._truth.cancel()
 
 
 def test_the_simulation_of_a_closed_tab_completes(kicked: View, monkeypatch: pytest.MonkeyPatch, port: int) -> None:
-    monkeypatch.setattr(truth, "simulate_here", at_rest)
+    monkeypatch.setattr(truth, "simulate_motion", at_rest)
     app, client = kicked
     with LoopbackClient(port) as other:
         other.click("Simulate this")
@@ -151,7 +151,7 @@ def test_the_simulation_of_a_closed_tab_completes(kicked: View, monkeypatch: pyt
 
 
 def test_a_server_that_closes_ends_its_simulation(kick: Predictor, monkeypatch: pytest.MonkeyPatch, port: int) -> None:
-    monkeypatch.setattr(truth, "simulate_here", endless)
+    monkeypatch.setattr(truth, "simulate_motion", endless)
     app = App([Column("odeform", kick, kick.rest)], port=port)
     with LoopbackClient(port) as client:
         client.click("Simulate this")

@@ -19,9 +19,9 @@ def test_parts_are_cut_along_the_planes_and_cover_the_surface() -> None:
     mesh = Mesh((ball.vertices @ turned.T).astype(np.float32), np.asarray(ball.faces, dtype=np.int32))
     centre = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     parts = checkerboard_parts(mesh)
-    assert sum(_area(p.of(mesh.points), p.faces) for p in parts) - _area(mesh.points, mesh.faces) < 1e-5
+    assert sum(_area(p.vertices(mesh.points), p.faces) for p in parts) - _area(mesh.points, mesh.faces) < 1e-5
     for part, sign in zip(parts, (1.0, -1.0), strict=True):
-        corners = (part.of(mesh.points) - centre)[part.faces]
+        corners = (part.vertices(mesh.points) - centre)[part.faces]
         for axis in range(3):  # no face on both sides of a plane
             assert (np.minimum(corners[..., axis].max(axis=1), -corners[..., axis].min(axis=1)) < 1e-5).all()
         assert (sign * np.prod(corners.mean(axis=1), axis=1) > 0.0).all()
@@ -33,7 +33,7 @@ def test_parts_are_cut_along_the_planes_and_cover_the_surface() -> None:
 def test_a_mesh_along_the_planes_is_not_cut(kick: Predictor) -> None:
     parts = checkerboard_parts(kick.rest)
     assert sum(len(part.faces) for part in parts) == len(kick.rest.faces)
-    together = np.concatenate([part.of(kick.rest.points) for part in parts])
+    together = np.concatenate([part.vertices(kick.rest.points) for part in parts])
     assert set(map(tuple, together)) == set(map(tuple, np.asarray(kick.rest.points, dtype=np.float32)))
 
 
@@ -42,4 +42,6 @@ def test_what_was_cut_moves_with_the_mesh() -> None:
     mesh = Mesh(ball.vertices.astype(np.float32), np.asarray(ball.faces, dtype=np.int32))
     stretch = np.array([2.0, 1.0, 0.5], dtype=np.float32)
     for part in checkerboard_parts(mesh):
-        np.testing.assert_allclose(part.of(mesh.points * stretch), part.of(mesh.points) * stretch, atol=1e-6)
+        np.testing.assert_allclose(
+            part.vertices(mesh.points * stretch), part.vertices(mesh.points) * stretch, atol=1e-6
+        )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from odeform.models.base import Predictor
-from odeform_viz.rendering.error_colors import BANDS, Spread, bands_of, levels_of, scale_for
+from odeform_viz.rendering.error_colors import BANDS, NearestInterpolation, band_indices, scale_for, split_into_bands
 
 
 def test_the_scale_is_round_and_holds_three_times_the_largest() -> None:
@@ -15,13 +15,13 @@ def test_the_scale_is_round_and_holds_three_times_the_largest() -> None:
 
 def test_levels_follow_the_error_and_end_open() -> None:
     values = np.array([0.0, 0.9, 1.0, 7.9, 8.0, 100.0])
-    np.testing.assert_array_equal(levels_of(values, 8.0), [0, 0, 1, 7, 7, 7])
+    np.testing.assert_array_equal(band_indices(values, 8.0), [0, 0, 1, 7, 7, 7])
 
 
 def test_bands_are_all_faces_once(kick: Predictor) -> None:
     mesh = kick.rest
     values = mesh.points[:, 2].astype(float)
-    parts = bands_of(values, mesh.faces, 0.2)
+    parts = split_into_bands(values, mesh.faces, 0.2)
     assert len(parts) == len(BANDS)
     assert sum(len(part[1]) for part in parts if part) == len(mesh.faces)
     for band, part in enumerate(parts):
@@ -33,7 +33,7 @@ def test_bands_are_all_faces_once(kick: Predictor) -> None:
 
 def test_values_are_carried_to_other_points_of_the_surface(kick: Predictor) -> None:
     coarse, fine = kick.rest.points[::4], kick.rest.points
-    spread = Spread(coarse, fine)
+    spread = NearestInterpolation(coarse, fine)
     assert spread(np.full(len(coarse), 2.5)) == pytest.approx(np.full(len(fine), 2.5))
     np.testing.assert_allclose(spread(coarse[:, 2].astype(float)), fine[:, 2], atol=0.02)
     np.testing.assert_allclose(spread(coarse[:, 2].astype(float))[::4], coarse[:, 2], atol=1e-6)

@@ -8,7 +8,7 @@ import viser
 
 from odeform.models.base import Predictor
 from odeform.types import PointCloud
-from odeform_viz.rendering.error_colors import BANDS, levels_of
+from odeform_viz.rendering.error_colors import BANDS, band_indices
 from odeform_viz.rendering.shapes import show_shape
 
 
@@ -25,7 +25,7 @@ def test_points_are_painted_by_their_error_and_plain_again(server: viser.ViserSe
     values = np.linspace(0.0, 2.0, len(points))
     view.paint(points, values, 1.0)
     cloud = view._cloud  # pyright: ignore
-    np.testing.assert_array_equal(cloud.colors, np.array(BANDS, dtype=np.uint8)[levels_of(values, 1.0)])
+    np.testing.assert_array_equal(cloud.colors, np.array(BANDS, dtype=np.uint8)[band_indices(values, 1.0)])
     view.move(points + np.float32(0.1))
     np.testing.assert_array_equal(cloud.colors, np.tile(np.array([206, 78, 26], dtype=np.uint8), (len(points), 1)))
     np.testing.assert_array_equal(cloud.points, points + np.float32(0.1))

@@ -7,25 +7,25 @@ from collections.abc import Callable
 from typing import Any
 
 from odeform import InputError
-from odeform_viz.runtime.jobs import Job, Send
+from odeform_viz.runtime.jobs import Job, Report
 
 
-def count(send: Send, until: int) -> int:
+def count(report: Report, until: int) -> int:
     for step in range(until):
-        send((step + 1) / until)
+        report((step + 1) / until)
     return os.getpid()
 
 
-def fail(send: Send, message: str) -> None:
+def fail(report: Report, message: str) -> None:
     raise InputError(message)
 
 
-def die(send: Send) -> None:
+def die(report: Report) -> None:
     os._exit(7)
 
 
-def sleep(send: Send) -> None:
-    send(0.0)
+def sleep(report: Report) -> None:
+    report(0.0)
     time.sleep(60.0)
 
 
