@@ -96,18 +96,12 @@ def _pack(args: argparse.Namespace) -> None:
 
 def _train(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
-    from odeform.training.train import TrainRequest, rest_of, train
+    from odeform.training.train import train
 
     dataset = open_dataset(args.dataset)
     window = parse_window(args.window)
-    if not 0.0 < args.minutes < float("inf"):
-        raise InputError(f"--minutes: expected a positive number, got {args.minutes:g}")
-    if args.steps is not None and args.steps < 1:
-        raise InputError(f"--steps: expected a positive number, got {args.steps}")
-    request = TrainRequest(
-        args.model, args.seed, args.minutes, args.steps, window, args.every, args.stagger, args.resume
-    )
-    train(dataset, rest_of(dataset), args.out, request, lambda line: print(line, file=sys.stderr, flush=True))
+    chosen = {name: getattr(args, name) for name in ("minutes", "steps", "seed", "every", "stagger", "resume")}
+    train(dataset, args.out, args.model, window=window, **chosen)
 
 
 def _evaluate(args: argparse.Namespace) -> None:

@@ -23,10 +23,9 @@ from odeform.models.base import Predictor
 from odeform.models.baselines.point_network import Trial
 from odeform.models.registry import load
 from odeform.simulation import runner
-from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
-from odeform.training.train import POINTS, TrainRequest, train
+from odeform.training.train import POINTS, train
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -129,7 +128,7 @@ def trained(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
             patch.setattr(config, "TrainConfig", few)
             for model in models:
                 path = folder / f"{model}.safetensors"
-                train(dataset, get_scene("kick").rest_mesh(), path, TrainRequest(model, seed=1, steps=60), _silent)
+                train(dataset, path, model, seed=1, steps=60, report=_silent)
 
     folder = made_once("models", fit)
     return {model: folder / f"{model}.safetensors" for model in models}
@@ -151,8 +150,8 @@ def point_models(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
                 patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
                 patch.setattr(model.network, "work", 256, raising=False)
                 steps = 210 if model.network.teaching == "moments" else 56  # a step of these is cheap
-                request = TrainRequest(name, seed=1, steps=steps, every=4)
-                train(dataset, get_scene("kick").rest_mesh(), folder / f"{name}.safetensors", request, _silent)
+                path = folder / f"{name}.safetensors"
+                train(dataset, path, name, seed=1, steps=steps, every=4, report=_silent)
 
     folder = made_once("points", fit)
     return {name: folder / f"{name}.safetensors" for name in POINTS}

@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -19,7 +19,8 @@ from odeform.evaluation.metrics import evaluate
 from odeform.io import atomic_write
 from odeform.models.registry import load
 from odeform.progress import Progress
-from odeform.training.train import TrainRequest, rest_of, train, train_command
+from odeform.training.request import TrainRequest
+from odeform.training.train import train
 
 __all__ = ["Cell", "Result", "run_cells"]
 
@@ -56,7 +57,7 @@ class Cell:
 
     @property
     def command(self) -> str:
-        return f"odeform train {self.scene}{train_command(self.request).removeprefix('odeform train DIR --out FILE')}"
+        return f"odeform train {self.scene}{self.request.command.removeprefix('odeform train DIR --out FILE')}"
 
     @property
     def request(self) -> TrainRequest:
@@ -97,7 +98,8 @@ def _run(cell: Cell, folder: Path) -> Result:
     dataset = replace(fine, read=lambda entry: fine.read(entry).frames(window.stop, window.rate))
     if not _is_of(file, request):
         with (folder / f"{cell.name}.log").open("w") as log:
-            train(dataset, rest_of(dataset), file, request, partial(print, file=log, flush=True), cell.scored)
+            report = partial(print, file=log, flush=True)
+            train(dataset, file, **asdict(request), parts=cell.scored, report=report)
     model = load(file)
     known = _read(kept)
     scores = known.get("scores", {}) if known.get("sha256") == model.checkpoint.sha256 else {}
@@ -133,7 +135,7 @@ def _is_of(file: Path, request: TrainRequest) -> bool:
     except InputError as error:
         print(f"note: {error}; trained anew", file=sys.stderr)
         return False
-    return bool(checkpoint.scores) and checkpoint.provenance["command"][-1] == train_command(request)
+    return bool(checkpoint.scores) and checkpoint.provenance["command"][-1] == request.command
 
 
 def _read(file: Path) -> Result:

@@ -1,9 +1,10 @@
 """From a data set to a checkpoint, for every model that learns from parameters."""
 
 import platform
+import sys
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.residuals import validation_residuals
+from odeform.models.base import Predictor
 from odeform.models.baselines.direct import Direct
 from odeform.models.baselines.nearest import fit_nearest
 from odeform.models.baselines.node import Node
@@ -31,28 +33,13 @@ from odeform.training.continuation import with_continuation
 from odeform.training.point_data import prepare_points
 from odeform.training.pruning import without_modes
 from odeform.training.qualities import with_qualities
+from odeform.training.request import TrainRequest
 from odeform.types import Arrays, Mesh
 
-__all__ = ["MODELS", "POINTS", "TrainRequest", "rest_of", "train", "train_command"]
+__all__ = ["MODELS", "POINTS", "print_line", "rest_of", "train"]
 
 POINTS = {model.model: model for model in (OdeformPerPoint, Node, Rnn, Direct, OccupancyFlow)}
 MODELS = ("odeform", *POINTS, "pod-rbf", "nearest")
-
-
-@dataclass(frozen=True)
-class TrainRequest:
-    """What `odeform train` was asked for."""
-
-    model: str = "odeform"
-    seed: int = 0
-    minutes: float = 30.0
-    steps: int | None = None
-    """Of training, in place of minutes."""
-    window: tuple[int, int] | None = None
-    every: int = 1
-    stagger: bool = False
-    """Every k-th frame of each sequence, but not the same of all."""
-    resume: bool = False
 
 
 def rest_of(dataset: Dataset) -> Mesh:
@@ -124,72 +111,104 @@ def _learn_points(dataset: Dataset, request: TrainRequest, report: Callable[[str
     return replace(checkpoint, arrays=arrays)
 
 
+def print_line(line: str) -> None:
+    """Report progress on standard error."""
+    print(line, file=sys.stderr, flush=True)
+
+
 def train(
     dataset: Dataset,
-    rest: Mesh,
     out: str | Path,
-    request: TrainRequest,
-    report: Callable[[str], None],
+    model: str = "odeform",
+    *,
+    minutes: float = 30.0,
+    steps: int | None = None,
+    seed: int = 0,
+    window: tuple[int, int] | None = None,
+    every: int = 1,
+    stagger: bool = False,
+    resume: bool = False,
     parts: Iterable[tuple[int, int]] = (),
-) -> Checkpoint:
-    """Train one model, score it on the test split, also on `parts` of its frames, write the checkpoint.
+    report: Callable[[str], None] = print_line,
+) -> Predictor:
+    """Train a model on a data set, score it on the test split, and write a checkpoint.
 
-    `rest` is the body as viewers show it, as it rests in the scene.
+    Args:
+        dataset: What `open_dataset` or `simulate` returned.
+        out: The checkpoint to write. While `odeform` trains, its state is kept in `OUT.part`.
+        model: One of `odeform`, `odeform-per-point`, `node`, `rnn`, `direct`, `occupancy-flow`, `pod-rbf`, `nearest`.
+        minutes: Budget of processor time, trials included, unless `steps` is given.
+        steps: Number of training steps, in place of `minutes`: repeatable on any machine.
+        seed: Seeds initial weights and batches.
+        window: Half-open range of frames to train on; default: all.
+        every: Train on every n-th frame.
+        stagger: Start every n-th frame at a different frame in each sequence, so that the sequences interleave.
+        resume: Continue the interrupted training of which `OUT.part` is the state.
+        parts: Half-open ranges of frames to score separately as well.
+        report: Called with each line of progress; default: prints it to standard error.
+
+    Returns:
+        The trained predictor, as `load(out)` returns it, with its scores in `predictor.checkpoint.scores`.
+
+    Raises:
+        InputError: An unknown model, a number out of range, frames that the data do not have, or nothing to resume.
     """
-    if request.model not in MODELS:
-        raise InputError(f"unknown model {request.model!r}: expected one of {', '.join(MODELS)}")
+    request = TrainRequest(model, seed, minutes, steps, window, every, stagger, resume)
+    if model not in MODELS:
+        raise InputError(f"unknown model {model!r}: expected one of {', '.join(MODELS)}")
     part = Path(f"{out}.part")
-    if request.resume and (request.model != "odeform" or not part.exists()):
-        raise InputError(f"--resume: expected {part}, which an interrupted training of odeform leaves")
+    if resume and (model != "odeform" or not part.exists()):
+        raise InputError(f"resume: expected {part}, which an interrupted training of odeform leaves")
     begin = time.process_time()
-    body = {
-        "rest.points": np.asarray(rest.points, dtype=np.float32),
-        "rest.faces": np.asarray(rest.faces, dtype=np.int32),
-    }
-    if request.model in POINTS:
+    body = _body(dataset)
+    if model in POINTS:
         learned = _learn_points(dataset, request, report, body)
     else:
         learned = _learn_reduced(dataset, request, report, body, part)
-    provenance = {
-        "command": _command(dataset, request),
+    # over all sittings of a resumed training
+    seconds = learned.config.get("val", {}).get("seconds", time.process_time() - begin)
+    provenance = {**_provenance(dataset, request, seconds), **learned.provenance}
+    scores = _write_scored(replace(learned, provenance=provenance), out, dataset, parts)
+    part.unlink(missing_ok=True)
+    report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
+    return load(out)
+
+
+def _write_scored(
+    checkpoint: Checkpoint, out: str | Path, dataset: Dataset, parts: Iterable[tuple[int, int]]
+) -> dict[str, Any]:
+    """Write the checkpoint with its residuals on validation and its scores on the test split; return the scores."""
+    write_checkpoint(out, checkpoint)
+    checkpoint = replace(checkpoint, arrays={**checkpoint.arrays, **validation_residuals(load(out), dataset)})
+    write_checkpoint(out, checkpoint)
+    scores = evaluate(load(out), dataset, "test", parts=parts)
+    write_checkpoint(out, replace(checkpoint, scores=scores))
+    return scores
+
+
+def _body(dataset: Dataset) -> Arrays:
+    rest = rest_of(dataset)
+    return {
+        "rest.points": np.asarray(rest.points, dtype=np.float32),
+        "rest.faces": np.asarray(rest.faces, dtype=np.int32),
+    }
+
+
+def _provenance(dataset: Dataset, request: TrainRequest, seconds: float) -> dict[str, Any]:
+    return {
+        "command": [_data_command(dataset.provenance), request.command],
         "dataset": dataset.provenance,
         "fixed": dataset.fixed,
         "seed": request.seed,
-        # over all sittings of a resumed training
-        "training_seconds": round(learned.config.get("val", {}).get("seconds", time.process_time() - begin), 1),
+        "training_seconds": round(seconds, 1),
         "machine": platform.processor() or platform.machine(),
         "versions": {name: version(name) for name in ("odeform", "numpy", "torch")},
-        **learned.provenance,
     }
-    checkpoint = replace(learned, provenance=provenance)
-    write_checkpoint(out, checkpoint)
-    arrays = {**checkpoint.arrays, **validation_residuals(load(out), dataset)}
-    checkpoint = replace(checkpoint, arrays=arrays)
-    write_checkpoint(out, checkpoint)
-    scores = evaluate(load(out), dataset, "test", parts=parts)
-    scored = replace(checkpoint, scores=scores)
-    write_checkpoint(out, scored)
-    part.unlink(missing_ok=True)
-    report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
-    return scored
 
 
-def _command(dataset: Dataset, request: TrainRequest) -> list[str]:
-    made = dataset.provenance
+def _data_command(made: dict[str, Any]) -> str:
     if "imported" in made:
-        return [f"odeform import {made['imported']} --out DIR", train_command(request)]
-    simulate = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
-    simulate += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
-    simulate += " --corners" if made.get("corners") else ""
-    return [simulate, train_command(request)]
-
-
-def train_command(request: TrainRequest) -> str:
-    """What it is on the command line, without the files."""
-    options = f" --model {request.model} --seed {request.seed}"
-    if request.model == "odeform" or request.model in POINTS:
-        options += f" --minutes {request.minutes:g}" if request.steps is None else f" --steps {request.steps}"
-    options += f" --window {request.window[0]}:{request.window[1]}" if request.window else ""
-    options += f" --every {request.every}" if request.every > 1 else ""
-    options += " --stagger" if request.stagger else ""
-    return f"odeform train DIR --out FILE{options}"
+        return f"odeform import {made['imported']} --out DIR"
+    command = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
+    command += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
+    return command + (" --corners" if made.get("corners") else "")

@@ -13,13 +13,11 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
 from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
-from odeform.models.registry import load
-from odeform.simulation.scene import get_scene
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.training.config import TrainConfig
 from odeform.training.loop import network_weights, train_network
 from odeform.training.start import build_network
-from odeform.training.train import TrainRequest, train
+from odeform.training.train import train
 from odeform.training.trainer import Trainer
 
 
@@ -172,7 +170,7 @@ def test_an_interruption_leaves_what_resume_wants(data: TrainingData, tmp_path: 
 
 def test_resume_without_a_trace(dataset: Dataset, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="part"):
-        train(dataset, get_scene("kick").rest_mesh(), tmp_path / "a", TrainRequest(resume=True), silent)
+        train(dataset, tmp_path / "a", resume=True)
 
 
 def test_training_does_not_look_at_val(data: TrainingData) -> None:
@@ -202,10 +200,8 @@ def test_a_checkpoint_says_where_it_comes_from(predictors: dict[str, Predictor])
 def trained_on(
     dataset: Dataset, tmp_path: Path, window: tuple[int, int] | None, every: int = 1, report: Callable = silent
 ) -> Predictor:
-    rest = get_scene("kick").rest_mesh()
     path = tmp_path / "nearest.safetensors"
-    train(dataset, rest, path, TrainRequest("nearest", window=window, every=every), report)
-    return load(path)
+    return train(dataset, path, "nearest", window=window, every=every, report=report)
 
 
 def test_part_of_the_frames(dataset: Dataset, tmp_path: Path) -> None:
@@ -236,5 +232,5 @@ def test_frames_that_are_not_there(
 
 def test_unknown_model(dataset: Dataset, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="oracle"):
-        train(dataset, get_scene("kick").rest_mesh(), tmp_path / "a", TrainRequest("oracle"), silent)
+        train(dataset, tmp_path / "a", "oracle")
     assert not (tmp_path / "a").exists()

@@ -11,7 +11,7 @@ from odeform.errors import InputError
 from odeform.models.baselines.occupancy_flow import OccupancyFlow
 from odeform.models.registry import load, observations
 from odeform.motion.recorded import RecordedMotion
-from odeform.training.train import TrainRequest, train
+from odeform.training.train import train
 from odeform.types import MotionSequence, PointCloud
 
 
@@ -85,4 +85,4 @@ def test_what_it_cannot_do_is_said(
     with pytest.raises(InputError, match="from 0 s on"):
         flow.solve(None, record.parameters, observed=replace(given, times=given.times + 0.1))
     with pytest.raises(InputError, match="every of at least 2"):
-        train(dataset, flow.rest, tmp_path / "a", TrainRequest("occupancy-flow", steps=1), lambda _: None)
+        train(dataset, tmp_path / "a", "occupancy-flow", steps=1)

@@ -1,0 +1,48 @@
+"""What a training is asked for, and the command that repeats it."""
+
+import math
+from dataclasses import dataclass
+
+from odeform.errors import InputError
+
+__all__ = ["DIRECT_FITS", "TrainRequest"]
+
+DIRECT_FITS = ("pod-rbf", "nearest")
+"""Models that are solved for, and have no budget."""
+
+
+@dataclass(frozen=True)
+class TrainRequest:
+    """A model and how to train it. `InputError` for a number out of range."""
+
+    model: str = "odeform"
+    seed: int = 0
+    minutes: float = 30.0
+    """Budget of processor time, trials included, unless `steps` is given."""
+    steps: int | None = None
+    """Number of training steps, in place of `minutes`: repeatable on any machine."""
+    window: tuple[int, int] | None = None
+    """Half-open range of frames to train on; default: all."""
+    every: int = 1
+    """Train on every n-th frame."""
+    stagger: bool = False
+    """Start every n-th frame at a different frame in each sequence, so that the sequences interleave."""
+    resume: bool = False
+    """Continue an interrupted training of `odeform`."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.minutes < math.inf:
+            raise InputError(f"minutes: expected a positive number, got {self.minutes:g}")
+        if self.steps is not None and self.steps < 1:
+            raise InputError(f"steps: expected a positive number, got {self.steps}")
+
+    @property
+    def command(self) -> str:
+        """The same request as a command line, without the names of files."""
+        options = f" --model {self.model} --seed {self.seed}"
+        if self.model not in DIRECT_FITS:
+            options += f" --minutes {self.minutes:g}" if self.steps is None else f" --steps {self.steps}"
+        options += f" --window {self.window[0]}:{self.window[1]}" if self.window else ""
+        options += f" --every {self.every}" if self.every > 1 else ""
+        options += " --stagger" if self.stagger else ""
+        return f"odeform train DIR --out FILE{options}"
