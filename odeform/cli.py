@@ -161,7 +161,7 @@ def _predict(args: argparse.Namespace) -> None:
         print(f"note: {args.checkpoint}: {predictor.schema.notes[-1]}", file=sys.stderr)
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
-        fit = fit_to(shape, predictor.rest, region, place=None if predictor.rescales_input else Similarity())
+        fit = fit_to(shape, predictor.rest, region, transform=None if predictor.rescales_input else Similarity())
     geometry = fit.geometry if fit else None
     for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
         print(f"note: {args.geometry}: {note}", file=sys.stderr)

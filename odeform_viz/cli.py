@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import odeform
 from odeform.cli import run_guarded
 from odeform.errors import InputError
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
@@ -31,7 +31,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     ]
 
 
-def _label(model: Predictor, fit: Fit | None) -> str:
+def _label(model: Predictor, fit: FittedShape | None) -> str:
     return model.model if fit or model.rescales_input else f"{model.model}, on a ball that stands in"
 
 

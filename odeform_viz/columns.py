@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Schema
@@ -28,7 +28,7 @@ class Column:
     pinned: Mapping[str, float] | None = None
     origin: str = ""
     """The checkpoint's name or path as the user gave it, or DATASET/NAME of a sequence; empty if it is in no file."""
-    fit: Fit | None = None
+    fit: FittedShape | None = None
     """How a loaded shape was fitted to the trained body; None for the trained body itself."""
     visible: bool = True
     key: int = -1
@@ -115,7 +115,7 @@ class Columns:
         with self._lock:
             self._columns = tuple(replace(c, visible=visible) if c.key == key else c for c in self._columns)
 
-    def set_shape(self, fit: Fit | None) -> None:
+    def set_shape(self, fit: FittedShape | None) -> None:
         """Give all models another shape; None for the body that each was trained on."""
         with self._lock:
             self._columns = tuple(

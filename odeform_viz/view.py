@@ -114,7 +114,7 @@ class Frame:
     def still(self) -> Geometry | None:
         """The part of the loaded shape that does not move; one for all columns."""
         fits = (c.column.fit for c in self.columns if c.column.fit)
-        return next((fit.still for fit in fits if fit.still), None)
+        return next((fit.static for fit in fits if fit.static), None)
 
     @property
     def off_truth(self) -> bool:

@@ -7,7 +7,7 @@ from typing import IO
 
 import numpy as np
 
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.motion.base import Motion
 from odeform.types import Floats, GaussianSplats, Mesh
@@ -17,14 +17,14 @@ __all__ = ["write_npz"]
 LEVEL = 1  # of compression: floats hardly shrink at any level
 
 
-def write_npz(file: IO[bytes], motion: Motion, times: Floats, fit: Fit | None) -> None:
+def write_npz(file: IO[bytes], motion: Motion, times: Floats, fit: FittedShape | None) -> None:
     """`times` (T,) s, `parameters` as JSON, and `vertices` (T, N, 3) m float32 with `faces` (F, 3), or for splats
     `centers` (T, N, 3) and `covariances` (T, N, 3, 3).
 
     With `fit`, lengths are in the units of its file, and only the part that moves is written. Like
     `numpy.savez_compressed`, but one frame at a time: moving splats may exceed the memory.
     """
-    back = fit.place.inverse if fit else Similarity()
+    back = fit.transform.inverse if fit else Similarity()
     geometry = motion.geometry
     small = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
     splats = isinstance(geometry, GaussianSplats)

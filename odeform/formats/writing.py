@@ -6,7 +6,7 @@ from pathlib import Path
 from odeform.errors import InputError
 from odeform.formats.registry import FRAME, WRITERS, Writer, load_function, motion_endings, shape_formats
 from odeform.geometry.harmonics import rotated_harmonics
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.io import atomic_open, atomic_write
 from odeform.motion.base import Motion
 from odeform.types import Floats, GaussianSplats, Geometry
@@ -26,7 +26,7 @@ def write_shape(geometry: Geometry, out: str | Path) -> None:
     atomic_write(path, load_function(writer.shape)(geometry, path))
 
 
-def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None = None) -> None:
+def write_motion(motion: Motion, times: Floats, out: str | Path, fit: FittedShape | None = None) -> None:
     """Write the frames of `motion` at `times` (T,) s; the suffix of `out` selects the format.
 
     `.npz` holds all frames. A name with `{frame}` in it, for instance `ball_{frame}.ply`, gives one file per frame in
@@ -46,11 +46,11 @@ def write_motion(motion: Motion, times: Floats, out: str | Path, fit: Fit | None
         raise InputError(f"{out}: expected a name ending in {motion_endings()}")
 
 
-def shape_at(motion: Motion, time: float, fit: Fit | None = None) -> Geometry:
+def shape_at(motion: Motion, time: float, fit: FittedShape | None = None) -> Geometry:
     """The geometry at `time` in seconds, in scene axes; with `fit` in those of its file, the still part included."""
     moved = replace(motion.geometry, points=motion.vertices(time))
     if isinstance(moved, GaussianSplats):
         # colours turn with the body as a whole
         harmonics = rotated_harmonics(moved.harmonics, motion.pose(time)[:3, :3])
         moved = replace(moved, covariances=motion.covariances(time), harmonics=harmonics)
-    return fit.undo(moved) if fit else moved
+    return fit.to_file(moved) if fit else moved

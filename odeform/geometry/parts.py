@@ -9,7 +9,7 @@ from odeform.errors import InputError
 from odeform.geometry.region import Mask, Region
 from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
 
-__all__ = ["joined", "most_visible", "split", "subset"]
+__all__ = ["concatenated", "most_visible", "split", "subset"]
 
 Bare = TypeVar("Bare", bound=GaussianSplats | PointCloud)
 
@@ -19,7 +19,7 @@ def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None
 
     Of a mesh the faces that lie within as a whole, and all others. `InputError` where nothing lies within.
     """
-    inside = region.inside(geometry.points)
+    inside = region.contains(geometry.points)
     if isinstance(geometry, Mesh):
         within = np.asarray(inside[geometry.faces].all(axis=1))
         if not within.any():
@@ -44,7 +44,7 @@ def subset(geometry: Bare, kept: Mask) -> Bare:
     )
 
 
-def joined(one: Geometry, other: Geometry | None) -> Geometry:
+def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
     """Two parts of one shape as one, the points of `one` first."""
     if other is None:
         return one

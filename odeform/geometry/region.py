@@ -27,11 +27,11 @@ class Sphere:
     centre: Vector
     radius: float
 
-    def inside(self, points: Points) -> Mask:
+    def contains(self, points: Points) -> Mask:
         """(N,) which points lie in it or on it."""
         return np.asarray(np.linalg.norm(np.asarray(points, dtype=float) - self.centre, axis=1) <= self.radius)
 
-    def moved(self, by: Similarity) -> "Sphere":
+    def transformed(self, by: Similarity) -> "Sphere":
         return Sphere(by.points(self.centre), by.factor * self.radius)
 
 
@@ -43,12 +43,12 @@ class Box:
     size: Vector
     rotation: Rotations = field(default_factory=lambda: np.eye(3))
 
-    def inside(self, points: Points) -> Mask:
+    def contains(self, points: Points) -> Mask:
         """(N,) which points lie in it or on it."""
         local = (np.asarray(points, dtype=float) - self.centre) @ self.rotation
         return np.asarray((np.abs(local) <= 0.5 * np.asarray(self.size)).all(axis=1))
 
-    def moved(self, by: Similarity) -> "Box":
+    def transformed(self, by: Similarity) -> "Box":
         return Box(by.points(self.centre), by.factor * np.asarray(self.size), by.rotation @ self.rotation)
 
 

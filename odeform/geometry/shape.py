@@ -1,4 +1,4 @@
-"""Shapes: how much of a body each point stands for, and how a foreign shape comes to lie where a model expects one."""
+"""Surface weights of a shape, and the placement of a new shape where a model expects its body."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -6,18 +6,18 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import KDTree
 
-from odeform.geometry.parts import joined, split
+from odeform.geometry.parts import concatenated, split
 from odeform.geometry.region import Region
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Perpoint, Points, Rotations
 
-__all__ = ["Fit", "difference", "fit_to", "surface_shares", "together"]
+__all__ = ["FittedShape", "fit_to", "mean_distance", "surface_weights", "without_outliers"]
 
-SURROUNDED = 0.2  # of a unit vector: what surrounds a part evenly tells no direction
+EVEN = 0.2  # length of the mean unit vector below which the surroundings give no direction
 
 
-def surface_shares(geometry: Geometry) -> Perpoint:
-    """(N,) share of the surface at each point, summing to 1: a third of the adjacent faces; equal for bare points."""
+def surface_weights(geometry: Geometry) -> Perpoint:
+    """(N,) share of the surface at each point, summing to 1: a third of the adjacent faces; equal without faces."""
     count = len(geometry.points)
     if not isinstance(geometry, Mesh):
         return np.full(count, 1.0 / count)
@@ -29,36 +29,36 @@ def surface_shares(geometry: Geometry) -> Perpoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """A shape, or the part of it within a region, brought to where a body lies."""
+class FittedShape:
+    """A shape, or the part of it within a region, placed where a body rests in the scene."""
 
     source: Geometry
     """The whole shape, as in its file."""
     region: Region | None
-    """What moves of it, in the units of the file; None for all."""
-    place: Similarity
-    """From the units and place of the file to those of the scene."""
+    """The part that moves, in the units of the file; None for all of it."""
+    transform: Similarity
+    """From the file to the scene (metres)."""
     geometry: Geometry
-    """What moves, as it lies at rest."""
-    left: Geometry | None
-    """What stands still, as in the file; None if all moves."""
+    """The part that moves, at rest in the scene."""
+    remainder: Geometry | None
+    """The part that does not move, as in the file; None if all of it moves."""
     lift: float
-    """Metres by which a body that is dropped starts above what stands still."""
+    """Metres by which a body that is dropped starts above the part that does not move."""
     origin: str = ""
-    """The file, or the bundled shape, that the source was read from; empty where it can be read from neither."""
+    """The file or the bundled shape that `source` was read from; empty if it cannot be read again."""
 
     @cached_property
-    def still(self) -> Geometry | None:
-        """What stands still, where it lies in the scene."""
-        return None if self.left is None else self.place.shape(self.left)
+    def static(self) -> Geometry | None:
+        """The part that does not move, in the scene."""
+        return None if self.remainder is None else self.transform.shape(self.remainder)
 
-    def undo(self, moved: Geometry) -> Geometry:
-        """What moves, at whatever moment, in the units and place of the file, and with it what stands still."""
-        return joined(self.place.inverse.shape(moved), self.left)
+    def to_file(self, moved: Geometry) -> Geometry:
+        """The whole shape in the units and axes of the file, its moving part as `moved` has it in the scene."""
+        return concatenated(self.transform.inverse.shape(moved), self.remainder)
 
 
-def difference(geometry: Geometry, reference: Mesh) -> float:
-    """Mean distance in metres between two shapes' points, nearest to nearest, the larger of both ways."""
+def mean_distance(geometry: Geometry, reference: Mesh) -> float:
+    """Mean distance in metres from the points of one shape to the nearest of the other, the larger of both ways."""
     one, other = (np.asarray(shape.points, dtype=float) for shape in (geometry, reference))
     ways = (KDTree(other).query(one)[0].mean(), KDTree(one).query(other)[0].mean())
     return float(max(ways))
@@ -69,32 +69,32 @@ def fit_to(
     reference: Mesh,
     region: Region | None = None,
     rotation: Rotations | None = None,
-    place: Similarity | None = None,
-) -> Fit:
-    """Bring a shape, or the part of it within `region`, to where `reference` lies; all else then stands still.
+    transform: Similarity | None = None,
+) -> FittedShape:
+    """Place a shape, or the part of it within `region`, where `reference` rests; the remainder then stays still.
 
-    By default at the largest extent of `reference` and its footprint, on the same floor, turned by `rotation`: without
-    one, a shape as a whole keeps its axes, and a part is turned so that what surrounds it is below. A part stands on
-    the floor of the scene with its surroundings; where the reference lies higher, the part alone is lifted. `place`
-    overrides all of this. `InputError` if the region is empty.
+    By default the shape is scaled to the largest extent of `reference` and stands on the same footprint and floor. A
+    whole shape keeps its axes, and a part is turned so that its surroundings are below it, unless `rotation` (3, 3) is
+    given. A part stays on the floor of the scene with its surroundings; where `reference` is higher, the part alone is
+    lifted. `transform` overrides all of this. Raises `InputError` if the region is empty.
     """
-    part, left = (geometry, None) if region is None else split(geometry, region)
-    lift = 0.0 if left is None else float(np.asarray(reference.points)[:, 2].min())
-    if place is None:
+    part, remainder = (geometry, None) if region is None else split(geometry, region)
+    lift = 0.0 if remainder is None else float(np.asarray(reference.points)[:, 2].min())
+    if transform is None:
         points = np.asarray(part.points, dtype=float)
-        if left is not None or isinstance(geometry, GaussianSplats):
-            points = together(points)
-        if left is not None:
-            rotation = UPRIGHT[_up(points, np.asarray(left.points, dtype=float))] if rotation is None else rotation
-        place = _standing(points, rotation, np.asarray(reference.points, dtype=float), lift)
-    fitted = place.shape(part)
+        if remainder is not None or isinstance(geometry, GaussianSplats):
+            points = without_outliers(points)
+        if remainder is not None:
+            rotation = UPRIGHT[_up(points, np.asarray(remainder.points, dtype=float))] if rotation is None else rotation
+        transform = _standing(points, rotation, np.asarray(reference.points, dtype=float), lift)
+    fitted = transform.shape(part)
     if lift:
         fitted = replace(fitted, points=fitted.points + np.array([0.0, 0.0, lift], np.float32))
-    return Fit(geometry, region, place, fitted, left, lift)
+    return FittedShape(geometry, region, transform, fitted, remainder, lift)
 
 
 def _standing(points: Points, rotation: Rotations | None, target: Floats, lift: float) -> Similarity:
-    """Of the extent of `target`, and where it stands less `lift`."""
+    """The similarity that gives `points` the extent and the footprint of `target`, `lift` metres lower."""
     rotation = np.eye(3) if rotation is None else rotation
     turned = points @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
@@ -105,20 +105,21 @@ def _standing(points: Points, rotation: Rotations | None, target: Floats, lift: 
     return Similarity(factor, rotation, goal - factor * foot)
 
 
-def together(points: Floats) -> Floats:
-    """Without those far off, as captures have them: beyond half as far again as 19 of 20 are from the middle."""
+def without_outliers(points: Floats) -> Floats:
+    """(M, 3) without stray points, which captures have: beyond 1.5 times the 95 % quantile of the distance to the
+    median."""
     away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
     return points[away <= 1.5 * np.quantile(away, 0.95)]
 
 
-def _up(part: Points, left: Floats) -> str:
-    """The axis along which a part rises from what surrounds it: away from the points within twice its reach."""
+def _up(part: Points, remainder: Floats) -> str:
+    """The signed axis along which a part rises from its surroundings: away from the points within twice its radius."""
     centre = 0.5 * (part.min(axis=0) + part.max(axis=0))
-    away = left - centre
+    away = remainder - centre
     distance = np.linalg.norm(away, axis=1)
     near = (distance <= 2.0 * np.linalg.norm(part - centre, axis=1).max()) & (distance > 0.0)
     if not near.any():
         return "+z"
     mean = (away[near] / distance[near, None]).mean(axis=0)
     axis = int(np.abs(mean).argmax())
-    return "+z" if np.abs(mean[axis]) < SURROUNDED else ("-" if mean[axis] > 0.0 else "+") + "xyz"[axis]
+    return "+z" if np.abs(mean[axis]) < EVEN else ("-" if mean[axis] > 0.0 else "+") + "xyz"[axis]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.geometry.rigid import rotation_z
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.motion.local_frames import Axes, LocalFrames, evaluate_local_frames
 from odeform.motion.reduced_space import ReducedSpace, to_canonical
 from odeform.types import GaussianSplats, Geometry, Perpoint, Points
@@ -78,4 +78,4 @@ def evaluate_basis(geometry: Geometry, space: ReducedSpace, azimuth: float) -> E
     rows[3] = rest.ravel()
     squares = (np.square(values[:, at : at + CHUNK]).sum(axis=2).max(axis=1) for at in range(0, count, CHUNK))
     reach = np.sqrt(np.max(list(squares), axis=0))
-    return EvaluatedBasis(geometry, space, azimuth, points, rest, rows, reach, surface_shares(geometry))
+    return EvaluatedBasis(geometry, space, azimuth, points, rest, rows, reach, surface_weights(geometry))

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid, rotation_z
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.reduced_space import to_canonical
 from odeform.schema import Parameters, Schema, soft_clip
@@ -114,7 +114,7 @@ def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
         other = np.linalg.norm(points - points[chosen[-1]], axis=1)
         nearest[other < distance] = len(chosen) - 1
         distance = np.minimum(distance, other)
-    return Probes(points[chosen], np.bincount(nearest, surface_shares(rest), minlength=len(chosen)))
+    return Probes(points[chosen], np.bincount(nearest, surface_weights(rest), minlength=len(chosen)))
 
 
 class PointMotion(Motion):

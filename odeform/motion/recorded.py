@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.motion.base import SolveStats
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, Mesh, MotionSequence, Points, Pose, Times
@@ -86,7 +86,7 @@ class RecordedMotion:
         """(T,) root-mean-square local displacement over the surface in metres."""
         frames, poses = self.vertices(times), self.pose(times)
         back = np.einsum("tni,tij->tnj", frames - poses[:, None, :3, 3], poses[:, :3, :3])
-        return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_shares(self.geometry))
+        return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_weights(self.geometry))
 
     def of(self, parameters: Mapping[str, float]) -> bool:
         """Whether this is the motion under those parameters, to the resolution of a slider."""

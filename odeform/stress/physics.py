@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.models.base import Predictor
 from odeform.simulation.objects.ball import GRAVITY
 from odeform.stress.cases import inside
@@ -36,7 +36,7 @@ def check_physics(predictor: Predictor, seed: int = 0) -> Checks:
             strain = max(strain, float(np.abs(_lengths(body, edges) / lengths - 1.0).max()))
             drift = max(drift, abs(_volume(body, rest.faces) / volume - 1.0))
         depth = max(depth, -float(motion.vertices(times)[..., 2].min()))
-        gained = max(gained, energy_gained(fine, motion.pose(fine), points, surface_shares(rest)))
+        gained = max(gained, energy_gained(fine, motion.pose(fine), points, surface_weights(rest)))
     return {
         "inverted_faces": Check(inverted, 0),
         "edge_strain": Check(strain, 0.5),

@@ -69,7 +69,7 @@ def main() -> None:
     parser.add_argument("--out", required=True, metavar="FILE.spz")
     path = Path(parser.parse_args().out)
     atomic_write(path, spz_bytes(FILE.shape(volleyball_in_room()), fraction=14))
-    atomic_write(region_beside(path), json.dumps(region_to_json(REGION.moved(FILE)), indent=1).encode())
+    atomic_write(region_beside(path), json.dumps(region_to_json(REGION.transformed(FILE)), indent=1).encode())
     print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
@@ -30,7 +30,7 @@ class AlignmentPanel:
         """`hold` stops at rest; `turn` fits the shape anew under a rotation, or as guessed; `put` takes a place;
         `changed` is called when arrows and rings come or go."""
         self._hold, self._turn, self._put, self._changed = hold, turn, put, changed
-        self._fit: Fit | None = None
+        self._fit: FittedShape | None = None
         self._guess = 1.0
         self._gizmo, self._camera = TransformGizmo(server, self._dragged), CameraFocus(server)
         gui = server.gui
@@ -47,16 +47,16 @@ class AlignmentPanel:
         on_user_change(self._drag, self._toggled)
         back.on_click(serialized(lambda: self._turn(None)))
 
-    def show(self, fit: Fit | None, guess: float) -> None:
+    def show(self, fit: FittedShape | None, guess: float) -> None:
         """How a shape lies, None for the body that was trained; and the factor that was guessed."""
         self._fit, self._guess = fit, guess
         self._folder.visible = fit is not None
         if fit is None:
             self._drag.value = False
         else:
-            named = (name for name, turn in UPRIGHT.items() if np.allclose(turn, fit.place.rotation))
+            named = (name for name, turn in UPRIGHT.items() if np.allclose(turn, fit.transform.rotation))
             self._up.value = next(named, BY_HAND)
-            self._size.value = round(100.0 * fit.place.factor / guess, 2)
+            self._size.value = round(100.0 * fit.transform.factor / guess, 2)
         self._show_gizmo()
 
     @property
@@ -94,10 +94,10 @@ class AlignmentPanel:
         points = np.asarray(self._fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)
         foot = np.array([*(0.5 * (low + high))[:2], low[2] - self._fit.lift])
-        more = 0.01 * size * self._guess / self._fit.place.factor
-        self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.place)
+        more = 0.01 * size * self._guess / self._fit.transform.factor
+        self._put(Similarity(more, np.eye(3), (1.0 - more) * foot) @ self._fit.transform)
 
     def _dragged(self, motion: Similarity) -> None:
         with LOCK:
             if self._fit is not None:
-                self._put(motion @ self._fit.place)
+                self._put(motion @ self._fit.transform)

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from odeform.geometry.region import Box, Region, Sphere
-from odeform.geometry.shape import Fit, together
+from odeform.geometry.shape import FittedShape, without_outliers
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
 from odeform_viz.rendering.gizmos import CameraFocus, RegionGizmo, half_extent
 
@@ -22,14 +22,14 @@ class PartPanel:
     def __init__(
         self,
         server: viser.ViserServer,
-        whole: Callable[[], Fit | None],
+        whole: Callable[[], FittedShape | None],
         use: Callable[[Region | None], None],
         changed: Callable[[], None],
     ) -> None:
         """`whole` lays the whole shape out at rest and returns its fit; `use` makes a region's part move, or all;
         `changed` is called when a region comes up."""
         self._whole, self._use, self._changed = whole, use, changed
-        self._fit: Fit | None = None
+        self._fit: FittedShape | None = None
         self._gizmo, self._camera = RegionGizmo(server, self._count), CameraFocus(server)
         gui = server.gui
         self._folder = gui.add_folder("Part that moves", expand_by_default=False, visible=False)
@@ -52,7 +52,7 @@ class PartPanel:
         """Whether a region is on show."""
         return self._gizmo.region is not None
 
-    def show(self, fit: Fit | None) -> None:
+    def show(self, fit: FittedShape | None) -> None:
         """What moves now; None for the body that was trained."""
         self._gizmo.hide()
         self._camera.restore()
@@ -83,7 +83,7 @@ class PartPanel:
             self._radius.value = round(100.0 * region.radius / extent, 1)
         else:
             self._edges.value = tuple(np.round(100.0 * np.asarray(region.size) / extent, 1))
-        shown = region.moved(fit.place)
+        shown = region.transformed(fit.transform)
         self._camera.look_at(shown.centre, 3.0 * half_extent(shown))
         self._gizmo.show(shown)
         self._choosing(True)
@@ -94,7 +94,7 @@ class PartPanel:
         region = self._gizmo.region
         if region is None or self._fit is None:
             return
-        share = 0.01 * self._fit.place.factor * _extent(self._fit)
+        share = 0.01 * self._fit.transform.factor * _extent(self._fit)
         if isinstance(region, Sphere):
             self._gizmo.show(Sphere(region.centre, share * float(self._radius.value)))
         else:
@@ -104,13 +104,13 @@ class PartPanel:
     def _chosen(self) -> Region | None:
         """The region on show, in the units of the file."""
         region = self._gizmo.region
-        return None if region is None or self._fit is None else region.moved(self._fit.place.inverse)
+        return None if region is None or self._fit is None else region.transformed(self._fit.transform.inverse)
 
     def _count(self) -> None:
         with LOCK:  # the last to get in reads the newest place
             region = self._chosen()
             if region is not None and self._fit is not None:
-                inside = int(region.inside(self._fit.source.points).sum())
+                inside = int(region.contains(self._fit.source.points).sum())
                 self._said.content = f"**{inside:,}** of {len(self._fit.source.points):,} points inside"
 
     def _take(self) -> None:
@@ -119,7 +119,7 @@ class PartPanel:
             self._use(region)
 
 
-def region_like(known: Region | None, kind: str, fit: Fit) -> Region:
+def region_like(known: Region | None, kind: str, fit: FittedShape) -> Region:
     """A sphere or a box in the units of the file: as known, or as large; the first in the middle of the shape."""
     if known is None:
         known = Sphere(np.median(np.asarray(fit.source.points, dtype=float), axis=0), 0.005 * FIRST * _extent(fit))
@@ -127,7 +127,7 @@ def region_like(known: Region | None, kind: str, fit: Fit) -> Region:
         return known
     if isinstance(known, Sphere):
         # upright where the shape lies
-        return Box(known.centre, np.full(3, 2.0 * known.radius), fit.place.rotation.T)
+        return Box(known.centre, np.full(3, 2.0 * known.radius), fit.transform.rotation.T)
     return Sphere(known.centre, half_extent(known))
 
 
@@ -135,6 +135,6 @@ def _kind_of(region: Region | None) -> str:
     return KINDS[0] if region is None else "sphere" if isinstance(region, Sphere) else "box"
 
 
-def _extent(fit: Fit) -> float:
+def _extent(fit: FittedShape) -> float:
     """The largest of the whole shape but for what lies far off, in the units of the file."""
-    return float(np.ptp(together(np.asarray(fit.source.points, dtype=float)), axis=0).max())
+    return float(np.ptp(without_outliers(np.asarray(fit.source.points, dtype=float)), axis=0).max())

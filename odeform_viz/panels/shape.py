@@ -11,7 +11,7 @@ import viser
 from odeform.errors import InputError
 from odeform.formats.bundled import bundled_shapes
 from odeform.geometry.region import Region
-from odeform.geometry.shape import Fit, fit_to
+from odeform.geometry.shape import FittedShape, fit_to
 from odeform.geometry.similarity import Similarity
 from odeform.types import Mesh, Rotations
 from odeform_viz.columns import Columns
@@ -43,7 +43,7 @@ class ShapePanel:
         self._fit = next((column.fit for column in columns.all if column.fit), None)
         self._name = "the shape"
         self._turned: Rotations | None = None  # by hand; None as guessed
-        self._guess = self._fit.place.factor if self._fit else 1.0
+        self._guess = self._fit.transform.factor if self._fit else 1.0
         gui = server.gui
         with gui.add_folder("Shape", expand_by_default=False):
             self._text = gui.add_markdown(TRAINED)
@@ -85,12 +85,12 @@ class ShapePanel:
         self._name, self._turned = name, None
         self._adopt(fit if kept else replace(fit, origin=""))
 
-    def set(self, fit: Fit | None) -> None:
+    def set(self, fit: FittedShape | None) -> None:
         """Another shape, or the same in another part or place; None for the body that was trained."""
         with LOCK:
             if fit is not None:
-                self._name, self._turned = fit.origin, fit.place.rotation
-                self._guess = fit_to(fit.source, self._body, fit.region, fit.place.rotation).place.factor
+                self._name, self._turned = fit.origin, fit.transform.rotation
+                self._guess = fit_to(fit.source, self._body, fit.region, fit.transform.rotation).transform.factor
             self._adopt(fit, guessed=False)
 
     @property
@@ -98,10 +98,10 @@ class ShapePanel:
         """Whether a hand is choosing a part or putting the shape into place."""
         return self._part.choosing or self._alignment.dragging
 
-    def _adopt(self, fit: Fit | None, guessed: bool = True) -> None:
+    def _adopt(self, fit: FittedShape | None, guessed: bool = True) -> None:
         self._fit = fit
         if fit is not None and guessed:
-            self._guess = fit.place.factor
+            self._guess = fit.transform.factor
         self._columns.set_shape(fit)
         self._show()
         self._changed()
@@ -112,21 +112,23 @@ class ShapePanel:
         self._part.show(self._fit)
         self._alignment.show(self._fit, self._guess)
 
-    def _refit(self, region: Region | None, rotation: Rotations | None, place: Similarity | None = None) -> None:
+    def _refit(self, region: Region | None, rotation: Rotations | None, transform: Similarity | None = None) -> None:
         """The same shape, otherwise; it stays as it is where that cannot be."""
         fit = self._fit
         if fit is not None:
-            self._guarded(lambda: self._move(fit, region, rotation, place))
+            self._guarded(lambda: self._move(fit, region, rotation, transform))
 
-    def _move(self, fit: Fit, region: Region | None, rotation: Rotations | None, place: Similarity | None) -> None:
-        moved = fit_to(fit.source, self._body, region, rotation, place)
-        self._adopt(replace(moved, origin=fit.origin), guessed=place is None)
+    def _move(
+        self, fit: FittedShape, region: Region | None, rotation: Rotations | None, transform: Similarity | None
+    ) -> None:
+        moved = fit_to(fit.source, self._body, region, rotation, transform)
+        self._adopt(replace(moved, origin=fit.origin), guessed=transform is None)
 
-    def _lay_out(self) -> Fit | None:
+    def _lay_out(self) -> FittedShape | None:
         """The whole shape at rest, upright as it was; a part taken from it then stays so."""
         if self._fit is not None:
             self._hold()
-            upright = self._fit.place.rotation
+            upright = self._fit.transform.rotation
             if not np.array_equal(upright, np.eye(3)):
                 self._turned = upright
             self._refit(None, upright)
@@ -140,10 +142,10 @@ class ShapePanel:
         if self._fit is not None:
             self._refit(self._fit.region, rotation)
 
-    def _put(self, place: Similarity) -> None:
-        self._turned = place.rotation
+    def _put(self, transform: Similarity) -> None:
+        self._turned = transform.rotation
         if self._fit is not None:
-            self._refit(self._fit.region, None, place)
+            self._refit(self._fit.region, None, transform)
 
     def _return(self) -> None:
         self._adopt(None)

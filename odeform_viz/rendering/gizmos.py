@@ -7,7 +7,7 @@ import viser
 import viser.transforms as vtf
 
 from odeform.geometry.region import Box, Region, Sphere
-from odeform.geometry.shape import Fit
+from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.types import Floats, Rotations, Vector
 from odeform_viz.colors import HANDLE
@@ -109,7 +109,7 @@ class TransformGizmo:
     def visible(self) -> bool:
         return self._controls is not None
 
-    def show(self, fit: Fit) -> None:
+    def show(self, fit: FittedShape) -> None:
         """Show arrows and rings around the moving part of a fit."""
         points = np.asarray(fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)

@@ -39,8 +39,8 @@ class SceneView:
                 # from left to right as seen from the initial camera
                 lane = 0.0 if options.overlay else SPACING * self._extent * (0.5 * (len(row) - 1) - index)
                 view.show(shown, lane, OVERLAID if options.overlay and index else None, frame.truth, scale_mm)
-                if shown.column.fit and shown.column.fit.still is not None:
-                    self._stage.place_background(shown.column.fit.still, lane)
+                if shown.column.fit and shown.column.fit.static is not None:
+                    self._stage.place_background(shown.column.fit.static, lane)
                 view.title(title_of(shown) if several and not options.overlay else None, shown)
             self._stage.shift(*self._offset(frame, options))
         self._server.flush()

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from odeform.errors import InputError
-from odeform.geometry.parts import joined, most_visible, split
+from odeform.geometry.parts import concatenated, most_visible, split
 from odeform.geometry.region import Box, Sphere
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
@@ -21,9 +21,9 @@ def test_splats_in_two_and_together_again() -> None:
     part, left = split(SPLATS, MIDDLE)
     assert isinstance(part, GaussianSplats)
     assert left is not None
-    assert MIDDLE.inside(part.points).all()
-    assert not MIDDLE.inside(left.points).any()
-    both = joined(part, left)
+    assert MIDDLE.contains(part.points).all()
+    assert not MIDDLE.contains(left.points).any()
+    both = concatenated(part, left)
     assert isinstance(both, GaussianSplats)
     order, same = (np.argsort(s.harmonics[:, 0, 0]) for s in (both, SPLATS))
     for name in ("points", "covariances", "harmonics", "opacities"):
@@ -40,7 +40,7 @@ def test_a_mesh_is_split_between_faces() -> None:
     assert isinstance(left, Mesh)
     assert (len(part.points), len(part.faces)) == (len(other.vertices), len(other.faces))
     assert (len(left.points), len(left.faces)) == (len(one.vertices), len(one.faces))
-    again = joined(part, left)
+    again = concatenated(part, left)
     assert isinstance(again, Mesh)
     assert trimesh.Trimesh(again.points, again.faces).volume == pytest.approx(both.volume)
     # across the middle of one: every face is in one part
@@ -59,7 +59,7 @@ def test_a_region_that_holds_nothing_is_refused(shape: GaussianSplats | PointClo
 def test_a_region_that_holds_all_leaves_nothing() -> None:
     part, left = split(PointCloud(POINTS), Sphere(np.zeros(3), 9.0))
     assert left is None
-    assert len(joined(part, left).points) == 300
+    assert len(concatenated(part, left).points) == 300
 
 
 def test_of_too_many_splats_the_most_visible_stay() -> None:

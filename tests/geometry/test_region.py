@@ -16,19 +16,19 @@ BOX = Box(np.array([0.1, 0.2, 0.0]), np.array([1.0, 0.4, 0.6]), rotation_z(0.5))
 
 def test_inside() -> None:
     at = np.array([[0.2, 0.0, 0.4], [0.2, 0.0, 0.41], [0.2, 0.0, -0.1]])
-    assert SPHERE.inside(at).tolist() == [True, False, True]
+    assert SPHERE.contains(at).tolist() == [True, False, True]
     along = np.array([np.cos(0.5), np.sin(0.5), 0.0])
-    assert BOX.inside(BOX.centre + np.outer([0.49, 0.51], along)).tolist() == [True, False]
-    assert not BOX.inside(BOX.centre + np.array([[0.49, 0.0, 0.0]])).any()  # an unturned box would hold it
+    assert BOX.contains(BOX.centre + np.outer([0.49, 0.51], along)).tolist() == [True, False]
+    assert not BOX.contains(BOX.centre + np.array([[0.49, 0.0, 0.0]])).any()  # an unturned box would hold it
 
 
 @pytest.mark.parametrize("region", [SPHERE, BOX], ids=["sphere", "box"])
 def test_a_moved_region_holds_what_it_held(region: Region) -> None:
     move = Similarity(0.067, UPRIGHT["-y"], np.array([1.0, 2.0, 3.0]))
-    inside = region.inside(POINTS)
+    inside = region.contains(POINTS)
     assert 50 < inside.sum() < 1000
-    assert np.array_equal(region.moved(move).inside(move.points(POINTS)), inside)
-    assert np.array_equal(region.moved(move).moved(move.inverse).inside(POINTS), inside)
+    assert np.array_equal(region.transformed(move).contains(move.points(POINTS)), inside)
+    assert np.array_equal(region.transformed(move).transformed(move.inverse).contains(POINTS), inside)
 
 
 @pytest.mark.parametrize("region", [SPHERE, BOX], ids=["sphere", "box"])
@@ -37,7 +37,7 @@ def test_files(tmp_path: Path, region: Region) -> None:
     path.write_text(json.dumps(region_to_json(region)))
     again = read_region(path)
     assert type(again) is type(region)
-    assert np.array_equal(again.inside(POINTS), region.inside(POINTS))
+    assert np.array_equal(again.contains(POINTS), region.contains(POINTS))
 
 
 DAMAGED = (

@@ -5,7 +5,7 @@ import pytest
 import torch
 import trimesh
 
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.models.odeform.config import ModelConfig
 from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.odeform.network import ODeformNet, ShapeEncoder
@@ -19,7 +19,7 @@ Shape = tuple[torch.Tensor, torch.Tensor]
 def shape(level: int = 3, stretch: float = 1.0) -> Shape:
     sphere = trimesh.creation.icosphere(level)
     mesh = Mesh(np.asarray(sphere.vertices) * [stretch, 1.0, 1.0], np.asarray(sphere.faces))
-    return torch.as_tensor(mesh.points).float(), torch.as_tensor(surface_shares(mesh)).float()
+    return torch.as_tensor(mesh.points).float(), torch.as_tensor(surface_weights(mesh)).float()
 
 
 def network(rigid: bool, random_features: int = 0) -> ODeformNet:

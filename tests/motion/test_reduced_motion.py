@@ -10,7 +10,7 @@ import trimesh
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
 from odeform.geometry.rigid import rotation_z
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load
@@ -179,7 +179,7 @@ def test_bound_and_size_of_the_deformation(predictors: dict[str, Predictor], mod
     size = np.linalg.norm(motion.local(times), axis=-1)
     bounds = np.array([motion.deformation_bound(float(time)) for time in times])
     assert (size.max(axis=1) <= bounds * (1.0 + 1e-5) + 1e-9).all()
-    assert np.allclose(motion.deformation_rms(times), np.sqrt(size**2 @ surface_shares(egg())), rtol=1e-3, atol=1e-8)
+    assert np.allclose(motion.deformation_rms(times), np.sqrt(size**2 @ surface_weights(egg())), rtol=1e-3, atol=1e-8)
 
 
 @everywhere

@@ -56,7 +56,7 @@ def test_the_file_holds_what_was_made(scene: GaussianSplats) -> None:
 def test_its_region_holds_the_ball_and_nothing_else(scene: GaussianSplats) -> None:
     _, region = read_shape("volleyball")
     assert region is not None
-    inside = region.inside(scene.points)
+    inside = region.contains(scene.points)
     assert inside[: volleyball.BALL].all()
     assert not inside[volleyball.BALL :].any()
     # three colours of panels, darker seams
@@ -72,8 +72,8 @@ def test_it_fits_the_bodies_at_once(scene: GaussianSplats, name: str) -> None:
     fit = fit_to(scene, model.rest, region)
     for end in (np.min, np.max):
         assert np.allclose(end(fit.geometry.points, axis=0), end(model.rest.points, axis=0), atol=1e-3)
-    assert np.array_equal(fit.place.rotation, volleyball.FILE.rotation.T)
-    assert fit.place.factor == pytest.approx(1.0, abs=0.01)
-    assert isinstance(fit.still, GaussianSplats)
-    assert fit.still.points[:, 2].min() == pytest.approx(0.0, abs=2e-3)
-    assert fit.still.points[:, 2].max() > 1.1
+    assert np.array_equal(fit.transform.rotation, volleyball.FILE.rotation.T)
+    assert fit.transform.factor == pytest.approx(1.0, abs=0.01)
+    assert isinstance(fit.static, GaussianSplats)
+    assert fit.static.points[:, 2].min() == pytest.approx(0.0, abs=2e-3)
+    assert fit.static.points[:, 2].max() > 1.1

@@ -115,7 +115,7 @@ def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
         client.collect(2.0)
         assert f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text()
         assert app.columns.all[0].fit is not None
-        assert app.columns.all[0].fit.left is None  # the whole scene lies at rest while one chooses
+        assert app.columns.all[0].fit.remainder is None  # the whole scene lies at rest while one chooses
         client.set("radius (%)", 3.4)  # the ball is hollow: its top alone
         client.collect(1.0)
         smaller = int(client.text().split("**")[1].replace(",", ""))
@@ -126,9 +126,9 @@ def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
     assert fit is not None
     assert isinstance(fit.region, Sphere)
     assert len(fit.geometry.points) == smaller
-    assert fit.left is not None
-    assert len(fit.left.points) == BALL + REST - smaller
-    assert np.array_equal(fit.place.rotation, UPRIGHT["-y"])  # as it lay while one chose
+    assert fit.remainder is not None
+    assert len(fit.remainder.points) == BALL + REST - smaller
+    assert np.array_equal(fit.transform.rotation, UPRIGHT["-y"])  # as it lay while one chose
 
 
 def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
@@ -144,7 +144,7 @@ def test_alignment_by_hand_and_back(app: App, port: int) -> None:
     def place() -> Similarity:
         fit = app.columns.all[0].fit
         assert fit is not None
-        return fit.place
+        return fit.transform
 
     guessed = place()
     with LoopbackClient(port) as client:

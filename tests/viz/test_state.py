@@ -83,9 +83,11 @@ def test_a_missing_checkpoint_is_named(view_request: ViewRequest) -> None:
 def test_a_shape_its_part_and_its_place_are_kept(view_request: ViewRequest) -> None:
     (model,) = {c.predictor for c in view_request.columns if c.predictor and c.pinned is None}
     guessed = shape_from("volleyball", model.rest)
-    turned = Similarity(1.1 * guessed.place.factor, UPRIGHT["+x"] @ guessed.place.rotation, guessed.place.shift)
+    turned = Similarity(
+        1.1 * guessed.transform.factor, UPRIGHT["+x"] @ guessed.transform.rotation, guessed.transform.shift
+    )
     region = Sphere(guessed.region.centre + 0.5 * guessed.region.radius, guessed.region.radius)
-    fit = replace(fit_to(guessed.source, model.rest, region, place=turned), origin="volleyball")
+    fit = replace(fit_to(guessed.source, model.rest, region, transform=turned), origin="volleyball")
     columns = Columns.of([replace(view_request.columns[0], geometry=fit.geometry, fit=fit)])
     state = state_from_json(
         state_to_json(capture(SCENE, replace(view_request, columns=columns.all), DisplayOptions())), SCENE
@@ -93,7 +95,7 @@ def test_a_shape_its_part_and_its_place_are_kept(view_request: ViewRequest) -> N
     assert state.shape is not None
     again = fit_from_json(state.shape, model.rest)
     np.testing.assert_array_equal(again.geometry.points, fit.geometry.points)
-    np.testing.assert_array_equal(again.still.points, fit.still.points)
+    np.testing.assert_array_equal(again.static.points, fit.static.points)
     assert again.origin == "volleyball"
     # what was uploaded is in no file here
     nowhere = replace(columns.all[0], fit=replace(fit, origin=""))

@@ -10,7 +10,7 @@ import numpy as np
 from odeform.dataset.folder import folder_reader, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.progress import Progress
 from odeform.schema import Parameter, Schema, Window
 from odeform.types import Faces, Frames, Mesh, MotionSequence
@@ -87,7 +87,7 @@ def _sequence(found: Found, rate: float) -> MotionSequence:
     vertices, faces = found.read()
     if not np.isfinite(vertices).all():
         raise InputError(f"{found.name}: a vertex that is not finite")
-    weights = surface_shares(Mesh(vertices[0], faces))
+    weights = surface_weights(Mesh(vertices[0], faces))
     return MotionSequence(np.arange(len(vertices)) / rate, vertices.astype(np.float32), faces, weights, name=found.name)
 
 

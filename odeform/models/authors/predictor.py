@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.importers.authors import AUTHORS_MASS_ELASTIC
 from odeform.errors import InputError
-from odeform.geometry.shape import surface_shares
+from odeform.geometry.shape import surface_weights
 from odeform.models.authors.file import MODEL
 from odeform.models.authors.network import Networks, normalisation
 from odeform.models.base import Predictor
@@ -156,4 +156,4 @@ def _place(shape: Geometry, frames: Frames) -> EvaluatedBasis:
     none = DisplacementBasis(np.zeros((1, 3)), np.zeros((5, 0)), 1.0)
     space = ReducedSpace(np.zeros(3), 1.0, none, None)
     reach = np.linalg.norm(frames, axis=2).max(axis=1)
-    return _EvaluatedFrames(shape, space, 0.0, points, points, rows, reach, surface_shares(shape))
+    return _EvaluatedFrames(shape, space, 0.0, points, points, rows, reach, surface_weights(shape))

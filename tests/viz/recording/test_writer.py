@@ -210,7 +210,7 @@ def test_what_stands_still_is_recorded_once(kick: Predictor, path: Path, record:
     record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
     rows = _rows(path)
     (points,) = rows["/world/still/points:Points3D:positions"]
-    assert fit.still is not None
-    assert len(points) == len(fit.still.points)
+    assert fit.static is not None
+    assert len(points) == len(fit.static.points)
     (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
     assert "volleyball" in shape
