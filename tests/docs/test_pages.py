@@ -1,0 +1,88 @@
+"""The README and the docs: size, links, the page of commands, and the site."""
+
+import argparse
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from blocks import ROOT, blocks_of, pages, prose
+from commands import parser_of
+
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+
+
+def slug(heading: str) -> str:
+    return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", heading.replace("`", "").strip().lower()))
+
+
+def anchors(page: Path) -> set[str]:
+    return {slug(heading) for heading in re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)}
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_bytes()) <= 6000
+
+
+def test_the_readme_has_the_test_command_that_ci_runs():
+    readme = (ROOT / "README.md").read_text()
+    assert "<!-- test -->\n```bash\npip install -e '.[dev]' && pytest\n```" in readme
+    assert "```bash\npip install -e . && odeform-viz\n```" in readme
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda p: p.stem)
+def test_links_lead_somewhere(page: Path):
+    for target in LINK.findall(prose(page)):
+        if target.startswith(("https://", "mailto:")):
+            continue
+        name, _, anchor = target.partition("#")
+        file = (page.parent / name).resolve() if name else page
+        assert file.exists(), f"{page.name}: {target} does not exist"
+        assert not anchor or anchor in anchors(file), f"{page.name}: {target}: no such heading"
+
+
+def test_every_page_is_in_the_menu():
+    listed = set(re.findall(r"- ([\w-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
+    assert listed == {page.name for page in (ROOT / "docs").glob("*.md")}
+
+
+def section(page: Path, heading: str) -> str:
+    """The text under a heading, up to the next one of its level."""
+    match = re.search(rf"^### {re.escape(heading)}$(.*?)(?=^##|\Z)", page.read_text(), re.MULTILINE | re.DOTALL)
+    assert match, f"{page.name}: no section {heading}"
+    return match[1]
+
+
+def options(parser: argparse.ArgumentParser) -> set[str]:
+    return {option for action in parser._actions for option in action.option_strings if option.startswith("--")}
+
+
+def documented(text: str) -> set[str]:
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("|")]
+    return {option for row in rows for option in re.findall(r"`(--[\w-]+)`", row)}
+
+
+def test_the_page_of_commands_has_every_command_and_option():
+    page = ROOT / "docs" / "cli.md"
+    parser = parser_of("odeform", ["info", "kick"])
+    commands = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction)).choices
+    expected = {f"odeform {name}": options(sub) for name, sub in commands.items()}
+    expected["odeform-viz"] = options(parser_of("odeform-viz", []))
+    for name, its in expected.items():
+        assert documented(section(page, name)) == its - {"--help", "--version"}, name
+
+
+def test_a_block_that_is_never_closed_is_an_error(tmp_path: Path):
+    page = tmp_path / "page.md"
+    page.write_text("```python\nprint(1)\n")
+    with pytest.raises(ValueError, match="not in list"):
+        blocks_of(page)
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_warnings(tmp_path: Path):
+    pytest.importorskip("mkdocs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert built.returncode == 0, built.stderr
