@@ -1,5 +1,6 @@
 """What all models that move each point by itself share: how they are kept and read, and how they solve."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -29,8 +30,7 @@ class PointModel(Predictor):
     trajectory: type[MomentaryPoints | FramedPoints]
 
     def _read(self, checkpoint: Checkpoint) -> None:
-        frame = checkpoint.config["frame"]
-        self.frame = PointFrame(**{**frame, "anchor": tuple(frame["anchor"])})
+        self.frame = _frame_from_json(checkpoint.config["frame"])
         weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         for name, shape in layer_shapes(self.network.sizes(len(self.schema.learned), checkpoint.config["width"])):
             if weights[name].shape != shape or not np.isfinite(weights[name]).all():
@@ -60,10 +60,21 @@ class PointModel(Predictor):
         return PointMotion(self.schema, parameters, geometry, self.frame, self.mean, self._probes, moved, body)
 
 
+def _frame_to_json(frame: PointFrame) -> dict[str, Any]:
+    """Files call the radius of gyration `arm`."""
+    values = asdict(frame)
+    return {"arm": values.pop("gyration_radius"), **values}
+
+
+def _frame_from_json(data: Mapping[str, Any]) -> PointFrame:
+    values = dict(data)
+    return PointFrame(tuple(values.pop("anchor")), values.pop("arm"), **values)
+
+
 def point_checkpoint(
     model: str, schema: Schema, frame: PointFrame, mean: MeanMotion, weights: Arrays, config: dict[str, Any]
 ) -> Checkpoint:
     """What a model of points is read from, but for the body that viewers show."""
     arrays = {PREFIX + name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
     arrays |= {"mean.times": mean.times, "mean.shifts": mean.shifts}
-    return Checkpoint(model, schema, {"frame": asdict(frame), **config}, arrays)
+    return Checkpoint(model, schema, {"frame": _frame_to_json(frame), **config}, arrays)
