@@ -63,9 +63,10 @@ def _emit(result: dict[str, Any], path: str | None) -> None:
 def _simulate(args: argparse.Namespace) -> None:
     try:
         from odeform.simulation.runner import simulate
+
+        dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, args.rate, corners=args.corners)
     except ModuleNotFoundError as error:
         raise InputError(f"simulation needs {error.name}: pip install 'odeform[simulate]'") from None
-    dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, args.rate, corners=args.corners)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
 

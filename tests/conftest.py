@@ -59,8 +59,8 @@ def no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def _coarsen(patch: pytest.MonkeyPatch) -> None:
     """A kick of a quarter of the vertices, simulated in this process (others would not know of it)."""
     scene = kick_scene.SCENE
-    simulate = functools.partial(kick_scene.simulate, segments=4)
-    patch.setattr(kick_scene, "SCENE", replace(scene, simulate=simulate, step=2e-3))
+    simulate = functools.partial(kick_scene.simulate, resolution=4)
+    patch.setattr(kick_scene, "SCENE", replace(scene, simulate=simulate, step=2e-3, resolutions=(4,)))
 
 
 @contextmanager

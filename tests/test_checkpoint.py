@@ -16,7 +16,7 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint, 
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.registry import load
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 
 MODELS = ("odeform", "pod-rbf", "nearest")
 

@@ -7,7 +7,7 @@ import pytest
 
 from odeform.errors import InputError
 from odeform.schema import Schema, Window, soft_clip
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 
 SCHEMA = get_scene("kick").schema
 

@@ -13,15 +13,16 @@ from odeform.models.odeform.model import ODeform
 from odeform.motion.basis import fit_basis
 from odeform.motion.reduced_space import decompose, rotation_of, to_canonical
 from odeform.schema import Window
-from odeform.simulation.objects.ball import SEGMENTS
-from odeform.simulation.scene import Scene, get_scene
+from odeform.simulation.errors import SimulationError
+from odeform.simulation.scene import Scene
+from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Floats, Frames, MotionSequence
 
-__all__ = ["carried_over", "simulator"]
+__all__ = ["carried_over", "coarser_settings", "simulator"]
 
 SIMULATED = 3  # sequences of the test split
-COARSER = ((1.0, 1.0), (2.0, 1.0), (4.0, 1.0), (1.0, 0.8), (2.0, 0.8), (1.0, 0.5))
-"""Simulations that are tried: times the scene's step, and times its segments along an edge."""
+STEPS = (1.0, 2.0, 4.0)
+"""Time steps that are tried, in multiples of the scene's own. Coarser meshes are tried with fewer of them."""
 
 
 def carried_over(coarse: MotionSequence, truth: MotionSequence, anchor: Floats, azimuth: float) -> Frames:
@@ -49,26 +50,34 @@ def _model_ms(model: ODeform, truth: MotionSequence) -> float:
     return typical(lambda _: model.solve(truth.rest, truth.parameters).vertices(times), 15)
 
 
-def _attempt(
-    scene: Scene, model: ODeform, truths: list[MotionSequence], coarser: float, finer: float
-) -> dict[str, Any]:
-    """Mean time and pooled error of the simulator at one of the settings `COARSER`."""
-    from odeform.simulation.shell import SimulationError
+def coarser_settings(scene: Scene) -> list[tuple[float, int | None]]:
+    """Time step in seconds and resolution of the simulations that are tried, that of the scene's truth first."""
+    return [
+        (factor * scene.step, resolution)
+        for index, resolution in enumerate(scene.resolutions or (None,))
+        for factor in STEPS[: max(len(STEPS) - index, 1)]
+    ]
 
-    window, step, segments = model.schema.window, coarser * scene.step, round(finer * SEGMENTS)
-    errors, ms = [], []
+
+def _attempt(
+    scene: Scene, model: ODeform, truths: list[MotionSequence], step: float, resolution: int | None
+) -> dict[str, Any]:
+    """Mean time and pooled error of the simulator at one setting."""
+    window, errors, ms = model.schema.window, [], []
+    numerics = {} if resolution is None else {"resolution": resolution}
+    setting = {"step": step, "segments": resolution}
     for truth in truths:
         begin = time.perf_counter()
         try:
-            simulated = scene.simulate(truth.parameters, rate=window.rate, step=step, segments=segments)
+            simulated = scene.simulate(truth.parameters, rate=window.rate, step=step, **numerics)
         except SimulationError as error:
-            return {"step": step, "segments": segments, "failed": str(error)}
+            return {**setting, "failed": str(error)}
         ms.append(1e3 * (time.perf_counter() - begin))
         azimuth = model.schema.azimuth(truth.parameters)
         moved = carried_over(simulated.until(window.stop), truth, model.space.anchor, azimuth)
         errors.append(((moved - truth.vertices)[1:] ** 2).mean())
     error_mm = float(1e3 * np.sqrt(np.mean(errors)))
-    return {"step": step, "segments": segments, "ms": float(np.mean(ms)), "error_mm": error_mm}
+    return {**setting, "ms": float(np.mean(ms)), "error_mm": error_mm}
 
 
 def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
@@ -79,19 +88,19 @@ def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     """
     if dataset is None:
         return {"skipped": f"no data set of scene {model.schema.scene} at hand: --data"}
-    try:
-        import odeform.simulation.shell  # noqa: F401
-    except ModuleNotFoundError as error:
-        return {"skipped": f"{error.name} is not installed: pip install 'odeform[simulate]'"}
-
-    scene, window = get_scene(model.schema.scene), model.schema.window
+    scene, window = find_scene(model.schema.scene), model.schema.window
+    if scene is None:
+        return {"skipped": f"scene {model.schema.scene} cannot be simulated"}
     if scene.fixed != dataset.fixed:
         return {"skipped": "the data set is of other physics than this version simulates"}
     near = nearest_sequences(dataset, model.schema.complete(None), SIMULATED)
     truths = [_on_frames(recorded, window) for recorded in near.sequences("test")]
     model_error = evaluate(model, near, "test")["rmse_pooled_mm"]
 
-    tried = [_attempt(scene, model, truths, *setting) for setting in COARSER]
+    try:
+        tried = [_attempt(scene, model, truths, *setting) for setting in coarser_settings(scene)]
+    except ModuleNotFoundError as error:
+        return {"skipped": f"{error.name} is not installed: pip install 'odeform[simulate]'"}
     enough = [row for row in tried if row.get("error_mm", np.inf) <= model_error]
     equal, truth = min(enough, key=lambda row: row["ms"], default=tried[0]), tried[0]
     if "failed" in truth:

@@ -13,7 +13,7 @@ import numpy as np
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.evaluation.metrics import Scores
-from odeform.simulation.objects.ball import GRAVITY
+from odeform.simulation.physics import GRAVITY
 from odeform.types import Frames, MotionSequence
 
 __all__ = ["ballistic", "evaluate_simple", "hold_last", "spline_through"]
@@ -27,17 +27,20 @@ def hold_last(known: int) -> Guess:
     return lambda truth, _: truth.vertices[np.minimum(np.arange(len(truth.times)), known - 1)]
 
 
-def ballistic(known: int) -> Guess:
-    """From the last of the first `known` frames on, its shape flies on under gravity with the centre's velocity."""
+def ballistic(known: int, gravity: float = GRAVITY) -> Guess:
+    """From the last of the first `known` frames on, its shape flies on with the centre's velocity under `gravity`.
+
+    `gravity` is in m/s^2, along -z.
+    """
 
     def fly(truth: MotionSequence, index: int) -> Frames:
         step = float(truth.times[1] - truth.times[0])
         before, last = truth.vertices[known - 2 : known].astype(float)
-        gravity = np.array([0.0, 0.0, -GRAVITY])
+        down = np.array([0.0, 0.0, -gravity])
         # the centre's mean velocity over the last interval, and what gravity adds in its second half
-        velocity = truth.weights @ (last - before) / step + 0.5 * gravity * step
+        velocity = truth.weights @ (last - before) / step + 0.5 * down * step
         ahead = np.maximum(truth.times - truth.times[known - 1], 0.0)[:, None]
-        shift = ahead * velocity + 0.5 * ahead**2 * gravity
+        shift = ahead * velocity + 0.5 * ahead**2 * down
         return hold_last(known)(truth, index) + shift[:, None]
 
     return fly

@@ -1,6 +1,7 @@
 """Many motions of one scene: in parallel, resumable, the same data whatever the number of workers."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ from odeform.dataset.folder import INDEX, folder_reader, open_folder, save_seque
 from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
 from odeform.progress import Progress
-from odeform.simulation.scene import Scene, get_scene
-from odeform.simulation.shell import SimulationError
+from odeform.simulation.errors import SimulationError
+from odeform.simulation.scene import Scene
+from odeform.simulation.scenes.registry import get_scene
+from odeform.types import MotionSequence
 
 __all__ = ["simulate"]
 
@@ -20,10 +23,10 @@ __all__ = ["simulate"]
 TEST_RATE = 4  # test sequences have so many times the frames: people look between those that were learned
 
 
-def _one(scene_name: str, entry: Entry, root: Path, rate: float, step: float) -> Entry:
+def _one(simulate: Callable[..., MotionSequence], entry: Entry, root: Path, rate: float, step: float) -> Entry:
     try:
         rate = rate * (TEST_RATE if entry.split == "test" else 1)
-        sequence = get_scene(scene_name).simulate(entry.parameters, rate=rate, step=step)
+        sequence = simulate(entry.parameters, rate=rate, step=step)
     except SimulationError as error:
         return replace(entry, status=str(error))
     return replace(entry, sha256=save_sequence(root, entry.name, sequence))
@@ -90,7 +93,7 @@ def simulate(
         return dataset
 
     root.mkdir(parents=True, exist_ok=True)
-    jobs = (delayed(_one)(scene, entry, root, rate, step) for entry in todo)
+    jobs = (delayed(_one)(known.simulate, entry, root, rate, step) for entry in todo)
     finished: Any = Parallel(n_jobs=workers, return_as="generator_unordered")(jobs)
     for entry in finished:
         done[entry.name] = entry

@@ -1,4 +1,4 @@
-"""A scene: what is varied, what is fixed, and how one motion of it comes about."""
+"""A scene: a family of motions, with everything that the rest of the package needs to know of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -6,30 +6,50 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import qmc
 
-from odeform.errors import InputError
-from odeform.schema import Schema
-from odeform.types import Mesh, MotionSequence
+from odeform.schema import Parameters, Schema
+from odeform.simulation.glyphs import Arrow
+from odeform.simulation.measurements import Measurements
+from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
+from odeform.types import Mesh, MotionSequence, Points
 
-__all__ = ["Scene", "get_scene", "known_scenes"]
+__all__ = ["Scene"]
+
+
+def _no_glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
+    return ()
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A family of motions.
+    """A family of motions of one body. Only `schema` to `count` are required.
 
-    `simulate(parameters, rate, **numerics)` runs one motion; `rest_mesh()` is a fine
-    mesh of the undeformed body, for display. `fixed` are the physical quantities that do not vary, with units in
-    their names, kept with every data set.
+    A scene is a module-level value, named in `odeform.simulation.scenes.registry`. Its functions should import their
+    simulator when they are called: looking at a scene, or training on its data, needs none.
     """
 
     schema: Schema
+    """Its name, parameters and time window."""
     simulate: Callable[..., MotionSequence]
+    """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the share done,
+    and `resolution`, if the scene has `resolutions`. It raises `SimulationError` where the result is not sound."""
     rest_mesh: Callable[[], Mesh]
+    """A fine mesh of the undeformed body where the motion starts, for display."""
     step: float
-    """The simulator's time step in seconds that this scene calls its truth."""
+    """Time step of the simulator in seconds whose results count as the truth."""
     count: int
-    """Sequences of its own data set."""
+    """Number of sequences in its standard data set."""
     fixed: dict[str, float] = field(default_factory=dict)
+    """Physical quantities that do not vary, with units in their names. They are stored with every data set."""
+    gravity: float = GRAVITY
+    """m/s^2, along -z."""
+    resolutions: tuple[int, ...] = ()
+    """Resolutions of the simulated mesh, finest first. The first counts as the truth; none: it cannot be changed."""
+    glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs
+    """`glyphs(parameters, rest_points)` are the arrows that show the parameters on a body of points (N, 3) m."""
+    measurements: Measurements = field(default_factory=Measurements)
+    """What `odeform.simulation.study` measures besides the effect of the time step."""
+    checks: tuple[PhysicalCheck, ...] = STANDARD_CHECKS
+    """What `odeform stress` asks of predicted motions."""
 
     def sample(self, count: int, seed: int) -> list[dict[str, float]]:
         """`count` parameter sets, space-filling over the trained box (scrambled Sobol points).
@@ -43,18 +63,3 @@ class Scene:
             {p.name: p.denormalise(2.0 * float(u) - 1.0) for p, u in zip(parameters, row, strict=True)}
             for row in points
         ]
-
-
-def known_scenes() -> dict[str, Scene]:
-    """All that can be simulated, by name."""
-    from odeform.simulation.scenes import kick, mass_elastic
-
-    return {scene.schema.scene: scene for scene in (mass_elastic.SCENE, kick.SCENE)}
-
-
-def get_scene(name: str) -> Scene:
-    """The scene of that name."""
-    scenes = known_scenes()
-    if name not in scenes:
-        raise InputError(f"unknown scene {name!r}: expected one of {', '.join(scenes)}")
-    return scenes[name]

@@ -13,6 +13,7 @@ from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spl
 from odeform.identification.table import identify_split
 from odeform.io import atomic_write
 from odeform.models.registry import load
+from odeform.simulation.scenes.registry import get_scene
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import KEPT, run_cells
@@ -61,11 +62,11 @@ def _shipped() -> Found:
 
 
 def _simple() -> Found:
-    guesses = {}
+    guesses, gravity = {}, get_scene(DROP).gravity
     for until in UNTIL:
         window = until, until + AHEAD
         guesses[f"hold-last {until}:{until + AHEAD}"] = hold_last(until), window
-        guesses[f"ballistic {until}:{until + AHEAD}"] = ballistic(until), window
+        guesses[f"ballistic {until}:{until + AHEAD}"] = ballistic(until, gravity), window
     for k in INTERVALS:
         guesses[f"spline {k}"] = spline_through(FrameSubsampling(every=k)), IMPACT
         guesses[f"spline {k} staggered"] = spline_through(FrameSubsampling(every=k, stagger=True)), IMPACT

@@ -28,7 +28,7 @@ from odeform.models.baselines.pod_rbf import fit_pod_rbf
 from odeform.models.baselines.rnn import Rnn
 from odeform.models.odeform.model import PREFIX
 from odeform.models.registry import load
-from odeform.simulation.scene import known_scenes
+from odeform.simulation.scenes.registry import find_scene
 from odeform.training.continuation import with_continuation
 from odeform.training.point_data import prepare_points
 from odeform.training.pruning import without_modes
@@ -44,7 +44,7 @@ MODELS = ("odeform", *POINTS, "pod-rbf", "nearest")
 
 def rest_of(dataset: Dataset) -> Mesh:
     """The body as viewers show it: the scene's fine mesh, or of imported data the first training sequence's own."""
-    scene = known_scenes().get(dataset.schema.scene)
+    scene = find_scene(dataset.schema.scene)
     if scene is not None:
         return scene.rest_mesh()
     first = next(dataset.sequences("train"), None)

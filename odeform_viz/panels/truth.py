@@ -10,7 +10,7 @@ from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Schema
-from odeform.simulation.scene import known_scenes
+from odeform.simulation.scenes.registry import find_scene
 from odeform.types import MotionSequence
 from odeform_viz.columns import Column, Columns
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulator_installed
@@ -68,7 +68,7 @@ class TruthPanel:
         self._job: Job | None = None
         self._starting = threading.Lock()
         self._opening = asyncio.Lock()  # fair: what was chosen last is opened last
-        installed, scene = simulator_installed(), known_scenes().get(schema.scene)
+        installed, scene = simulator_installed(), find_scene(schema.scene)
         gui = server.gui
         with gui.add_folder("Truth"):
             if dataset is not None:

@@ -89,7 +89,7 @@ def simulator_installed() -> bool:
 
 def simulate_motion(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     """Simulate one motion of a scene under `parameters` (SI units), sampled at `rate` in Hz."""
-    from odeform.simulation.scene import get_scene
+    from odeform.simulation.scenes.registry import get_scene
 
     return get_scene(scene).simulate(parameters, rate=rate, report=report)
 

@@ -7,7 +7,7 @@ from odeform.benchmark import equal_error
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 
 
 @pytest.fixture
@@ -27,9 +27,8 @@ def test_a_motion_carried_to_its_own_mesh_is_itself(dataset: Dataset, model: ODe
 def test_a_coarser_simulation_is_off_by_more(dataset: Dataset, model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     """The fixture's scene has 4 segments and steps of 2 ms; its data set is the truth of that setting."""
     scene = get_scene("kick")
-    monkeypatch.setattr(equal_error, "SEGMENTS", 4)
     monkeypatch.setattr(equal_error, "SIMULATED", 1)
-    monkeypatch.setattr(equal_error, "COARSER", ((1.0, 1.0), (2.0, 1.0)))
+    monkeypatch.setattr(equal_error, "STEPS", (1.0, 2.0))
     row = equal_error.simulator(model, dataset)
     same, coarser = row["tried"]
     assert (same["step"], same["segments"]) == (scene.step, 4)

@@ -11,7 +11,7 @@ import pytest
 from odeform.dataset.folder import folder_reader, open_folder, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
 

@@ -13,7 +13,7 @@ from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.packed import _expand, _squeeze, open_packed, pack
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
 TOLERANCE = 2e-5  # m

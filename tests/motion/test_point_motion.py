@@ -7,7 +7,7 @@ import trimesh
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.motion.base import SolveStats
 from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, evaluate_probes
-from odeform.simulation.scene import get_scene
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames, Mesh
 
 ANCHOR = np.array([0.0, 0.0, 0.1])

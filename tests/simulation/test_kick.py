@@ -4,8 +4,8 @@ import trimesh
 from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_z
 from odeform.simulation.objects.ball import RADIUS
-from odeform.simulation.scene import get_scene
-from odeform.simulation.scenes.kick import pulse_direction, pulse_weights
+from odeform.simulation.scenes.kick import PULSE, pulse_direction, pulse_weights
+from odeform.simulation.scenes.registry import get_scene
 
 
 def test_the_pulse_comes_from_behind_and_below() -> None:
@@ -50,3 +50,18 @@ def test_longer_samples_start_with_the_shorter() -> None:
     scene = get_scene("kick")
     assert scene.sample(37, seed=5)[:9] == scene.sample(9, seed=5)
     assert scene.sample(9, seed=6) != scene.sample(9, seed=5)
+
+
+def test_the_arrow_of_the_pulse_is_as_long_as_it_is_strong() -> None:
+    scene = get_scene("kick")
+    rest = np.asarray(scene.rest_mesh().points)
+    parameters = scene.schema.complete({"force": 75.0, "azimuth": 0.5 * np.pi, "elevation": 0.6})
+    (arrow,) = scene.glyphs(parameters, rest)
+    direction = np.array([0.0, np.cos(0.6), np.sin(0.6)])
+    assert np.allclose(arrow.vector, 0.5 * 2.0 * RADIUS * direction, atol=1e-9)
+    assert np.allclose(arrow.start, [0.0, 0.0, RADIUS] + 0.55 * 2.0 * RADIUS * direction, atol=1e-9)
+    assert (arrow.label, arrow.begin, arrow.end) == ("75 N", 0.0, PULSE)
+
+
+def test_no_arrow_without_the_parameters_of_a_pulse() -> None:
+    assert get_scene("kick").glyphs({"mass": 0.6}, np.zeros((4, 3))) == ()

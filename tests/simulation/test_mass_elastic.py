@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from odeform.geometry.rigid import best_rigid, vector_from_rotation
-from odeform.simulation.objects.ball import GRAVITY, RADIUS
+from odeform.simulation.objects.ball import RADIUS
+from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.mass_elastic import HEIGHT, REST_SPEED, REST_TIME, SCENE, SCHEMA, simulate
 from odeform.types import Floats, MotionSequence
 
@@ -12,7 +13,7 @@ CONTACT_BEGINS = np.sqrt(2.0 * (HEIGHT - RADIUS) / GRAVITY)
 
 @pytest.fixture(scope="module")
 def drop() -> MotionSequence:
-    return simulate(LIGHT_AND_SOFT, step=1e-3, segments=5)
+    return simulate(LIGHT_AND_SOFT, step=1e-3, resolution=5)
 
 
 def centre(sequence: MotionSequence) -> Floats:
@@ -64,7 +65,7 @@ def test_frames_lie_on_the_grid(drop: MotionSequence) -> None:
 
 def test_frames_asked_for_do_not_change_the_motion() -> None:
     """A rate that divides the steps, one that does not, and a multiple of both."""
-    motions = {rate: simulate(LIGHT_AND_SOFT, rate=rate, step=2e-3, segments=4) for rate in (100.0, 120.0, 600.0)}
+    motions = {rate: simulate(LIGHT_AND_SOFT, rate=rate, step=2e-3, resolution=4) for rate in (100.0, 120.0, 600.0)}
     for rate, every in ((100.0, 6), (120.0, 5)):
         plain, fine = motions[rate].vertices, motions[600.0].vertices[::every]
         assert len(plain) == len(fine) > 100

@@ -10,10 +10,10 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.schema import Parameters, Window
+from odeform.simulation.errors import SimulationError
 from odeform.simulation.runner import simulate
-from odeform.simulation.scene import get_scene
 from odeform.simulation.scenes import kick
-from odeform.simulation.shell import SimulationError
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
 

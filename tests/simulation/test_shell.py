@@ -10,11 +10,14 @@ import pytest
 import trimesh
 
 from odeform.geometry.rigid import best_rigid
-from odeform.simulation import shell
+from odeform.simulation import flex
+from odeform.simulation.errors import SimulationError
 from odeform.simulation.material import wall_thickness
-from odeform.simulation.objects.ball import GRAVITY, MATERIAL, RADIUS, STEP, stress_free
+from odeform.simulation.objects.ball import MATERIAL, RADIUS, STEP, relaxed, stress_free
+from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.kick import simulate
-from odeform.simulation.shell import Rest, ShellBody, SimulationError, relax_sphere, run
+from odeform.simulation.shell import ShellBody
+from odeform.simulation.stepping import Rest, run
 from odeform.types import Mesh
 
 MASS = 0.5
@@ -23,15 +26,15 @@ soft_and_stiff = pytest.mark.parametrize("bending", [0.3, 3.0])
 
 
 @functools.cache
-def relaxed(bending: float) -> tuple[Mesh, Mesh]:
+def relaxed_ball(bending: float) -> tuple[Mesh, Mesh]:
     sphere = trimesh.creation.icosphere(2, RADIUS)
     mesh = Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces))
-    return relax_sphere(mesh, RADIUS, wall_thickness(bending, MATERIAL), MATERIAL)
+    return relaxed(mesh, RADIUS, wall_thickness(bending, MATERIAL), MATERIAL)
 
 
 def ball(bending: float, gravity: float = 0.0, step: float = STEP) -> ShellBody:
     """At rest without a floor."""
-    reference, rest = relaxed(bending)
+    reference, rest = relaxed_ball(bending)
     body = ShellBody(reference, MASS, wall_thickness(bending, MATERIAL), MATERIAL, step, gravity, floor=False)
     body.positions = rest.points
     return body
@@ -44,7 +47,7 @@ def momentum(body: ShellBody) -> np.ndarray:
 
 @soft_and_stiff
 def test_stress_free_ball_stays_at_rest(bending: float) -> None:
-    _, rest = relaxed(bending)
+    _, rest = relaxed_ball(bending)
     assert np.linalg.norm(rest.points, axis=1).mean() == pytest.approx(RADIUS, abs=1e-9)
     body = ball(bending)
     _, frames = run(body, 0.1, 100.0, lambda _: None)
@@ -114,12 +117,12 @@ def test_a_diverging_run_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.chdir(tmp_path)  # MuJoCo leaves a log where it runs
     parameters = {"mass": 0.3, "bending": 3.0, "force": 1e12, "azimuth": 0.0, "elevation": 0.6}
     with pytest.raises(SimulationError):
-        simulate(parameters, rate=120.0, step=5e-3, segments=4)
+        simulate(parameters, rate=120.0, step=5e-3, resolution=4)
 
 
 def test_an_unconverged_contact_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     body, _, _ = stress_free({"mass": MASS, "bending": 0.6}, 1e-3, segments=4)
-    monkeypatch.setattr(shell, "ITERATIONS", 2)
+    monkeypatch.setattr(flex, "ITERATIONS", 2)
     with pytest.raises(SimulationError, match="converged"):
         run(body, 0.1, 100.0)
 

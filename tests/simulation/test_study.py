@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from odeform.simulation.study import RATE, _condition, _contacts, _rebound, _rmse
+from odeform.simulation.measurements import contacts, rebound
+from odeform.simulation.study import RATE, _condition, _rmse
 from odeform.types import Floats, MotionSequence
 
 
@@ -21,30 +22,30 @@ def moved(vertices: Floats) -> MotionSequence:
 
 def test_contacts_are_those_of_the_lowest_vertex() -> None:
     motion = bobbing(0.0, 100.0, 1.9, -1.0, 2.1, 1.0, above=0.2)
-    assert _contacts(motion) == [slice(0, 1), slice(2, 4), slice(5, 6)]
-    assert _contacts(bobbing(50.0, 40.0, 30.0)) == []
+    assert contacts(motion) == [slice(0, 1), slice(2, 4), slice(5, 6)]
+    assert contacts(bobbing(50.0, 40.0, 30.0)) == []
 
 
 def test_rebound_of_a_drop_is_above_where_it_comes_to_rest() -> None:
     motion = bobbing(500.0, 200.0, 0.0, 120.0, 300.0, 90.0, 0.0, 40.0, 0.0, above=0.2)
-    assert _rebound(motion) == pytest.approx(0.3)
+    assert rebound(motion) == pytest.approx(0.3)
 
 
 def test_rebound_of_a_kick_is_after_its_first_landing() -> None:
     """It starts on the floor, which is no landing."""
-    assert _rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 0.0)) == pytest.approx(0.06)
+    assert rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 0.0)) == pytest.approx(0.06)
     # and need not have come down again when the window ends
-    assert _rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 50.0)) == pytest.approx(0.06)
+    assert rebound(bobbing(0.0, 1.0, 400.0, 0.0, 60.0, 50.0)) == pytest.approx(0.06)
 
 
 def test_rebound_is_that_of_the_centre_of_mass() -> None:
     motion = bobbing(100.0, 0.0, 0.0, 0.0, weights=(0.25, 0.75))
     motion.vertices[2, 1, 2] = 0.08
-    assert _rebound(motion) == pytest.approx(0.75 * 0.08)
+    assert rebound(motion) == pytest.approx(0.75 * 0.08)
 
 
 def test_no_rebound_without_a_landing() -> None:
-    assert _rebound(bobbing(0.0, 1.0, 400.0, 500.0)) is None
+    assert rebound(bobbing(0.0, 1.0, 400.0, 500.0)) is None
 
 
 def test_rmse_is_over_coordinates() -> None:

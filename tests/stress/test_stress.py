@@ -19,12 +19,12 @@ from odeform.models.odeform.inference import LatentTrajectory
 from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load
 from odeform.motion.reduced_motion import ReducedMotion
+from odeform.simulation.physics import energy_gained
 from odeform.solver import tableau
 from odeform.stress import cases as cases_module
 from odeform.stress import consistency, convergence, physics, solvers, stress
 from odeform.stress.cases import draws, shapes
 from odeform.stress.check import Check
-from odeform.stress.physics import energy_gained
 from odeform.stress.stability import map_image, stability_map
 
 REFINED, FINER = (12, 16, 48), (3, 4, 6)  # within the asymptotic range of all methods

@@ -1,4 +1,4 @@
-"""The soft hollow ball that the scenes of this package throw and drop."""
+"""A soft hollow ball."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odeform.geometry.primitives import octasphere
-from odeform.schema import Parameter, Parameters
+from odeform.schema import Parameter, Parameters, Schema
+from odeform.simulation.errors import SimulationError
 from odeform.simulation.material import Material, wall_thickness
+from odeform.simulation.physics import GRAVITY
 from odeform.types import Floats, Mesh
 
 if TYPE_CHECKING:
@@ -17,23 +19,25 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FIXED",
-    "GRAVITY",
     "MATERIAL",
     "NOTES",
     "RADIUS",
+    "RESOLUTIONS",
     "SEGMENTS",
     "STEP",
     "bending",
+    "extremes",
     "mass",
+    "relaxed",
     "rest_mesh",
     "sphere",
     "stress_free",
 ]
 
 RADIUS = 0.100  # m
-GRAVITY = 9.81  # m/s^2
 STEP = 5e-4  # s
-SEGMENTS = 10  # 402 vertices
+SEGMENTS = 10  # along an edge of an octant: 402 vertices
+RESOLUTIONS = (SEGMENTS, 8, 5)
 MATERIAL = Material(young=0.13e6, poisson=0.3, viscosity=19.0, friction=0.5, contact_time=0.002)
 
 NOTES = (
@@ -55,10 +59,12 @@ FIXED = {
 
 
 def mass(low: float, high: float, default: float) -> Parameter:
+    """The parameter `mass`, with its range in kg."""
     return Parameter("mass", "kg", low, high, default, scale="log", description="mass of the ball")
 
 
 def bending(high: float) -> Parameter:
+    """The parameter `bending`, up to `high` N m."""
     return Parameter("bending", "N m", 0.3, high, 0.6, scale="log", description="bending stiffness EI of its wall")
 
 
@@ -75,14 +81,45 @@ def sphere(segments: int = SEGMENTS) -> Mesh:
     return Mesh(ball.points @ np.stack([np.cross(side, up), side, up], axis=1), ball.faces)
 
 
-def stress_free(parameters: Parameters, step: float, segments: int = SEGMENTS) -> tuple[ShellBody, Floats, Mesh]:
-    """The ball at rest, touching the floor: (body, its positions (N, 3) about its centre, its mesh)."""
+def extremes(schema: Schema) -> tuple[Parameters, ...]:
+    """Softest and heaviest, where a ball flattens most; stiffest and lightest, where its contact is hardest."""
+    defaults = schema.complete(None)
+    return tuple(
+        {**defaults, **{p.name: (p.high if (p.name == "bending") == stiff else p.low) for p in schema.learned}}
+        for stiff in (False, True)
+    )
+
+
+def relaxed(mesh: Mesh, radius: float, thickness: float, material: Material) -> tuple[Mesh, Mesh]:
+    """The stress-free ball: (`reference` for the simulator, `rest` shape of mean radius `radius` m, centred at 0).
+
+    A sphere inflates as soon as it is simulated, so the reference is rescaled until its equilibrium has the radius.
+    """
     # here, so that looking at a scene and training on its data need no simulator
-    from odeform.simulation.shell import ShellBody, relax_sphere
+    from odeform.simulation.shell import relax
+
+    scale, mean = 1.0, 0.0
+    for _ in range(20):
+        reference = Mesh(mesh.points * scale, mesh.faces)
+        rest = relax(reference, thickness, material)
+        mean = float(np.linalg.norm(rest.points, axis=1).mean())
+        if abs(mean - radius) < 1e-10:
+            return reference, rest
+        scale *= radius / mean
+    raise SimulationError(f"the ball did not relax to radius {radius} m (last {mean} m) at thickness {thickness:.4f} m")
+
+
+def stress_free(parameters: Parameters, step: float, segments: int = SEGMENTS) -> tuple[ShellBody, Floats, Mesh]:
+    """The ball at rest, touching the floor: (body, its positions (N, 3) m about its centre, its mesh).
+
+    `step` is in seconds; `segments` are along an edge of an octant of the mesh.
+    """
+    # here, so that looking at a scene and training on its data need no simulator
+    from odeform.simulation.shell import ShellBody
 
     mesh = sphere(segments)
     thickness = wall_thickness(parameters["bending"], MATERIAL)
-    reference, rest = relax_sphere(mesh, RADIUS, thickness, MATERIAL)
+    reference, rest = relaxed(mesh, RADIUS, thickness, MATERIAL)
     body = ShellBody(reference, parameters["mass"], thickness, MATERIAL, step, GRAVITY)
     body.positions = rest.points - [0.0, 0.0, rest.points[:, 2].min()]
     return body, rest.points, mesh

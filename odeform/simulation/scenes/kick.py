@@ -7,11 +7,26 @@ import numpy as np
 
 from odeform.geometry.rigid import rotation_z
 from odeform.schema import Parameter, Parameters, Schema, Window
-from odeform.simulation.objects.ball import FIXED, NOTES, SEGMENTS, STEP, bending, mass, rest_mesh, stress_free
+from odeform.simulation.glyphs import Arrow
+from odeform.simulation.measurements import Measurements, bounce_figures, first_contact
+from odeform.simulation.objects.ball import (
+    FIXED,
+    NOTES,
+    RESOLUTIONS,
+    SEGMENTS,
+    STEP,
+    bending,
+    extremes,
+    mass,
+    rest_mesh,
+    stress_free,
+)
+from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
-from odeform.types import Floats, MotionSequence
+from odeform.simulation.stepping import run
+from odeform.types import Floats, MotionSequence, Points
 
-__all__ = ["PULSE", "SCENE", "simulate"]
+__all__ = ["PULSE", "SCENE", "glyphs", "simulate"]
 
 PULSE = 0.020  # s
 SPREAD = math.radians(25.0)  # angular width of the pulse around the struck point
@@ -19,7 +34,7 @@ SPREAD = math.radians(25.0)  # angular width of the pulse around the struck poin
 SCHEMA = Schema(
     scene="kick",
     parameters=(
-        # beyond these ranges the first contact no longer tells mass, bending and force apart: balls that are light and
+        # beyond these ranges the first contact no longer separates mass, bending and force: balls that are light and
         # stiff or kicked flat leave too soon, heavy ones kicked weakly not at all
         mass(0.5, 1.0, 0.7),
         bending(2.0),
@@ -49,19 +64,17 @@ def simulate(
     parameters: Parameters,
     rate: float | None = None,
     step: float = STEP,
-    segments: int = SEGMENTS,
+    resolution: int = SEGMENTS,
     report: Callable[[float], None] = lambda _: None,
 ) -> MotionSequence:
-    """One motion over the scene's window, frames at `rate` Hz (default: the window's).
+    """One motion over the scene's window, with frames at `rate` Hz (default: the window's).
 
-    `report` is given the share that is done. The mesh is oriented with the pulse: the heading is a
-    symmetry of the scene, and a mesh that turns with it keeps this symmetry exact.
+    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the share done. The mesh is
+    oriented with the pulse: the heading is a symmetry of the scene, and a mesh that turns with it keeps this symmetry
+    exact. Raises `SimulationError`.
     """
-    # here, so that looking at a scene and training on its data need no simulator
-    from odeform.simulation.shell import run
-
     window = SCHEMA.window
-    body, rest, mesh = stress_free(parameters, step, segments)
+    body, rest, mesh = stress_free(parameters, step, resolution)
     elevation = parameters["elevation"]
     load = pulse_weights(rest, elevation)[:, None] * pulse_direction(elevation) * parameters["force"]
 
@@ -73,6 +86,20 @@ def simulate(
     return MotionSequence(times, turned.astype(np.float32), mesh.faces, body.weights, dict(parameters))
 
 
+def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
+    """The pulse, on the side towards which it drives the body, with a length in proportion to its force.
+
+    It acts on the far side, low at the back, where the floor would hide most of an arrow.
+    """
+    if not {"force", "elevation"} <= set(parameters):
+        return ()
+    force, size = parameters["force"], float(np.ptp(rest_points, axis=0).max())
+    direction = rotation_z(parameters.get("azimuth", 0.0)) @ pulse_direction(parameters["elevation"])
+    start = 0.5 * (rest_points.min(axis=0) + rest_points.max(axis=0)) + 0.55 * size * direction
+    high = next(p.high for p in SCHEMA.parameters if p.name == "force")
+    return (Arrow(start, size * max(force, 0.0) / high * direction, f"{force:.0f} N", 0.0, PULSE),)
+
+
 SCENE = Scene(
     schema=SCHEMA,
     simulate=simulate,
@@ -80,4 +107,8 @@ SCENE = Scene(
     step=STEP,
     count=700,
     fixed={**FIXED, "pulse_s": PULSE, "pulse_spread_rad": SPREAD},
+    gravity=GRAVITY,
+    resolutions=RESOLUTIONS,
+    glyphs=glyphs,
+    measurements=Measurements(extremes(SCHEMA), ("mass", "bending", "force"), first_contact, bounce_figures),
 )

@@ -6,19 +6,24 @@ from collections.abc import Callable
 import numpy as np
 
 from odeform.schema import Parameters, Schema, Window
+from odeform.simulation.errors import SimulationError
+from odeform.simulation.measurements import Measurements, bounce_figures, first_contact
 from odeform.simulation.objects.ball import (
     FIXED,
-    GRAVITY,
     NOTES,
     RADIUS,
+    RESOLUTIONS,
     SEGMENTS,
     STEP,
     bending,
+    extremes,
     mass,
     rest_mesh,
     stress_free,
 )
+from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
+from odeform.simulation.stepping import Rest, run
 from odeform.types import Mesh, MotionSequence
 
 __all__ = ["SCENE", "simulate"]
@@ -44,19 +49,16 @@ def simulate(
     parameters: Parameters,
     rate: float | None = None,
     step: float = STEP,
-    segments: int = SEGMENTS,
+    resolution: int = SEGMENTS,
     report: Callable[[float], None] = lambda _: None,
 ) -> MotionSequence:
-    """One drop until the ball rests, frames at `rate` Hz (default: the window's).
+    """One drop until the ball rests, with frames at `rate` Hz (default: the window's).
 
-    `report` is given the share that is done. A stress-free ball falls as a point does; the simulator takes
-    over shortly before it lands.
+    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the share done. A stress-free ball
+    falls as a point does; the simulator takes over shortly before it lands. Raises `SimulationError`.
     """
-    # here, so that looking at a scene and training on its data need no simulator
-    from odeform.simulation.shell import Rest, SimulationError, run
-
     rate = rate or SCHEMA.window.rate
-    body, rest, mesh = stress_free(parameters, step, segments)
+    body, rest, mesh = stress_free(parameters, step, resolution)
     clearance = HEIGHT + rest[:, 2].min()
     landing = math.sqrt(2.0 * clearance / GRAVITY)
     begin = (landing - 5e-3) // STEP * STEP
@@ -95,4 +97,7 @@ SCENE = Scene(
     step=STEP,
     count=500,
     fixed={**FIXED, "height_m": HEIGHT, "rest_speed_m_s": REST_SPEED, "rest_time_s": REST_TIME},
+    gravity=GRAVITY,
+    resolutions=RESOLUTIONS,
+    measurements=Measurements(extremes(SCHEMA), ("mass", "bending"), first_contact, bounce_figures),
 )

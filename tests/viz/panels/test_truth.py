@@ -28,7 +28,7 @@ ENTRIES = open_dataset("mass-elastic").select("test")
 def coarse(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
     """A kick of a quarter of the vertices; in this module, for the job's process to find it."""
     assert scene == "kick"
-    return replace(kick_scene.SCENE, step=2e-3).simulate(parameters, rate=rate, report=report, segments=4)
+    return replace(kick_scene.SCENE, step=2e-3).simulate(parameters, rate=rate, report=report, resolution=4)
 
 
 def at_rest(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:

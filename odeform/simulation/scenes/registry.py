@@ -1,0 +1,35 @@
+"""The scenes that can be simulated, by name."""
+
+from importlib import import_module
+
+from odeform.errors import InputError
+from odeform.simulation.scene import Scene
+
+__all__ = ["SCENES", "find_scene", "get_scene", "known_scenes"]
+
+SCENES: dict[str, str] = {
+    "mass-elastic": "odeform.simulation.scenes.mass_elastic:SCENE",
+    "kick": "odeform.simulation.scenes.kick:SCENE",
+}
+"""Scene name to "module:attribute", imported when the scene is first asked for."""
+
+
+def known_scenes() -> tuple[str, ...]:
+    """Names of all scenes."""
+    return tuple(SCENES)
+
+
+def find_scene(name: str) -> Scene | None:
+    """The scene of that name, or None. Imported data may belong to a scene that cannot be simulated."""
+    if name not in SCENES:
+        return None
+    module, attribute = SCENES[name].split(":")
+    return getattr(import_module(module), attribute)
+
+
+def get_scene(name: str) -> Scene:
+    """The scene of that name; `InputError` where there is none."""
+    scene = find_scene(name)
+    if scene is None:
+        raise InputError(f"unknown scene {name!r}: expected one of {', '.join(SCENES)}")
+    return scene
