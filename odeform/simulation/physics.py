@@ -99,7 +99,9 @@ def energy_gain(bound: float = 0.05, gravity: float = GRAVITY, driven: float = 0
 
     def figure(motion: SampledMotion) -> float:
         points = _points(motion)
-        return energy_gained(motion.fine_times, motion.fine_poses, points, surface_weights(motion.rest), gravity, driven)
+        return energy_gained(
+            motion.fine_times, motion.fine_poses, points, surface_weights(motion.rest), gravity, driven
+        )
 
     return PhysicalCheck("energy_gained_after_impact", bound, figure)
 
