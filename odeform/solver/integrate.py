@@ -43,7 +43,7 @@ class SolverSettings:
             raise InputError("quality: expected either a step or a tolerance")
         if self.step is not None and not self.step > 0.0:
             raise InputError(f"quality: expected a positive step, got {self.step}")
-        if self.tolerance is not None and (method.error is None or not self.tolerance > 0.0):
+        if self.tolerance is not None and (method.embedded is None or not self.tolerance > 0.0):
             raise InputError(f"quality: {self.method} cannot control its step with tolerance {self.tolerance}")
         if self.dtype not in ("float32", "float64"):
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")

@@ -1,75 +1,80 @@
 """The stages of a Runge-Kutta step: slopes, and weighted sums of them."""
 
 from collections.abc import Callable
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
 
-from odeform.solver.tableau import Tableau
+from odeform.solver.tableau import Row, Tableau, rounded
+from odeform.types import Floats
 
 __all__ = ["Field", "Stages", "gemv"]
 
 Field = Callable[[float, Any], Any]
-EXACT = 10**6  # denominators of tableaux are smaller
+"""(time in s, state (n,)) -> slope (n,)."""
 
 
 def gemv(dtype: np.dtype) -> Callable[..., Any]:
-    """(alpha, a, x, beta=0, y=0) -> alpha a x + beta y: of BLAS, or, in precisions that it does not know, of numpy."""
+    """(alpha, a, x, beta=0, y=0) -> alpha a x + beta y: by BLAS, or by numpy in precisions that BLAS lacks."""
     if dtype.char in "fd":
         return get_blas_funcs(("gemv",), dtype=dtype)[0]
     return lambda alpha, a, x, beta=0.0, y=0.0: alpha * (a @ x) + beta * y
 
 
 class Stages:
-    """The slopes within a step of `method` from states like `start`, arrays (n,).
+    """The slopes within a step of `method`, for states like `start`: arrays (n,) of one dtype.
 
-    They are columns of one array: for small states a sum as one product costs a fraction of one term by term.
+    The slopes are columns of one array: for small states, a sum as one matrix product costs a fraction of a sum term by
+    term.
     """
 
     def __init__(self, method: Tableau, start: Any) -> None:
         self.method = method
-        rows = [*method.a[1:], *(() if method.fsal else (method.b,))]
-        nodes = (*method.c[1:], *(() if method.fsal else (1.0,)))
+        dtype = start.dtype
+        rows: tuple[Row, ...] = (*method.a[1:], *(() if method.fsal else (method.b,)))
+        nodes = [float(node) for node in (*method.c[1:], *(() if method.fsal else (1,)))]
         self.evaluations = len(rows)
-        """What a step takes."""
-        self._slopes = np.empty((len(start), self.evaluations + 1), start.dtype, order="F")
-        self._product = gemv(start.dtype)
-        weighed = [self._weigh(row) for row in rows]
-        self._stages = list(zip(range(1, len(rows) + 1), weighed, nodes, strict=True))
-        self._error = self._weigh(method.error or ())
-        self._middle = self._weigh(method.middle or ())
+        """Evaluations of the field per step."""
+        self._slopes = np.empty((len(start), self.evaluations + 1), dtype, order="F")
+        self._product = gemv(dtype)
+        weighted = [self._weighted(rounded(row, dtype)) for row in rows]
+        self._stages = list(zip(range(1, len(rows) + 1), weighted, nodes, strict=True))
+        self._error = self._weighted(_error_weights(method, dtype))
+        self._middle = self._weighted(rounded(method.middle or (), dtype))
 
-    def _weigh(self, row: tuple[float, ...]) -> Any:
-        dtype = self._slopes.dtype
-        if dtype.char in "fd":
-            return self._slopes[:, : len(row)], np.array(row, dtype)
-        # beyond double precision the fractions that the numbers stand for
-        fractions = [Fraction(weight).limit_denominator(EXACT) for weight in row]
-        exact = [dtype.type(f.numerator) / dtype.type(f.denominator) for f in fractions]
-        return self._slopes[:, : len(row)], np.array(exact, dtype)
+    def _weighted(self, weights: Floats) -> tuple[Floats, Floats]:
+        """The slopes that weights belong to, and the weights."""
+        return self._slopes[:, : len(weights)], weights
 
-    def _ahead(self, state: Any, weighed: Any, step: float) -> Any:
+    def _advanced(self, state: Any, weighted: tuple[Floats, Floats], step: float) -> Any:
         """state + step * sum_i weights[i] slopes[i]"""
-        slopes, weights = weighed
+        slopes, weights = weighted
         return self._product(step, slopes, weights, 1.0, state)
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
-        """The state after one step, and the slope there."""
+        """One step from `state` (n,) with `slope` (n,) at `time`: the state after it, and the slope there."""
         after = state
         self._slopes[:, 0] = slope
-        for index, weighed, node in self._stages:
-            after = self._ahead(state, weighed, step)
+        for index, weighted, node in self._stages:
+            after = self._advanced(state, weighted, step)
             slope = field(time + node * step, after)
             self._slopes[:, index] = slope
         return after, slope
 
     def error(self, step: float) -> Any:
-        """What the embedded method says that the last step is off."""
+        """(n,) error of the last step as the embedded method estimates it."""
         slopes, weights = self._error
         return self._product(step, slopes, weights)
 
     def middle(self, state: Any, step: float) -> Any:
-        """The state halfway through the last step, from `state`."""
-        return self._ahead(state, self._middle, step)
+        """(n,) state halfway through the last step, which began at `state`."""
+        return self._advanced(state, self._middle, step)
+
+
+def _error_weights(method: Tableau, dtype: np.dtype) -> Floats:
+    """(s,) b - embedded; each is rounded first, which step control has always been computed with."""
+    if method.embedded is None:
+        return np.empty(0, dtype)
+    wide = np.promote_types(dtype, np.float64)
+    return (rounded(method.b, wide) - rounded(method.embedded, wide)).astype(dtype)

@@ -1,81 +1,86 @@
-"""Explicit Runge-Kutta methods as Butcher tableaux."""
+"""Explicit Runge-Kutta methods as Butcher tableaux of exact fractions."""
 
 from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
 
 from odeform.errors import InputError
+from odeform.types import Floats
 
-__all__ = ["METHODS", "Tableau", "get_method"]
+__all__ = ["METHODS", "Row", "Tableau", "get_method", "rounded"]
+
+Row = tuple[Fraction, ...]
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """`a` (lower triangle), `b`, `c`; `error` = b - b* for an embedded pair; `fsal`: the last stage is the next first.
-
-    `middle` are weights of the stages for the state at half a step, where the method has a quartic interpolant.
-    """
+    """Coefficients of a method with s stages."""
 
     name: str
     order: int
-    a: tuple[tuple[float, ...], ...]
-    b: tuple[float, ...]
-    c: tuple[float, ...]
-    error: tuple[float, ...] | None = None
+    a: tuple[Row, ...]
+    """Lower triangle, row i of i entries: the weights of earlier slopes in stage i."""
+    b: Row
+    """(s,) weights of the slopes in the step."""
+    c: Row
+    """(s,) nodes, as a share of the step."""
+    embedded: Row | None = None
+    """(s,) weights of the embedded method, whose difference to `b` estimates the error of a step."""
     fsal: bool = False
-    middle: tuple[float, ...] | None = None
+    """First same as last: the last stage is the first of the next step."""
+    middle: Row | None = None
+    """(s,) weights for the state at half the step, where the method has a quartic interpolant."""
 
 
-EULER = Tableau("euler", 1, ((),), (1.0,), (0.0,))
-MIDPOINT = Tableau("midpoint", 2, ((), (1 / 2,)), (0.0, 1.0), (0.0, 1 / 2))
-RK4 = Tableau(
-    "rk4",
-    4,
-    ((), (1 / 2,), (0.0, 1 / 2), (0.0, 0.0, 1.0)),
-    (1 / 6, 1 / 3, 1 / 3, 1 / 6),
-    (0.0, 1 / 2, 1 / 2, 1.0),
-)
+def rounded(row: Row, dtype: np.dtype) -> Floats:
+    """The fractions in a precision, each correctly rounded to double precision at least."""
+    if dtype.char in "fd":
+        return np.array([float(weight) for weight in row], dtype)
+    return np.array([dtype.type(weight.numerator) / dtype.type(weight.denominator) for weight in row], dtype)
+
+
+def _row(text: str) -> Row:
+    return tuple(Fraction(number) for number in text.split())
+
+
+def _rows(*texts: str) -> tuple[Row, ...]:
+    return tuple(_row(text) for text in texts)
+
+
+EULER = Tableau("euler", 1, _rows(""), _row("1"), _row("0"))
+MIDPOINT = Tableau("midpoint", 2, _rows("", "1/2"), _row("0 1"), _row("0 1/2"))
+RK4 = Tableau("rk4", 4, _rows("", "1/2", "0 1/2", "0 0 1"), _row("1/6 1/3 1/3 1/6"), _row("0 1/2 1/2 1"))
 # Bogacki & Shampine 1989, Appl. Math. Lett. 2(4)
 BOSH3 = Tableau(
     "bosh3",
     3,
-    ((), (1 / 2,), (0.0, 3 / 4), (2 / 9, 1 / 3, 4 / 9)),
-    (2 / 9, 1 / 3, 4 / 9, 0.0),
-    (0.0, 1 / 2, 3 / 4, 1.0),
-    error=(2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8),
+    a=_rows("", "1/2", "0 3/4", "2/9 1/3 4/9"),
+    b=_row("2/9 1/3 4/9 0"),
+    c=_row("0 1/2 3/4 1"),
+    embedded=_row("7/24 1/4 1/3 1/8"),
     fsal=True,
 )
 # Dormand & Prince 1980; state at half a step from Shampine 1986, Math. Comp. 46(173)
 DOPRI5 = Tableau(
     "dopri5",
     5,
-    (
-        (),
-        (1 / 5,),
-        (3 / 40, 9 / 40),
-        (44 / 45, -56 / 15, 32 / 9),
-        (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
-        (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
-        (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+    a=_rows(
+        "",
+        "1/5",
+        "3/40 9/40",
+        "44/45 -56/15 32/9",
+        "19372/6561 -25360/2187 64448/6561 -212/729",
+        "9017/3168 -355/33 46732/5247 49/176 -5103/18656",
+        "35/384 0 500/1113 125/192 -2187/6784 11/84",
     ),
-    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0.0),
-    (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0),
-    error=(
-        35 / 384 - 5179 / 57600,
-        0.0,
-        500 / 1113 - 7571 / 16695,
-        125 / 192 - 393 / 640,
-        -2187 / 6784 + 92097 / 339200,
-        11 / 84 - 187 / 2100,
-        -1 / 40,
-    ),
+    b=_row("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
+    c=_row("0 1/5 3/10 4/5 8/9 1 1"),
+    embedded=_row("5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40"),
     fsal=True,
-    middle=(
-        6025192743 / 30085553152 / 2,
-        0.0,
-        51252292925 / 65400821598 / 2,
-        -2691868925 / 45128329728 / 2,
-        187940372067 / 1594534317056 / 2,
-        -1776094331 / 19743644256 / 2,
-        11237099 / 235043384 / 2,
+    middle=_row(
+        "6025192743/60171106304 0 51252292925/130801643196 -2691868925/90256659456 187940372067/3189068634112 "
+        "-1776094331/39487288512 11237099/470086768"
     ),
 )
 
@@ -83,6 +88,7 @@ METHODS = {method.name: method for method in (EULER, MIDPOINT, RK4, BOSH3, DOPRI
 
 
 def get_method(name: str) -> Tableau:
+    """The method of that name. Raises `InputError` for an unknown one."""
     if name not in METHODS:
         raise InputError(f"unknown solver {name!r}: expected one of {', '.join(METHODS)}")
     return METHODS[name]
