@@ -1,4 +1,4 @@
-"""Colours of models, of the truth and of errors, shared by the page and by recordings."""
+"""Colors of models, of the truth and of errors, shared by the page and by recordings."""
 
 from odeform_viz.columns import Column
 
@@ -20,15 +20,15 @@ BACKGROUND: Color = (188, 190, 186)
 """The part of a scene that does not move."""
 ARROW: Color = (190, 20, 20)
 HANDLE: Color = (214, 96, 48)
-"""What the user drags, and the brand colour of the page."""
+"""What the user drags, and the brand color of the page."""
 
 
 def color_of(column: Column) -> Color:
-    """The colour of a column: a model has one of its own, the truth is grey."""
+    """The color of a column: a model has one of its own, the truth is gray."""
     return TRUTH if column.truth else MODELS[column.color_index % len(MODELS)]
 
 
 def paler(color: Color) -> Color:
-    """The second colour of a checkerboard: a body of one colour hides its rotation."""
+    """The second color of a checkerboard: a body of one color hides its rotation."""
     red, green, blue = (round(0.45 * channel + 0.55 * 235) for channel in color)
     return red, green, blue

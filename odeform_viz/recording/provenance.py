@@ -1,4 +1,4 @@
-"""Where a column comes from, in plain values: enough to make it again elsewhere, and to notice that it is another."""
+"""Where a column comes from, as plain values: enough to load it again elsewhere, and to notice if it has changed."""
 
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,18 +14,18 @@ __all__ = ["origin_of", "provenance_of", "versions"]
 
 
 def versions() -> dict[str, str]:
-    """What computes and what draws, by package. None is imported for it."""
+    """The versions of the packages that compute and draw. None of them is imported."""
     found = {}
     for package in ("odeform", "numpy", "scipy", "torch", "rerun-sdk", "viser"):
         try:
             found[package] = version(package)
-        except PackageNotFoundError:  # a clone on the path
+        except PackageNotFoundError:  # a clone on the path, not installed
             found[package] = "unknown"
     return found
 
 
 def provenance_of(column: Column) -> dict[str, Any]:
-    """Model or truth, origin, shape and fit. Files are named by their whole path, what is bundled by its name."""
+    """Label, origin, pinned parameters and shape of a column; its model's checkpoint, or the truth's parameters."""
     truth = column.truth
     common = {
         "label": column.label,
@@ -54,13 +54,13 @@ def _kind(geometry: Geometry) -> str:
 
 
 def origin_of(column: Column) -> str:
-    """The checkpoint or the DATASET/NAME of a column: bundled ones by name, others by their whole path."""
+    """The checkpoint or DATASET/NAME of a column: by name if bundled, else by absolute path; empty if there is none."""
     if not column.origin:
         return ""
     if column.truth is None:
         bundled = resolve_checkpoint(column.origin) in bundled_checkpoints().values()
         return column.origin if bundled else str(Path(column.origin).resolve())
     root, _, name = column.origin.rpartition("/")
-    place = Path(root)
-    here = place.is_file() or (place / INDEX).exists()
-    return f"{place.resolve()}/{name}" if here else column.origin
+    folder = Path(root)
+    local = folder.is_file() or (folder / INDEX).exists()
+    return f"{folder.resolve()}/{name}" if local else column.origin

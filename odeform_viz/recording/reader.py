@@ -1,4 +1,4 @@
-"""What a recording holds, and how it is read back: plain values and arrays. Nothing is unpickled."""
+"""Reads a recording back as plain values and arrays. Nothing is unpickled."""
 
 import json
 import warnings
@@ -13,35 +13,9 @@ from rerun.chunk import Chunk, RrdReader
 
 from odeform.errors import InputError
 from odeform.types import Faces, Floats, Points
+from odeform_viz.recording.entities import END, FORMAT, FRAME, HEADER, OLD_REQUEST, PROVENANCE, REQUEST, REST, WORLD
 
-__all__ = [
-    "END",
-    "FORMAT",
-    "HEADER",
-    "MOTION",
-    "PROVENANCE",
-    "REQUEST",
-    "REST",
-    "SHOWN",
-    "WORLD",
-    "Recording",
-    "read_recording",
-]
-
-FORMAT = 1
-
-# timelines
-SHOWN = "shown"  # the frames on screen, counted
-MOTION = "motion_time"  # seconds of the motion
-
-# entities; those of columns lie under them as column_KEY/form_N, N counting the shapes that a column has had
-HEADER = "recording"  # format and versions
-REQUEST = "request"  # for each frame what it takes to compute it again
-OLD_REQUEST = "wish"  # its name in recordings of earlier versions
-END = "end"  # how many frames; only a recording that was closed has it
-PROVENANCE = "provenance"
-REST = "rest"
-WORLD = "world"
+__all__ = ["Recording", "read_recording"]
 
 TEXT = "TextDocument:text"
 POSITIONS = ("Mesh3D:vertex_positions", "Points3D:positions")
@@ -49,24 +23,29 @@ POSITIONS = ("Mesh3D:vertex_positions", "Points3D:positions")
 
 @dataclass(eq=False)
 class Recording:
-    """Read back from `path`. Columns go by name, `column_KEY/form_N`; frames are counted from 0.
-
-    `requests` are those of frames, as `{"time", "quality", "parameters", "columns"}`; `columns` says for each name that
-    is shown which frame's points it shows. `rest` are points (N, 3) in metres and `faces` (F, 3) those of meshes;
-    `poses` (4, 4) in metres by name and frame. `frames` is how many there were at the end; None if there was no end.
-    """
+    """The contents of `path`. Columns are keyed by name, `column_KEY/form_N`; frames are counted from 0."""
 
     path: Path
     header: Mapping[str, Any] = field(default_factory=dict)
+    """Format and versions of packages."""
     columns: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+    """The provenance of each column."""
     requests: dict[int, Mapping[str, Any]] = field(default_factory=dict)
+    """For each frame `{"time", "quality", "parameters", "columns"}`.
+
+    `columns` gives, for each visible column, the frame in which its points were logged.
+    """
     rest: dict[str, Points] = field(default_factory=dict)
+    """(N, 3) m: the points of each column at rest."""
     faces: dict[str, Faces] = field(default_factory=dict)
+    """(F, 3): the faces of columns that are meshes."""
     poses: dict[tuple[str, int], Floats] = field(default_factory=dict)
+    """(4, 4), in m: the pose of a column in a frame."""
     frames: int | None = None
+    """The number of frames; None if the recording was not closed."""
 
     def points(self) -> Iterator[tuple[str, int, Points]]:
-        """Name, frame and points (N, 3) in metres before the pose, one at a time: they may be more than fits memory."""
+        """Column, frame and points (N, 3) in m before the pose, read one by one: they may not fit into memory."""
         for chunk in _chunks(self.path, list(POSITIONS)):
             kind, _, name = chunk.entity_path.strip("/").partition("/")
             if kind == WORLD and not chunk.is_static:
@@ -77,17 +56,17 @@ class Recording:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """All but the points of frames. `InputError` in one line for what is no recording of ODeform, or is damaged."""
+    """Read everything but the points of frames. `InputError` for other files and for damaged ones."""
     recording = Recording(Path(path))
     try:
         for chunk in _chunks(recording.path):
-            _take(recording, chunk)
+            _read_chunk(recording, chunk)
     except InputError:
         raise
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise _refused(path, f"damaged: {error}") from None
     if not recording.header:
-        raise _refused(path, "a Rerun recording, but none of ODeform that can be replayed")
+        raise _refused(path, "a Rerun recording, but not one of ODeform")
     return recording
 
 
@@ -100,7 +79,7 @@ def _chunks(path: Path, components: list[str] | None = None) -> Iterator[Chunk]:
         raise _refused(path, "there is no such file")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that there is no footer, where the process was killed
+            warnings.simplefilter("ignore")  # a killed process leaves no footer
             stream = RrdReader(path).stream()
         yield from stream if components is None else stream.filter(components=components)
     except (RuntimeError, ValueError) as error:
@@ -109,11 +88,11 @@ def _chunks(path: Path, components: list[str] | None = None) -> Iterator[Chunk]:
         raise _refused(path, why) from None
 
 
-def _take(recording: Recording, chunk: Chunk) -> None:
-    """What one chunk holds of a recording."""
+def _read_chunk(recording: Recording, chunk: Chunk) -> None:
+    """Add the contents of one chunk to a recording."""
     kind, _, name = chunk.entity_path.strip("/").partition("/")
     batch = chunk.to_record_batch()
-    held = set(batch.schema.names)
+    components = set(batch.schema.names)
     if kind in (REQUEST, OLD_REQUEST):
         recording.requests.update({frame: json.loads(_text(row)) for frame, row in _rows(batch, TEXT)})
     elif kind == HEADER:
@@ -124,14 +103,14 @@ def _take(recording: Recording, chunk: Chunk) -> None:
         recording.columns[name] = json.loads(_text(batch.column(TEXT)[0]))
     elif kind == REST:
         recording.rest[name] = _floats(batch.column(POSITIONS[1])[0], 3)
-    elif kind == WORLD and "Mesh3D:triangle_indices" in held:
+    elif kind == WORLD and "Mesh3D:triangle_indices" in components:
         faces = batch.column("Mesh3D:triangle_indices")[0].values.flatten().to_numpy()
         recording.faces[name.removesuffix("/body")] = faces.astype(np.int64).reshape(-1, 3)
-    elif kind == WORLD and "Transform3D:mat3x3" in held:
+    elif kind == WORLD and "Transform3D:mat3x3" in components:
         shifts = dict(_rows(batch, "Transform3D:translation"))
         for frame, row in _rows(batch, "Transform3D:mat3x3"):
             pose = np.eye(4)
-            pose[:3, :3] = _floats(row, 3).T  # Rerun writes matrices by columns
+            pose[:3, :3] = _floats(row, 3).T  # Rerun stores matrices by columns
             pose[:3, 3] = _floats(shifts[frame], 3)[0]
             recording.poses[name.removesuffix("/body"), frame] = pose
 
@@ -139,14 +118,15 @@ def _take(recording: Recording, chunk: Chunk) -> None:
 def _header(path: Path, header: Mapping[str, Any]) -> Mapping[str, Any]:
     found = header.get("odeform_recording")
     if found != FORMAT:
-        raise _refused(path, f"expected format {FORMAT}, got {found!r}, of odeform {header['versions'].get('odeform')}")
+        made_by = header["versions"].get("odeform")
+        raise _refused(path, f"expected format {FORMAT}, got format {found!r}, written by odeform {made_by}")
     return header
 
 
 def _rows(batch: pa.RecordBatch, component: str) -> Iterator[tuple[int, pa.ListScalar]]:
-    """Frame and value where there is one."""
+    """Frame and value of the rows that have a value."""
     column = batch.column(component)
-    for frame, row in zip(batch.column(SHOWN).to_pylist(), column, strict=True):
+    for frame, row in zip(batch.column(FRAME).to_pylist(), column, strict=True):
         if row.values is not None and len(row.values):
             yield frame, row
 

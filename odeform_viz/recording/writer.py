@@ -1,267 +1,130 @@
-"""Frames -> Rerun. One recording a session, from which every frame can be computed again."""
+"""Writes what is shown to a Rerun recording, from which every frame can be computed again."""
 
 import json
 import os
 import shutil
 import time
 import uuid
-from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from odeform.errors import InputError
-from odeform.geometry.normals import vertex_normals
-from odeform.motion.base import Motion
-from odeform.motion.recorded import RecordedMotion
-from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Points
-from odeform_viz.colors import Color, color_of, paler
+from odeform.types import Geometry
 from odeform_viz.columns import Column
-from odeform_viz.recording.provenance import provenance_of, versions
-from odeform_viz.recording.reader import END, FORMAT, HEADER, MOTION, PROVENANCE, REQUEST, REST, SHOWN, WORLD
-from odeform_viz.view import ColumnFrame, Frame
+from odeform_viz.recording.blueprint import make_blueprint
+from odeform_viz.recording.entities import END, FORMAT, FRAME, HEADER, REQUEST, TIME, WORLD
+from odeform_viz.recording.logged_column import LoggedColumn, log_still
+from odeform_viz.recording.provenance import versions
+from odeform_viz.view import Frame
 
 __all__ = ["Recorder"]
 
-STILL = f"{WORLD}/still"
-TINY = 1e-6  # m; points that moved less than this before the pose are not sent again
-FLUSH = 1.0  # s of what was shown that a killed process loses at most
-PATIENCE = 10.0  # s that a disk may take
-PLOTS = {  # views of curves, and the quantities in each: a scale of its own for each quantity
-    "curves": ("height_m", "deformation_mm"),
-    "errors": ("rmse_mm", "mae_mm", "worst_mm"),
-    "statistics": ("evaluations", "wall_ms", "solver_error_mm"),
-}
-
-
-@dataclass(eq=False)
-class _Form:
-    """A column of one shape: its name in the recording, and what was last sent of it."""
-
-    name: str
-    column: Column
-    number: int
-    motion: Motion | RecordedMotion | None = None
-    points: Points | None = None
-    frame: int = -1
-    """The frame that the points were sent in."""
-    status: str = ""
+FLUSH = 1.0  # s between flushes; a killed process loses at most this much
+FLUSH_TIMEOUT = 10.0  # s
 
 
 class Recorder:
-    """Logs every published frame to a file. Use from one thread: Rerun's clock is thread-local."""
+    """Logs every published frame to a file. Use it from one thread: Rerun's current time is thread-local."""
 
     def __init__(self, path: str | Path) -> None:
-        """`InputError` for a place where nothing can be written."""
+        """Start a recording. `InputError` if the file cannot be written."""
         self.path = Path(path)
         self.frames = 0
-        self._forms: dict[int, _Form] = {}
-        self._present: dict[str, _Form] = {}
+        """Frames logged so far."""
+        self._columns: dict[int, LoggedColumn] = {}
+        self._visible: dict[str, LoggedColumn] = {}
         self._still: Geometry | None = None
+        self._stream = self._open()
+        self._flushed_size, self._flushed_at = 0, 0.0
+        self._stream.log(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._log_json(HEADER, {"odeform_recording": FORMAT, "versions": versions()}, static=True)
+        self._flush()
+
+    def _open(self) -> rr.RecordingStream:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open("ab"):
                 pass
         except OSError as error:
-            raise InputError(f"recording {path}: cannot be written: {error.strerror}") from None
-        # fewer, longer chunks than by default: each costs a kilobyte of file and, until its end, some of memory
+            raise InputError(f"recording {self.path}: cannot be written: {error.strerror}") from None
+        # fewer, longer chunks than by default: each takes a kilobyte in the file and, until the end, in memory
         batches = rr.ChunkBatcherConfig(flush_tick=FLUSH)
-        self._stream = rr.RecordingStream("odeform", recording_id=uuid.uuid4(), batcher_config=batches)
-        self._sound, self._flushed = 0, 0.0
+        stream = rr.RecordingStream("odeform", recording_id=uuid.uuid4(), batcher_config=batches)
         try:
-            self._stream.save(str(path))
+            stream.save(str(self.path))
         except RuntimeError as error:
-            raise InputError(f"recording {path}: cannot be written: {error}") from None
-        self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self._log_json(HEADER, {"odeform_recording": FORMAT, "versions": versions()}, static=True)
-        self._flush()
+            raise InputError(f"recording {self.path}: cannot be written: {error}") from None
+        return stream
 
     def log(self, frame: Frame) -> None:
-        """`InputError` where no more can be written; the recording is then over, and whole up to its last second."""
-        self._stream.set_time(SHOWN, sequence=self.frames)
-        self._stream.set_time(MOTION, duration=frame.request.time)
-        known = list(self._forms.values())
-        shown = [(self._form(column), column) for column in frame.columns]
-        if list(self._forms.values()) != known:
-            self._stream.send_blueprint(_blueprint(self._forms.values()), make_default=True)
-        present = {form.name: form for form, _ in shown}
-        for name in self._present.keys() - present.keys():
-            self._stream.log(f"{WORLD}/{name}", rr.Clear(recursive=True))
-            self._present[name].points = self._present[name].motion = None
-        self._present = present
-        self._log_still(frame)
+        """Log one frame. `InputError` if the disk is full; the file then ends with the last second flushed."""
+        self._stream.set_time(FRAME, sequence=self.frames)
+        self._stream.set_time(TIME, duration=frame.request.time)
+        known = list(self._columns.values())
+        visible = [(self._column(shown.column), shown) for shown in frame.columns]
+        if list(self._columns.values()) != known:
+            self._stream.send_blueprint(make_blueprint(self._columns.values()), make_default=True)
+        self._clear_hidden({logged.name: logged for logged, _ in visible})
+        if frame.still is not self._still:
+            self._still = frame.still
+            log_still(self._stream, frame.still)
         for name, value in frame.request.parameters.items():
             self._stream.log(["parameters", name], rr.Scalars(value))
-        for form, column in shown:
-            self._log_column(form, column, frame.request.time)
-        request = {
-            "time": float(frame.request.time),
-            "quality": frame.request.quality,
-            "parameters": {name: float(value) for name, value in frame.request.parameters.items()},
-            "columns": {name: form.frame for name, form in present.items()},
-        }
-        self._log_json(REQUEST, request)
+        for logged, shown in visible:
+            logged.log(shown, frame.request.time, self.frames)
+        self._log_request(frame)
         self.frames += 1
-        if time.monotonic() - self._flushed > FLUSH:
+        if time.monotonic() - self._flushed_at > FLUSH:
             self._flush()
 
     def close(self) -> None:
-        """`InputError` where the end could not be written any more."""
+        """Complete the recording. `InputError` if its end cannot be written."""
         self._log_json(END, {"frames": self.frames}, static=True)
         self._flush()
         self._stream.disconnect()
 
+    def _column(self, column: Column) -> LoggedColumn:
+        """The column with its current shape; a new shape starts a new entity."""
+        logged = self._columns.get(column.key)
+        if logged is None or logged.column.geometry is not column.geometry:
+            number = 0 if logged is None else logged.number + 1
+            logged = self._columns[column.key] = LoggedColumn(self._stream, column, number)
+        return logged
+
+    def _clear_hidden(self, visible: dict[str, LoggedColumn]) -> None:
+        for name in self._visible.keys() - visible.keys():
+            self._stream.log(f"{WORLD}/{name}", rr.Clear(recursive=True))
+            self._visible[name].forget()
+        self._visible = visible
+
+    def _log_request(self, frame: Frame) -> None:
+        request = {
+            "time": float(frame.request.time),
+            "quality": frame.request.quality,
+            "parameters": {name: float(value) for name, value in frame.request.parameters.items()},
+            "columns": {name: logged.frame for name, logged in self._visible.items()},
+        }
+        self._log_json(REQUEST, request)
+
+    def _log_json(self, entity: str, value: Any, static: bool = False) -> None:
+        """Log plain values as JSON; floats read back exactly."""
+        self._stream.log(entity, rr.TextDocument(json.dumps(value, indent=1)), static=static)
+
     def _flush(self) -> None:
         try:
-            self._stream.flush(timeout_sec=PATIENCE)
-            self._sound, self._flushed = self.path.stat().st_size, time.monotonic()
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT)
+            self._flushed_size, self._flushed_at = self.path.stat().st_size, time.monotonic()
         except (RuntimeError, ValueError, OSError):
             self._stream.disconnect()
-            raise InputError(f"recording {self.path}: {self._give_up()}") from None
+            raise InputError(f"recording {self.path}: {self._truncate()}") from None
 
-    def _give_up(self) -> str:
-        """Cut off what was written in part, so that the rest can be read; what to tell."""
+    def _truncate(self) -> str:
+        """Remove a partly written end, so that the rest can be read; returns the reason for the user."""
         try:
-            os.truncate(self.path, self._sound)
+            os.truncate(self.path, self._flushed_size)
             free = shutil.disk_usage(self.path.parent).free >> 20
         except OSError as error:
             return f"can no longer be written: {error.strerror}"
         return f"can no longer be written, with {free:,} MiB free on its disk; it ends before frame {self.frames}"
-
-    def _log_json(self, path: str, value: Any, static: bool = False) -> None:
-        """Floats are written so that they read back to the last bit."""
-        self._stream.log(path, rr.TextDocument(json.dumps(value, indent=1)), static=static)
-
-    def _form(self, shown: ColumnFrame) -> _Form:
-        """The column with its present shape; what stays is logged when it first appears. Earlier shapes are let go."""
-        column = shown.column
-        form = self._forms.get(column.key)
-        if form is None or form.column.geometry is not column.geometry:
-            # named by key: labels have spaces and signs that mean something in paths
-            number = 0 if form is None else form.number + 1
-            form = self._forms[column.key] = _Form(f"column_{column.key}/form_{number}", column, number)
-            self._log_static(form, color_of(column))
-        return form
-
-    def _log_static(self, form: _Form, color: Color) -> None:
-        column, name = form.column, form.name
-        self._log_json(f"{PROVENANCE}/{name}", provenance_of(column), static=True)
-        points = np.asarray(column.geometry.points, dtype=np.float32)
-        self._stream.log(f"{REST}/{name}", rr.Points3D(points), static=True)
-        body = f"{WORLD}/{name}/body"
-        if isinstance(column.geometry, Mesh):
-            mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=_octants(points, color))
-            self._stream.log(body, mesh, static=True)
-        elif isinstance(column.geometry, GaussianSplats):
-            colors, radii = _look(column.geometry)
-            self._stream.log(body, rr.Points3D.from_fields(colors=colors, radii=radii), static=True)
-        else:
-            self._stream.log(body, rr.Points3D.from_fields(colors=_octants(points, color)), static=True)
-        for view, quantities in PLOTS.items():
-            for quantity in quantities:
-                lines = rr.SeriesLines(names=column.label, colors=color)
-                self._stream.log(f"{view}/{quantity}/{name}", lines, static=True)
-
-    def _log_still(self, frame: Frame) -> None:
-        """What stands still about the columns, when it appears, and that it is gone."""
-        still = frame.still
-        if still is self._still:
-            return
-        self._still = still
-        self._stream.log(STILL, rr.Clear(recursive=True))
-        if isinstance(still, Mesh):
-            self._stream.log(f"{STILL}/mesh", rr.Mesh3D(vertex_positions=still.points, triangle_indices=still.faces))
-        elif still is not None:
-            colors, radii = _look(still) if isinstance(still, GaussianSplats) else (None, None)
-            self._stream.log(f"{STILL}/points", rr.Points3D(still.points, colors=colors, radii=radii))
-
-    def _log_column(self, form: _Form, shown: ColumnFrame, time: float) -> None:
-        body, motion, pose = f"{WORLD}/{form.name}/body", shown.motion, shown.pose
-        # what is too small to be seen is recorded all the same: a replay measures finer
-        points = motion.deformed(time) if shown.points is None else shown.points
-        if form.points is None or not np.abs(points - form.points).max() <= TINY:  # also what is not a number
-            form.points, form.frame = points, self.frames
-            if isinstance(form.column.geometry, Mesh):
-                normals = vertex_normals(points, form.column.geometry.faces)
-                self._stream.log(body, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
-            else:
-                self._stream.log(body, rr.Points3D.from_fields(positions=points))
-        self._stream.log(body, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        self._log_numbers(form, shown, time)
-
-    def _log_numbers(self, form: _Form, shown: ColumnFrame, time: float) -> None:
-        motion, stats, pose = shown.motion, shown.stats, shown.pose
-        centre = np.asarray(form.column.geometry.points, dtype=float).mean(axis=0)
-        numbers: dict[str, float | None] = {
-            "curves/height_m": float(pose[2, :3] @ centre + pose[2, 3]),
-            "curves/deformation_mm": 1e3 * float(motion.deformation_rms(np.array([time]))[0]),
-        }
-        if shown.error is not None:
-            error = shown.error
-            numbers |= {
-                "errors/rmse_mm": error.rmse_mm,
-                "errors/mae_mm": error.mae_mm,
-                "errors/worst_mm": error.worst_mm,
-            }
-        if isinstance(motion, Motion):
-            numbers |= {"statistics/evaluations": float(stats.evaluations), "statistics/wall_ms": stats.wall_ms}
-            # it costs as much as the motion: for those that are looked at for longer than a frame
-            numbers["statistics/solver_error_mm"] = stats.solver_error_mm if motion is form.motion else None
-        for quantity, value in numbers.items():
-            if value is not None:
-                self._stream.log(f"{quantity}/{form.name}", rr.Scalars(value))
-        status = f"{form.column.label}: {stats.solver}, {stats.status}"
-        if status != form.status:
-            level = rr.TextLogLevel.INFO if stats.status == "ok" else rr.TextLogLevel.WARN
-            self._stream.log(f"status/{form.name}", rr.TextLog(status, level=level))
-        form.motion, form.status = motion, status
-
-
-def _look(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
-    """Colours, and radii in metres of spheres as large: Rerun draws no Gaussians."""
-    return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)
-
-
-def _octants(points: Points, color: Color) -> np.ndarray:
-    """(N, 3) the colour and a paler one in turn about the centre: a body of one colour hides how it turns."""
-    odd = np.prod(points - 0.5 * (points.min(axis=0) + points.max(axis=0)), axis=1) > 0.0
-    return np.where(odd[:, None], color, paler(color)).astype(np.uint8)
-
-
-def _blueprint(forms: Iterable[_Form]) -> rrb.Blueprint:
-    """A view in space for each column, curves below."""
-    forms = list(forms)
-    spaces = [
-        rrb.Spatial3DView(
-            origin=WORLD, contents=[f"{WORLD}/column_{f.column.key}/**", f"{STILL}/**"], name=f.column.label
-        )
-        for f in forms
-    ]
-    plots = {
-        view: [rrb.TimeSeriesView(origin=f"{view}/{quantity}", name=quantity) for quantity in quantities]
-        for view, quantities in PLOTS.items()
-    }
-    said = [rrb.TextDocumentView(origin=f"{PROVENANCE}/{f.name}", name=f"of {f.column.label}") for f in forms]
-    return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Horizontal(*spaces),
-            rrb.Horizontal(
-                rrb.TimeSeriesView(origin="parameters", name="parameters"),
-                *plots["curves"],
-                rrb.Tabs(*plots["errors"]),
-                rrb.Tabs(
-                    *plots["statistics"],
-                    rrb.TextLogView(origin="status", name="status"),
-                    rrb.TextDocumentView(origin=REQUEST, name="request"),
-                    *said,
-                ),
-            ),
-            row_shares=[3, 2],
-        ),
-        rrb.TimePanel(timeline=SHOWN, state="collapsed"),
-        collapse_panels=True,
-    )

@@ -63,7 +63,7 @@ class ColumnView:
     def show(
         self, frame: ColumnFrame, lane: float, opacity: float | None, truth: ColumnFrame | None, scale_mm: float | None
     ) -> None:
-        """Show one moment at `lane`, metres along y. Errors are coloured on a scale up to `scale_mm` mm, if given."""
+        """Show one moment at `lane`, metres along y. Errors are colored on a scale up to `scale_mm` mm, if given."""
         self._lane.visible = True
         self._lane.position = (0.0, lane, 0.0)
         # invisible rotations are dropped, so that a body that falls without rotating sends a position only

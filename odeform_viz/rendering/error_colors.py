@@ -1,4 +1,4 @@
-"""Errors on a surface as bands of a colour scale. Each band is a mesh of its own."""
+"""Errors on a surface as bands of a color scale. Each band is a mesh of its own."""
 
 import numpy as np
 from jaxtyping import Float
@@ -8,7 +8,7 @@ from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
 __all__ = ["BANDS", "NearestInterpolation", "band_indices", "scale_for", "split_into_bands"]
 
-# eight even samples of viridis: perceptually uniform, also in greyscale and for colour-blind readers
+# eight even samples of viridis: perceptually uniform, also in grayscale and for color-blind readers
 BANDS = (
     (68, 1, 84),
     (70, 50, 127),
@@ -58,7 +58,7 @@ def split_into_bands(values: Perpoint, faces: Faces, top: float) -> list[tuple[I
 
 
 def scale_for(errors_mm: Floats) -> float:
-    """A round upper end of the colour scale, in mm, for RMS errors over time: 1, 2 or 5 times a power of ten.
+    """A round upper end of the color scale, in mm, for RMS errors over time: 1, 2 or 5 times a power of ten.
 
     It is at least three times the largest error, so that nearly all points stay below it even at the worst time.
     """

@@ -27,7 +27,7 @@ class SceneView:
     def publish(self, frame: Frame, options: DisplayOptions, scale_mm: float | None) -> None:
         """Send one frame; clients never see it half. Paths and arrows follow it.
 
-        Errors against the truth are coloured on a scale up to `scale_mm` mm, if given.
+        Errors against the truth are colored on a scale up to `scale_mm` mm, if given.
         """
         with self._server.atomic():
             self._update_views(frame)

@@ -1,4 +1,4 @@
-"""Nodes of a shape in viser's scene: a mesh as a checkerboard or in error colours, points, Gaussian splats."""
+"""Nodes of a shape in viser's scene: a mesh as a checkerboard or in error colors, points, Gaussian splats."""
 
 from typing import Protocol
 
@@ -19,14 +19,14 @@ class ShapeView(Protocol):
     """A shape in the scene."""
 
     def move(self, points: Points, covariances: Floats | None = None) -> None:
-        """Show the shape at `points` (N, 3) in m, in its own colours.
+        """Show the shape at `points` (N, 3) in m, in its own colors.
 
         `covariances` (N, 3, 3) in m^2 are those of splats; None for those at rest.
         """
         ...
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
-        """Show the shape at `points` (N, 3) in m, coloured by `values` (N,) on a scale from 0 to `top`."""
+        """Show the shape at `points` (N, 3) in m, colored by `values` (N,) on a scale from 0 to `top`."""
         ...
 
     def fade(self, opacity: float | None) -> None:
@@ -128,7 +128,7 @@ class _SplatView:
         self._handle.set_gaussians(self._centers(points), rescaled, self._colors, self._opacities)
 
     def paint(self, points: Points, values: Perpoint, top: float) -> None:
-        """Splats keep their own colours."""
+        """Splats keep their own colors."""
         self.move(points)
 
     def fade(self, opacity: float | None) -> None:

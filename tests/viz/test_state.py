@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from odeform import InputError
 from odeform.geometry.region import Sphere
 from odeform.geometry.shape import fit_to
 from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
@@ -120,3 +122,11 @@ def test_a_wrong_shape_is_refused(view_request: ViewRequest, wrong: dict) -> Non
     whole = fit_to_json(shape_from("volleyball", body))
     with pytest.raises(InputError):
         fit_from_json({**whole, **wrong}, body)
+
+
+def test_an_older_state_file_opens(kick: Predictor) -> None:
+    state = state_from_json((Path(__file__).parent / "state-0.1.json").read_bytes(), "kick")
+    assert (state.time, state.overlay, state.follow) == (0.02, True, False)
+    columns = columns_of(state, kick.schema)
+    assert [(column.label, column.visible) for column in columns] == [("odeform", True), ("heavy", True)]
+    assert columns[1].pinned == kick.schema.complete({"mass": 0.9})

@@ -1,4 +1,4 @@
-"""A recording holds what was shown."""
+"""Recordings hold everything that was shown."""
 
 import json
 import resource
@@ -16,6 +16,7 @@ from odeform.models.base import Predictor
 from odeform.types import PointCloud
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import shape_from
+from odeform_viz.recording import writer
 from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.reader import read_recording
 from odeform_viz.recording.writer import Recorder
@@ -55,7 +56,7 @@ def test_positions_parameters_and_provenance_read_back(kick: Predictor, path: Pa
     assert kick.checkpoint.sha256 in str(provenance)
 
 
-def test_what_reads_back_is_exact(kick: Predictor, path: Path, record: Record) -> None:
+def test_requests_and_shapes_read_back_exactly(kick: Predictor, path: Path, record: Record) -> None:
     times, parameters = (0.1 + 0.2, 1.0 / 3.0), {"mass": 0.1 + 0.3, "force": np.nextafter(100.0, 200.0)}
     frames = record(path, [Column("odeform", kick, kick.rest)], times, parameters)
     recording = read_recording(path)
@@ -68,7 +69,7 @@ def test_what_reads_back_is_exact(kick: Predictor, path: Path, record: Record) -
     assert set(recording.header["versions"]) >= {"odeform", "numpy", "torch", "rerun-sdk", "viser"}
 
 
-def test_points_go_in_only_when_they_move(kick: Predictor, path: Path, record: Record) -> None:
+def test_points_are_logged_only_when_the_body_deforms(kick: Predictor, path: Path, record: Record) -> None:
     record(path, [Column("odeform", kick, kick.rest)], [0.0, 0.0, 0.02, 0.02, 0.03])
     recording = read_recording(path)
     assert [frame for _, frame, _ in recording.points()] == [0, 2, 4]
@@ -76,7 +77,7 @@ def test_points_go_in_only_when_they_move(kick: Predictor, path: Path, record: R
     assert len(recording.poses) == 5
 
 
-def test_errors_curves_and_statistics_are_series(path: Path, record: Record) -> None:
+def test_errors_curves_and_statistics_are_time_series(path: Path, record: Record) -> None:
     truth = truth_column("mass-elastic/" + _a_test_sequence())
     model = _load("mass-elastic")
     columns = [Column("odeform", model, model.rest, origin="mass-elastic"), truth]
@@ -108,17 +109,16 @@ def _load(name: str) -> Predictor:
     return odeform.load(name)
 
 
-def test_any_label_makes_a_sound_path(
+def test_any_label_makes_a_valid_entity(
     kick: Predictor, path: Path, record: Record, capfd: pytest.CaptureFixture[str]
 ) -> None:
     labels = ["kick at 0.4 kg", "kick #2", "kick/pod-rbf (no azimuth)", "Ärger: %$!\\"]
     record(path, [Column(label, kick, kick.rest) for label in labels])
-    said = capfd.readouterr()
-    assert "WARN" not in said.err
+    assert "WARN" not in capfd.readouterr().err
     assert [column["label"] for _, column in sorted(read_recording(path).columns.items())] == labels
 
 
-def test_the_layout_has_a_view_in_space_for_each_column(kick: Predictor, path: Path, record: Record) -> None:
+def test_the_blueprint_has_a_3d_view_for_each_column(kick: Predictor, path: Path, record: Record) -> None:
     record(path, [Column("one", kick, kick.rest), Column("two", kick, kick.rest)])
     reader = rr.chunk.RrdReader(path)
     chunks = [chunk for store in reader.blueprints() for chunk in reader.stream(store=store).to_chunks()]
@@ -133,7 +133,7 @@ def test_the_layout_has_a_view_in_space_for_each_column(kick: Predictor, path: P
     assert any("TimeSeries" in text for text in texts)
 
 
-def test_another_shape_is_another_form_and_hidden_columns_are_cleared(kick: Predictor, path: Path) -> None:
+def test_another_shape_is_another_entity_and_hidden_columns_are_cleared(kick: Predictor, path: Path) -> None:
     columns = Columns.of([Column("one", kick, kick.rest), Column("two", kick, kick.rest)])
     session, recorder = Session(kick.schema), Recorder(path)
     request = ViewRequest(kick.schema.complete({}), 0.02, "balanced", columns.all)
@@ -154,7 +154,7 @@ def test_another_shape_is_another_form_and_hidden_columns_are_cleared(kick: Pred
     assert "/world/column_1/form_0:Clear:is_recursive" in _rows(path)
 
 
-def test_a_file_is_named_by_its_whole_path(kick: Predictor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_named_by_absolute_path(kick: Predictor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "model.safetensors").write_bytes(b"")
     monkeypatch.chdir(tmp_path)
     origin = provenance_of(Column("model", kick, kick.rest, origin="model.safetensors"))["origin"]
@@ -163,7 +163,7 @@ def test_a_file_is_named_by_its_whole_path(kick: Predictor, tmp_path: Path, monk
     json.dumps(provenance_of(Column("model", kick, kick.rest, pinned={"mass": 0.5})))
 
 
-def test_two_recordings_of_one_process_are_two(kick: Predictor, tmp_path: Path, record: Record) -> None:
+def test_each_recording_has_an_id_of_its_own(kick: Predictor, tmp_path: Path, record: Record) -> None:
     ids = set()
     for name in ("one.rrd", "two.rrd"):
         record(tmp_path / name, [Column("odeform", kick, kick.rest)])
@@ -171,7 +171,7 @@ def test_two_recordings_of_one_process_are_two(kick: Predictor, tmp_path: Path, 
     assert len(ids) == 2
 
 
-def test_an_unwritable_place_is_refused_at_once(tmp_path: Path) -> None:
+def test_an_unwritable_path_is_refused_at_once(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="recording"):
         Recorder(tmp_path / "file" / "session.rrd")
@@ -179,7 +179,7 @@ def test_an_unwritable_place_is_refused_at_once(tmp_path: Path) -> None:
 
 @pytest.fixture
 def small_files() -> Iterator[None]:
-    """No file grows beyond 200 kB: a disk that is full."""
+    """Limit files to 200 kB, as a full disk would."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
     yield
@@ -187,10 +187,10 @@ def small_files() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("small_files")
-def test_a_full_disk_is_told_and_what_was_written_reads_back(
+def test_a_full_disk_is_reported_and_earlier_frames_read_back(
     kick: Predictor, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("odeform_viz.recording.writer.FLUSH", 0.0)
+    monkeypatch.setattr(writer, "FLUSH", 0.0)
     columns = Columns.of([Column("odeform", kick, kick.rest)]).all
     session, recorder = Session(kick.schema), Recorder(path)
 
@@ -205,7 +205,8 @@ def test_a_full_disk_is_told_and_what_was_written_reads_back(
     assert recording.frames is None
 
 
-def test_what_stands_still_is_recorded_once(kick: Predictor, path: Path, record: Record) -> None:
+@pytest.mark.slow
+def test_the_still_part_of_a_scene_is_logged_once(kick: Predictor, path: Path, record: Record) -> None:
     fit = shape_from("volleyball", kick.rest)
     record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
     rows = _rows(path)
