@@ -20,7 +20,9 @@ EXAMPLES = {
     if line.startswith("## ")
 }
 ENDS = [*[blocks[0].line if blocks else 0 for blocks in EXAMPLES.values()][1:], 10**9]
-EXAMPLES = {name: [b for b in blocks if b.line < end] for (name, blocks), end in zip(EXAMPLES.items(), ENDS, strict=True)}
+EXAMPLES = {
+    name: [b for b in blocks if b.line < end] for (name, blocks), end in zip(EXAMPLES.items(), ENDS, strict=True)
+}
 
 
 def apply(block: Block, root: Path) -> None:
@@ -74,7 +76,9 @@ def test_the_example_works(name: str, tmp_path: Path):
     assert ran.returncode == 0, ran.stderr
     linted = subprocess.run(
         [sys.executable, "-m", "ruff", "check", "--config", str(ROOT / "pyproject.toml"), "odeform", "odeform_viz"],
-        cwd=tmp_path, capture_output=True, text=True,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert linted.returncode == 0, linted.stdout
 
