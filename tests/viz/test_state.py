@@ -126,7 +126,8 @@ def test_a_wrong_shape_is_refused(view_request: ViewRequest, wrong: dict) -> Non
 
 def test_an_older_state_file_opens(kick: Predictor) -> None:
     state = state_from_json((Path(__file__).parent / "state-0.1.json").read_bytes(), "kick")
-    assert (state.time, state.overlay, state.follow) == (0.02, True, False)
+    assert state.time == 0.02
+    assert state.display == DisplayOptions(overlay=True, error_colors=True, follow=False)
     columns = columns_of(state, kick.schema)
     assert [(column.label, column.visible) for column in columns] == [("odeform", True), ("heavy", True)]
     assert columns[1].pinned == kick.schema.complete({"mass": 0.9})
