@@ -1,0 +1,5 @@
+"""The `odeform` command. Each subcommand is one module here, listed in `odeform.cli.entry.COMMANDS`."""
+
+from odeform.cli.entry import main, run_guarded
+
+__all__ = ["main", "run_guarded"]

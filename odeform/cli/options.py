@@ -1,0 +1,106 @@
+"""Arguments that several commands share, and how their values are read and written."""
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from odeform.errors import InputError
+
+__all__ = [
+    "add_checkpoint",
+    "add_data",
+    "add_json",
+    "add_quality",
+    "add_seed",
+    "add_split",
+    "add_window",
+    "parse_settings",
+    "parse_window",
+    "positive",
+    "write_json",
+]
+
+CHECKPOINT = "checkpoint file (.safetensors, or .pth of the paper's authors), or bundled: kick, kick/pod-rbf, ..."
+DATA = "data set: a folder, an .odp file, or the name of a bundled one"
+
+
+def add_checkpoint(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """CKPT, optional where there is a default."""
+    if default is None:
+        parser.add_argument("checkpoint", metavar="CKPT", help=CHECKPOINT)
+    else:
+        text = f"{CHECKPOINT} (default: {default})"
+        parser.add_argument("checkpoint", nargs="?", default=default, metavar="CKPT", help=text)
+
+
+def add_data(parser: argparse.ArgumentParser, required: bool = True, text: str = DATA) -> None:
+    """--data DATASET."""
+    parser.add_argument("--data", required=required, metavar="DATASET", help=text)
+
+
+def add_split(parser: argparse.ArgumentParser) -> None:
+    """--split."""
+    splits = ("train", "val", "test", "all")
+    parser.add_argument("--split", default="test", choices=splits, help="sequences to use (default: test)")
+
+
+def add_window(parser: argparse.ArgumentParser, purpose: str) -> None:
+    """--window A:B, read by `parse_window`."""
+    text = f"frames to {purpose}, half-open: from A up to but excluding B (default: all)"
+    parser.add_argument("--window", metavar="A:B", help=text)
+
+
+def add_quality(parser: argparse.ArgumentParser) -> None:
+    """--quality NAME."""
+    text = "solver settings: draft, balanced (default) or reference"
+    parser.add_argument("--quality", default="balanced", metavar="NAME", help=text)
+
+
+def add_seed(parser: argparse.ArgumentParser, purpose: str) -> None:
+    """--seed S."""
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help=f"random seed of {purpose} (default: 0)")
+
+
+def add_json(parser: argparse.ArgumentParser, text: str = "also write the result to this file, as JSON") -> None:
+    """--json FILE."""
+    parser.add_argument("--json", metavar="FILE", help=text)
+
+
+def parse_settings(pairs: Sequence[str]) -> dict[str, str]:
+    """NAME=VALUE ... as names and values; the schema of a model converts the values to numbers."""
+    settings = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise InputError(f"--set: expected NAME=VALUE, got {pair!r}")
+        settings[name] = value
+    return settings
+
+
+def parse_window(text: str | None) -> tuple[int, int] | None:
+    """A:B as two frame numbers."""
+    if text is None:
+        return None
+    try:
+        begin, end = (int(part) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"--window: expected A:B in frames, got {text!r}") from None
+    if not 0 <= begin < end:
+        raise InputError(f"--window: expected 0 <= A < B, got {text!r}")
+    return begin, end
+
+
+def positive(option: str, value: float) -> None:
+    """`InputError` for a value that is not positive and finite."""
+    if not 0.0 < value < float("inf"):
+        raise InputError(f"{option}: expected a positive number, got {value:g}")
+
+
+def write_json(result: dict[str, Any], path: str | None) -> None:
+    """Write the file of --json, if one is asked for."""
+    if path:
+        from odeform.io import atomic_write
+
+        atomic_write(Path(path), json.dumps(result, indent=1).encode())

@@ -1,0 +1,44 @@
+"""`odeform train`."""
+
+import argparse
+
+from odeform.cli.options import DATA, add_seed, add_window, parse_window
+
+__all__ = ["HELP", "add_options", "run"]
+
+HELP = "Train a model on a data set and score it on the test split"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    from odeform.models.registry import MODELS
+
+    parser.add_argument("dataset", metavar="DATASET", help=DATA)
+    parser.add_argument("--out", required=True, metavar="FILE", help="checkpoint to write")
+    models = f"one of {', '.join(name for name in MODELS if name != 'released')} (default: odeform)"
+    parser.add_argument("--model", default="odeform", metavar="NAME", help=models)
+    add_window(parser, "train on")
+    parser.add_argument("--every", type=int, default=1, metavar="K", help="train on every K-th frame (default: 1)")
+    parser.add_argument(
+        "--stagger", action="store_true", help="start every K-th frame at a different frame in each sequence"
+    )
+    add_seed(parser, "initial weights and batches")
+    parser.add_argument(
+        "--minutes",
+        type=float,
+        default=30.0,
+        metavar="M",
+        help="training budget in minutes of processor time, including trials (default: 30)",
+    )
+    parser.add_argument(
+        "--steps", type=int, metavar="N", help="number of training steps, in place of --minutes; repeatable"
+    )
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted training from FILE.part")
+
+
+def run(args: argparse.Namespace) -> None:
+    from odeform.dataset.store import open_dataset
+    from odeform.training.train import train
+
+    dataset, window = open_dataset(args.dataset), parse_window(args.window)
+    chosen = {name: getattr(args, name) for name in ("minutes", "steps", "seed", "every", "stagger", "resume")}
+    train(dataset, args.out, args.model, window=window, **chosen)
