@@ -13,13 +13,17 @@ from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
+from odeform_viz.recording.provenance import versions
 from odeform_viz.recording.replay import TOLERANCE, replay
 
 __all__ = ["main", "make_columns"]
 
 
 def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) -> list[Column]:
-    """The columns that the command line asks for; a foreign shape is fitted to the first model's body."""
+    """A column for each checkpoint. A shape from a file is fitted to the body of the first model, and printed how.
+
+    `InputError` for checkpoints and shapes that cannot be read.
+    """
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
@@ -32,48 +36,72 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
 
 
 def _label(model: Predictor, fit: FittedShape | None) -> str:
-    return model.model if fit or model.rescales_input else f"{model.model}, on a ball that stands in"
+    """The authors' files contain no body, so a ball is shown unless the user gives one."""
+    return model.model if fit or model.rescales_input else f"{model.model} (shown on a ball)"
 
 
 def _serve(args: argparse.Namespace) -> None:
     if args.device == "cuda":
-        raise InputError("--device cuda: a motion is a state of 160 numbers, solved on the CPU; expected cpu")
+        raise InputError("--device: expected cpu, got cuda: motions are so small that the CPU computes them faster")
     columns = make_columns(args.checkpoint, args.compare, args.geometry)
     if args.sequence:
         columns.append(truth_column(args.sequence))
     from odeform_viz.app import App
 
     app = App(columns, args.host, args.port, args.record)
-    print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C ends)", flush=True)
     try:
+        print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C to stop)", flush=True)
         while True:
             time.sleep(3600.0)
     finally:
         app.close()
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="odeform-viz", description="See and question learned motion.")
-    parser.add_argument("--checkpoint", default="kick", metavar="CKPT", help="path or bundled name (default: kick)")
-    parser.add_argument("--compare", nargs="+", default=[], metavar="CKPT", help="further models, side by side")
-    parser.add_argument(
-        "--geometry", metavar="FILE", help="a mesh, points or Gaussian splats to move instead (bundled: volleyball)"
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="odeform-viz",
+        description="Serve a web page that shows learned motions of soft bodies and computes them as you change "
+        "parameters. CKPT is a path or the name of a bundled checkpoint, SCENE or SCENE/MODEL.",
+        epilog="Exit codes: 0 success; 1 internal error, or a replay that differs; 2 invalid input.",
     )
-    parser.add_argument("--sequence", metavar="PATH", help="show a sequence of a data set as truth: DATASET/NAME")
-    parser.add_argument("--host", default="127.0.0.1", metavar="H")
-    parser.add_argument("--port", type=int, default=8080, metavar="N")
-    parser.add_argument("--record", metavar="FILE.rrd", help="log the session to a Rerun recording")
-    parser.add_argument("--replay", metavar="FILE.rrd", help="compute a recording again, compare, and end")
-    parser.add_argument(
+    parser.add_argument("--version", action="version", version=f"odeform-viz {versions()['odeform']}")
+    show = parser.add_argument_group("what to show")
+    show.add_argument("--checkpoint", default="kick", metavar="CKPT", help="the model (default: kick)")
+    show.add_argument("--compare", nargs="+", default=[], metavar="CKPT", help="more models of the scene, side by side")
+    show.add_argument(
+        "--geometry",
+        metavar="FILE",
+        help="move this shape instead of the trained body: a mesh, points or Gaussian splats (bundled: volleyball)",
+    )
+    show.add_argument(
+        "--sequence", metavar="PATH", help="show a sequence of a data set, DATASET/NAME, as the truth beside the models"
+    )
+    page = parser.add_argument_group("where to serve")
+    page.add_argument("--host", default="127.0.0.1", metavar="H", help="address to listen on (default: 127.0.0.1)")
+    page.add_argument(
+        "--port", type=int, default=8080, metavar="N", help="port to listen on; 0 takes a free one (default: 8080)"
+    )
+    page.add_argument("--device", default="cpu", choices=("cpu", "cuda"), help="where to compute: only on the cpu")
+    record = parser.add_argument_group("recordings")
+    record.add_argument("--record", metavar="FILE.rrd", help="record everything that is shown, for Rerun and --replay")
+    record.add_argument(
+        "--replay",
+        metavar="FILE.rrd",
+        help="compute every frame of a recording again, print the differences, and exit; serves no page",
+    )
+    record.add_argument(
         "--tolerance",
         type=float,
         default=TOLERANCE,
         metavar="M",
-        help="metres that a replay may differ (default: 1e-5)",
+        help="largest difference, in metres, that --replay accepts (default: 1e-5)",
     )
-    parser.add_argument("--device", default="cpu", choices=("cpu", "cuda"))
-    args = parser.parse_args(argv)
+    return parser
 
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit code."""
+    args = _parser().parse_args(argv)
     agrees = True
 
     def work() -> None:
@@ -84,7 +112,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         try:
             _serve(args)
         except KeyboardInterrupt:
-            print("closed")
+            print("stopped")
 
     return run_guarded(work) or int(not agrees)
 

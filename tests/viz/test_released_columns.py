@@ -38,9 +38,9 @@ def drops(tmp_path: Path) -> Path:
     return import_dataset(tmp_path / "src", tmp_path / "drops").root
 
 
-def test_labels_say_that_a_ball_stands_in(checkpoint: str, tmp_path: Path) -> None:
+def test_labels_say_that_a_ball_is_shown(checkpoint: str, tmp_path: Path) -> None:
     (column,) = make_columns(checkpoint, (), None)
-    assert "stands in" in column.label
+    assert "shown on a ball" in column.label
     file = tmp_path / "body.ply"
     trimesh.Trimesh(CORNERS, TETRAHEDRON, process=False).export(file)
     (column,) = make_columns(checkpoint, (), str(file))

@@ -1,37 +1,43 @@
 """The `odeform-viz` command as a user runs it."""
 
+import re
 import signal
-import socket
 import subprocess
 import sys
-import time
+import threading
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-import rerun as rr
 import trimesh
 
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import main
+from odeform_viz.recording.reader import read_recording
+
+DEADLINE = 120.0  # s, for a busy machine
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (["--checkpoint", "nowhere.safetensors"], "nowhere"),
         (["--compare", "kick/none"], "kick/none"),
         (["--geometry", "missing.ply"], "missing.ply"),
-        (["--device", "cuda"], "cpu"),
+        (["--sequence", "mass-elastic/none"], "mass-elastic/none"),
+        (["--device", "cuda"], "expected cpu, got cuda"),
         (["--port", "70000"], "70000"),
         (["--record", "/proc/nowhere/session.rrd"], "session.rrd"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_code_2(
-    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
     error = capsys.readouterr().err.strip()
-    assert said in error
+    assert message in error
     assert "\n" not in error
 
 
@@ -44,25 +50,47 @@ def test_broken_shapes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "not finite" in capsys.readouterr().err
 
 
-def test_serves_the_bundled_model_and_completes_its_recording(tmp_path: Path) -> None:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    record = tmp_path / "session.rrd"
-    command = [sys.executable, "-m", "odeform_viz.cli", "--port", str(port), "--record", str(record)]
+@pytest.mark.parametrize(("option", "printed"), [("--version", r"odeform-viz \d+\.\d+\.\d+"), ("--help", "--record")])
+def test_version_and_help_are_printed(option: str, printed: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        main([option])
+    assert exit_.value.code == 0
+    assert re.search(printed, capsys.readouterr().out)
+
+
+@contextmanager
+def _viewer(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
+    """`odeform-viz` in a process of its own, and its port. The process ends with the block, or at the deadline."""
+    command = [sys.executable, "-m", "odeform_viz.cli", "--port", "0", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    watchdog = threading.Timer(DEADLINE, process.kill)
+    watchdog.start()
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
-        assert f"http://127.0.0.1:{port}" in line
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=10) as page:
-            assert page.status == 200
-        time.sleep(2.0)
+        address = re.search(r"http://127\.0\.0\.1:(\d+)", line)
+        assert address is not None, line or process.communicate()[1]
+        yield process, int(address[1])
     finally:
+        watchdog.cancel()
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.slow
+def test_serves_the_bundled_model_and_completes_its_recording(tmp_path: Path) -> None:
+    record = tmp_path / "session.rrd"
+    with _viewer("--record", str(record)) as (process, port):
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=DEADLINE) as page:
+            assert page.status == 200
+        with LoopbackClient(port) as client:
+            assert client.until(lambda: "/world/column_0/body/part_0" in client.nodes, DEADLINE)
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=30)
-    assert process.returncode == 0, errors
+        printed, errors = process.communicate(timeout=DEADLINE)
+        assert process.returncode == 0, errors
+    assert printed.splitlines()[-1] == "stopped"
     assert "Traceback" not in errors
-    entities = {chunk.entity_path for chunk in rr.chunk.RrdReader(str(record)).stream().to_chunks()}
-    assert any("body" in entity for entity in entities)
-    assert "/parameters/mass" in entities
+    recording = read_recording(record)
+    assert recording.frames == len(recording.requests) > 0
+    assert "mass" in recording.requests[0]["parameters"]
+    assert next(iter(recording.points()))[0] == "column_0/form_0"
