@@ -23,7 +23,6 @@ from odeform.schema import Parameter, Parameters
 __all__ = ["identify_split", "report"]
 
 CALIBRATION = "val"
-TOGETHER = 4  # sequences that a process is given at once
 
 
 def identify_split(
@@ -43,9 +42,9 @@ def identify_split(
         print(f"note: intervals are calibrated on {CALIBRATION}, which is among what is scored", file=sys.stderr)
     discrepancy = _calibrated(predictor, dataset)
     observed = [(entry, observe(dataset.read(entry), predictor.schema, seen)) for entry in entries]
-    work = partial(_rows, type(predictor), predictor.checkpoint, discrepancy)
+    work = partial(_identified, type(predictor), predictor.checkpoint, discrepancy)
     begin = time.perf_counter()
-    rows = parallel_map(f"identify {dataset.schema.scene}", work, observed, TOGETHER)
+    rows = parallel_map(f"identify {dataset.schema.scene}", work, observed)
     seconds = (time.perf_counter() - begin) / len(rows)
     return {
         "model": predictor.model,
@@ -59,14 +58,14 @@ def identify_split(
     }
 
 
-def _rows(
+def _identified(
     model: Callable[[Checkpoint], Predictor],
     checkpoint: Checkpoint,
     discrepancy: Discrepancy,
-    observed: Sequence[tuple[Entry, Observation]],
-) -> list[dict[str, Any]]:
-    predictor = model(checkpoint)
-    return [_row(entry.name, entry.parameters, identify(predictor, seen, discrepancy)) for entry, seen in observed]
+    observed: tuple[Entry, Observation],
+) -> dict[str, Any]:
+    entry, observation = observed
+    return _row(entry.name, entry.parameters, identify(model(checkpoint), observation, discrepancy))
 
 
 def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:

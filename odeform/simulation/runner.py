@@ -3,14 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
-
-from joblib import Parallel, delayed
 
 from odeform.dataset.folder import INDEX, folder_reader, open_folder, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
+from odeform.parallel import as_completed
 from odeform.progress import Progress
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.scene import Scene
@@ -23,7 +22,7 @@ __all__ = ["simulate"]
 TEST_RATE = 4  # test sequences have so many times the frames: people look between those that were learned
 
 
-def _one(simulate: Callable[..., MotionSequence], entry: Entry, root: Path, rate: float, step: float) -> Entry:
+def _one(entry: Entry, simulate: Callable[..., MotionSequence], root: Path, rate: float, step: float) -> Entry:
     try:
         rate = rate * (TEST_RATE if entry.split == "test" else 1)
         sequence = simulate(entry.parameters, rate=rate, step=step)
@@ -93,9 +92,8 @@ def simulate(
         return dataset
 
     root.mkdir(parents=True, exist_ok=True)
-    jobs = (delayed(_one)(known.simulate, entry, root, rate, step) for entry in todo)
-    finished: Any = Parallel(n_jobs=workers, return_as="generator_unordered")(jobs)
-    for entry in finished:
+    work = partial(_one, simulate=known.simulate, root=root, rate=rate, step=step)
+    for _, entry in as_completed(work, todo, workers):
         done[entry.name] = entry
         index()
         progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")

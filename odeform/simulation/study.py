@@ -9,14 +9,15 @@ import argparse
 import json
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
 from odeform.errors import InputError
 from odeform.io import atomic_write
+from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import get_scene
@@ -32,7 +33,8 @@ def _rmse(a: MotionSequence, b: MotionSequence) -> float:
     return float(np.sqrt(np.mean((a.vertices.astype(float) - b.until(a.times[-1]).vertices) ** 2)))
 
 
-def _run(simulate: Callable[..., MotionSequence], parameters: Parameters, step: float) -> MotionSequence:
+def _run(simulate: Callable[..., MotionSequence], job: tuple[Parameters, float]) -> MotionSequence:
+    parameters, step = job
     return simulate(parameters, rate=RATE, step=step)
 
 
@@ -68,8 +70,7 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
     settings = [*measured.extremes, *scene.sample(count, seed)][:count]
     jobs = [(p, scene.step) for p in settings] + [(p, 0.5 * scene.step) for p in settings]
     jobs += [(_nudge(p, q, by), scene.step) for p in settings for q in hidden for by in (-NUDGE, NUDGE)]
-    parallel: Any = Parallel(n_jobs=workers, verbose=5)
-    motions: list[MotionSequence] = parallel(delayed(_run)(scene.simulate, *job) for job in jobs)
+    motions = parallel_map(f"study {scene_name}", partial(_run, scene.simulate), jobs, workers)
     coarse, fine = motions[:count], motions[count : 2 * count]
     width = 2 * len(hidden)
     nudged = [motions[at : at + width] for at in range(2 * count, len(motions), width)]

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -29,7 +29,7 @@ __all__ = ["Outcome", "report", "show", "stress"]
 CASES = 20_000
 MOMENTS = (0.0, 0.05, 0.3, 1.0, 1.5, 3.0, 10.0)  # trained windows
 PATIENCE = 10.0  # s
-TOGETHER = 64  # draws that a process takes at a time
+BATCH = 64  # cases that a process takes at a time
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     predictor = load_reduced(checkpoint)
     schema = predictor.schema
     asked = draws(schema, bool(predictor.qualities), count, seed)
-    outcomes = parallel_map("stress", partial(_show_part, checkpoint), asked, TOGETHER)
+    outcomes = parallel_map("stress", partial(_show_from, checkpoint), asked, batch_size=BATCH)
     checks = _of_all(predictor, asked, outcomes)
     checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
@@ -98,14 +98,14 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
     }
 
 
-def _show_part(checkpoint: str, asked: Sequence[Case]) -> list[Outcome]:
+def _show_from(checkpoint: str, case: Case) -> Outcome:
     predictor, geometries = _opened(checkpoint)
-    return [show(predictor, draw, geometries) for draw in asked]
+    return show(predictor, case, geometries)
 
 
 @cache
 def _opened(checkpoint: str) -> tuple[Predictor, dict[str, Geometry]]:
-    """Once in a process."""
+    """Opened once in each process."""
     predictor = load_reduced(checkpoint)
     return predictor, shapes(predictor.rest)
 

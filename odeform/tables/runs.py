@@ -6,10 +6,8 @@ Where the scores suffice, the checkpoint need not be there any more.
 import json
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.io import atomic_write
 from odeform.models.registry import load
+from odeform.parallel import as_completed
 from odeform.progress import Progress
 from odeform.training.request import TrainRequest
 from odeform.training.train import train
@@ -75,13 +74,9 @@ def run_cells(cells: Sequence[Cell], folder: Path, jobs: int, kept_only: bool = 
         cells = [c for c in cells if _scored(c, folder) or _is_of(folder / f"{c.name}.safetensors", c.request)]
     results: dict[Cell, Result] = {}
     progress = Progress("tables", len(cells))
-    work = partial(_run, folder=folder)
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(work, cell): cell for cell in cells}
-        for future in as_completed(waiting):
-            cell = waiting[future]
-            results[cell] = future.result()
-            progress.advance(note=cell.name)
+    for index, result in as_completed(partial(_run, folder=folder), cells, jobs):
+        results[cells[index]] = result
+        progress.advance(note=cells[index].name)
     progress.close()
     return {cell: results[cell] for cell in cells}
 
