@@ -21,7 +21,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    from odeform.dataset.importers.importing import import_dataset
+    from odeform.dataset.importers.registry import import_dataset
 
     dataset = import_dataset(args.source, args.out, args.rate, args.seed)
     failed = [entry.name for entry in dataset.entries if entry.status != "ok"]

@@ -1,4 +1,5 @@
 import csv
+import functools
 import json
 import shutil
 from pathlib import Path
@@ -9,8 +10,9 @@ import trimesh
 from authors import TETRAHEDRON, write_sequence
 
 from odeform.cli import main
-from odeform.dataset.importers.importing import import_dataset
-from odeform.dataset.importers.naming import in_order
+from odeform.dataset.importers.natural_order import naturally_sorted
+from odeform.dataset.importers.registry import IMPORTERS, Importer, import_dataset
+from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
@@ -24,7 +26,7 @@ def shapes(seed: int, frames: int = FRAMES) -> np.ndarray:
 
 
 def write_drops(root: Path, count: int = 10, splits: bool = True) -> None:
-    """In the released layout, numbered from 3 on; metadata longer than the sequence."""
+    """The authors' layout, frames numbered from 3; metadata longer than the sequence."""
     for k in range(count):
         params = {"mass": 0.2 + 0.1 * k, "soft_body_parameters": {"spring": {"bending": 3.0 - 0.2 * k}}}
         heights = np.concatenate([np.full(5, 9.0), 0.5 - 0.01 * np.arange(FRAMES)])
@@ -45,12 +47,12 @@ def by_split(dataset: Dataset) -> dict[str, list[str]]:
     return {split: [e.name for e in dataset.select(split)] for split in ("train", "val", "test")}
 
 
-def test_names_are_in_the_order_of_their_numbers() -> None:
+def test_natural_order() -> None:
     names = ["b_10.xyz", "b_9.xyz", "a_2.xyz", ".b_1.xyz", "b_100.xyz"]
-    assert [p.name for p in in_order(map(Path, names))] == ["a_2.xyz", "b_9.xyz", "b_10.xyz", "b_100.xyz"]
+    assert [p.name for p in naturally_sorted(map(Path, names))] == ["a_2.xyz", "b_9.xyz", "b_10.xyz", "b_100.xyz"]
 
 
-def test_released_drops(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mass_elastic_of_the_authors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_drops(tmp_path / "src")
     assert main(["import", str(tmp_path / "src"), "--out", str(tmp_path / "out")]) == 0
     assert "8 train, 1 val, 1 test; mass, bending vary; failed: none" in capsys.readouterr().out
@@ -69,7 +71,7 @@ def test_released_drops(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert sequence.weights.sum() == pytest.approx(1.0)
 
 
-def test_missing_splits_are_drawn_again_the_same(tmp_path: Path) -> None:
+def test_missing_splits_are_drawn_reproducibly(tmp_path: Path) -> None:
     write_drops(tmp_path / "src", splits=False)
     one, two, three = (import_dataset(tmp_path / "src", tmp_path / str(i), seed=s) for i, s in enumerate((0, 0, 1)))
     assert {split: len(names) for split, names in by_split(one).items()} == {"train": 7, "val": 1, "test": 2}
@@ -77,7 +79,7 @@ def test_missing_splits_are_drawn_again_the_same(tmp_path: Path) -> None:
     assert one.provenance["split_seed"] == 0
 
 
-def test_released_pushes(tmp_path: Path) -> None:
+def test_contact_force_of_the_authors(tmp_path: Path) -> None:
     write_pushes(tmp_path / "src")
     dataset = import_dataset(tmp_path / "src", tmp_path / "out")
     assert dataset.schema.scene == "released-contact-force"
@@ -97,7 +99,7 @@ def test_a_sequence_that_cannot_be_read_is_listed(tmp_path: Path, capsys: pytest
     assert "drop_5_6.xyz" in next(e.status for e in dataset.entries if e.name == "drop_5")
 
 
-def test_what_is_wrong_with_the_released_layout_is_one_line(tmp_path: Path) -> None:
+def test_errors_in_the_authors_layout(tmp_path: Path) -> None:
     write_drops(tmp_path / "good")
 
     def refused(match: str, name: str) -> None:
@@ -116,16 +118,16 @@ def test_what_is_wrong_with_the_released_layout_is_one_line(tmp_path: Path) -> N
     (copy("short") / "drop_4/metadata.json").write_text('{"offset_z_vertices_list": [0.5]}')
     refused("1 heights for 6 frames", "short")
     (copy("lost") / "val_folders.txt").write_text("../good/drop_1x\n")
-    refused("there is no folder", "lost")
+    refused("have no folder", "lost")
     (copy("twice") / "val_folders.txt").write_text("drop_3\n")
-    refused("drop_3 is in split train already", "twice")
+    refused("drop_3 is also in split train", "twice")
     write_pushes(copy("mixed"))
     for file in (tmp_path / "mixed").glob("*_folders.txt"):
         file.unlink()
-    refused("import them apart", "mixed")
+    refused("import them separately", "mixed")
     refused("no such folder", "nowhere")
     (tmp_path / "empty").mkdir()
-    refused(r"expected sequence folders with params\.json", "empty")
+    refused(r"expected parameters.csv .*, or folders with params\.json", "empty")
     with pytest.raises(InputError, match="another folder than the source"):
         import_dataset(tmp_path / "good", tmp_path / "good")
 
@@ -137,7 +139,7 @@ def test_objects_of_different_meshes_are_refused(tmp_path: Path) -> None:
         np.savetxt(file, np.loadtxt(file)[[0, 1, 2, 3, 3]])
     for file in folder.glob("*.ply"):
         trimesh.Trimesh(np.arange(15.0).reshape(5, 3), TETRAHEDRON, process=False).export(file)
-    with pytest.raises(InputError, match=r"drop_6 is of another mesh .*4 vertices.*5 vertices.*one object at a time"):
+    with pytest.raises(InputError, match=r"drop_6 has another mesh .*4 vertices.*5 vertices.*one object at a time"):
         import_dataset(tmp_path / "src", tmp_path / "out")
 
 
@@ -181,8 +183,8 @@ def test_mesh_frames(ending: str, table: str, tmp_path: Path) -> None:
         assert np.array_equal(sequence.faces, TETRAHEDRON)
 
 
-def test_vertices_stay_as_they_are_in_the_file(tmp_path: Path) -> None:
-    """Even two at one place, and with seams of a texture: frames would not match otherwise."""
+def test_vertices_keep_the_order_of_the_file(tmp_path: Path) -> None:
+    """Even where two coincide, and along texture seams: frames would not correspond otherwise."""
     rows = write_meshes(tmp_path / "lab")
     for k in range(4):
         for frame in range(FRAMES):
@@ -196,7 +198,26 @@ def test_vertices_stay_as_they_are_in_the_file(tmp_path: Path) -> None:
         assert np.abs(sequence.vertices - shapes(k)[:, [0, 1, 2, 3, 0]]).max() < 1e-6
 
 
-def test_what_is_wrong_with_a_table_is_one_line(tmp_path: Path) -> None:
+def test_a_layout_is_a_line_in_the_registry(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A layout that only a test knows, of one array per sequence."""
+
+    def source(root: Path, rate: float | None) -> Source:
+        def read(k: int) -> tuple[np.ndarray, np.ndarray]:
+            return np.load(root / f"{k}.npy"), TETRAHEDRON
+
+        found = (SourceSequence(f"s{k}", {"mass": 1.0 + k}, FRAMES, functools.partial(read, k)) for k in range(4))
+        return Source("arrays", rate or 10.0, tuple(found), {"mass": "kg"})
+
+    for k in range(4):
+        np.save(tmp_path / f"{k}.npy", shapes(k))
+    importer = Importer("arrays", lambda root: (root / "0.npy").is_file(), source)
+    monkeypatch.setitem(IMPORTERS, "arrays", importer)
+    dataset = import_dataset(tmp_path, tmp_path / "out", rate=24.0)
+    assert (dataset.schema.scene, dataset.schema.window.rate) == ("arrays", 24.0)
+    assert all(np.allclose(s.vertices, shapes(k), atol=1e-6) for k, s in enumerate(dataset.sequences("all")))
+
+
+def test_errors_in_a_table(tmp_path: Path) -> None:
     rows = write_meshes(tmp_path / "lab")
 
     def refused(match: str, rows: list[dict[str, object]], rate: float | None = 24.0) -> None:
@@ -207,11 +228,11 @@ def test_what_is_wrong_with_a_table_is_one_line(tmp_path: Path) -> None:
     refused("expected one rate in Hz", rows, None)
     refused("expected one rate in Hz", rows, -1.0)
     refused("no such folder", [{**rows[0], "sequence": "../lab/take 0"}, *rows[1:]])
-    refused("each sequence once", [rows[0], *rows])
+    refused("each sequence only once", [rows[0], *rows])
     refused(r"mass \(kg\): expected a number, got 'much'", [{**rows[0], "mass (kg)": "much"}, *rows[1:]])
     refused("split: expected train, val, test", [{**rows[0], "split": "all"}, *rows[1:]])
     refused("column 'sequence'", [{"mass": 1.0}])
-    refused("none of mass, grip varies", rows[:1])
+    refused("expected a parameter that varies, got constant mass, grip", rows[:1])
     next((tmp_path / "lab/take 1").glob("*.obj")).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     write_csv(tmp_path / "lab/parameters.csv", rows)
     statuses = [e.status for e in import_dataset(tmp_path / "lab", tmp_path / "out", 24.0).entries]

@@ -10,7 +10,7 @@ import trimesh
 from authors import TETRAHEDRON, Authors, write_sequence
 
 from odeform.cli import main
-from odeform.dataset.importers.importing import import_dataset
+from odeform.dataset.importers.registry import import_dataset
 from odeform.types import Mesh
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient

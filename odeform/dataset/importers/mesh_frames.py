@@ -1,8 +1,8 @@
-"""A folder of mesh frames: a sub-folder a sequence with its frames as .obj or .ply, and a table of parameters.
+"""A folder of mesh frames: one subfolder per sequence with its frames as .obj or .ply, and a table of parameters.
 
-The table, `parameters.csv`, has a row a sequence: a column `sequence` that names the sub-folder, and one for each
-parameter, its unit in brackets if it has one: `mass (kg)`. A column `split` (train, val, test) and a column `rate` (Hz,
-the same in all rows) may be there. `parameters.json` is a list of such rows as objects.
+The table, `parameters.csv`, has one row per sequence: a column `sequence` that names the subfolder, and one column per
+parameter, with its unit in brackets if it has one: `mass (kg)`. Columns `split` (train, val, test) and `rate` (Hz, the
+same in all rows) are optional. `parameters.json` is a list of such rows as objects.
 """
 
 import csv
@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from odeform.dataset.importers.naming import in_order, subfolders
-from odeform.dataset.importers.source import Found, Source
+from odeform.dataset.importers.natural_order import naturally_sorted, subfolders
+from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
 from odeform.types import Faces, Frames, Mesh
 
-__all__ = ["TABLES", "mesh_source", "table_of"]
+__all__ = ["has_table", "mesh_source"]
 
 ENDINGS = (".obj", ".ply")
 TABLES = ("parameters.csv", "parameters.json")
@@ -29,20 +29,24 @@ SPLITS = ("train", "val", "test")
 Row = Mapping[Any, Any]
 
 
-def table_of(root: Path) -> Path | None:
-    """The table of parameters in a folder; None without one."""
-    return next((root / name for name in TABLES if (root / name).is_file()), None)
+def has_table(root: Path) -> bool:
+    """Whether a folder has a table of parameters."""
+    return _table(root) is not None
 
 
-def mesh_source(root: Path, table: Path, rate: float | None = None) -> Source:
-    """All sequences of the table. `rate` in Hz, unless the table says. `InputError` in one line for what is wrong."""
+def mesh_source(root: Path, rate: float | None = None) -> Source:
+    """All sequences of the table. `rate` in Hz overrides that of the table. Raises `InputError` for any mistake in it,
+    and without a table."""
+    table = _table(root)
+    if table is None:
+        raise InputError(f"import {root}: expected {' or '.join(TABLES)}")
     rows = _rows(table)
     folders = {folder.name: folder for folder in subfolders(root)}
     sequences, units = [], {}
     for row in rows:
         name = str(row.get(SEQUENCE, ""))
         if name not in folders:
-            raise InputError(f"import {table}: sequence {name!r}: there is no such folder in {root}")
+            raise InputError(f"import {table}: sequence {name!r}: no such folder in {root}")
         split = str(row.get(SPLIT) or "")
         if split not in ("", *SPLITS):
             raise InputError(f"import {table}: {name}: split: expected {', '.join(SPLITS)}, got {split!r}")
@@ -52,12 +56,16 @@ def mesh_source(root: Path, table: Path, rate: float | None = None) -> Source:
                 parameter, _, unit = column.partition("(")
                 units[parameter.strip()] = unit.rstrip(") ")
                 parameters[parameter.strip()] = _number(value, f"import {table}: {name}: {column}")
-        files = in_order(path for path in folders[name].iterdir() if path.suffix.lower() in ENDINGS)
-        sequences.append(Found(name, parameters, len(files), lambda files=files: _read(files), split))
+        files = naturally_sorted(path for path in folders[name].iterdir() if path.suffix.lower() in ENDINGS)
+        sequences.append(SourceSequence(name, parameters, len(files), lambda files=files: _read(files), split))
     if len({found.name for found in sequences}) != len(sequences):
-        raise InputError(f"import {table}: expected each sequence once")
+        raise InputError(f"import {table}: expected each sequence only once")
     made = {"imported": root.name, "layout": "meshes"}
     return Source(f"imported-{root.name}", _rate(rows, table, rate), tuple(sequences), units, provenance=made)
+
+
+def _table(root: Path) -> Path | None:
+    return next((root / name for name in TABLES if (root / name).is_file()), None)
 
 
 def _rows(table: Path) -> list[Row]:
@@ -66,11 +74,11 @@ def _rows(table: Path) -> list[Row]:
         if table.suffix == ".json":
             rows = json.loads(text)
             if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-                raise ValueError("expected a list of objects, one a sequence")
+                raise ValueError("expected a list of objects, one per sequence")
         else:
             rows: list[Row] = [*csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)]
             if any(None in row or None in row.values() for row in rows):
-                raise ValueError("expected as many cells in each row as in the first")
+                raise ValueError("expected the same number of cells in every row")
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"import {table}: cannot be read: {error}") from None
     if not rows or not all(SEQUENCE in row for row in rows):
@@ -78,15 +86,15 @@ def _rows(table: Path) -> list[Row]:
     return rows
 
 
-def _rate(rows: list[Row], table: Path, asked: float | None) -> float:
-    said = {_number(row[RATE], f"import {table}: {RATE}") for row in rows if row.get(RATE) not in (None, "")}
-    if asked is not None:
-        said = {asked}
-    if len(said) != 1 or not 0.0 < min(said) < float("inf"):
+def _rate(rows: list[Row], table: Path, given: float | None) -> float:
+    rates = {_number(row[RATE], f"import {table}: {RATE}") for row in rows if row.get(RATE) not in (None, "")}
+    if given is not None:
+        rates = {given}
+    if len(rates) != 1 or not 0.0 < min(rates) < float("inf"):
         raise InputError(
-            f"import {table}: expected one rate in Hz, in a column {RATE!r} or by --rate, got {sorted(said)}"
+            f"import {table}: expected one rate in Hz, in a column {RATE!r} or by --rate, got {sorted(rates) or 'none'}"
         )
-    return said.pop()
+    return rates.pop()
 
 
 def _number(value: Any, where: str) -> float:
@@ -103,6 +111,6 @@ def _read(files: list[Path]) -> tuple[Frames, Faces]:
         if not isinstance(mesh, Mesh):
             raise InputError(f"import {file}: expected a mesh, got points")
         if meshes and (mesh.points.shape != meshes[0].points.shape or not np.array_equal(mesh.faces, meshes[0].faces)):
-            raise InputError(f"import {file}: expected the mesh of {files[0].name}, got another")
+            raise InputError(f"import {file}: expected the same mesh as in {files[0].name}")
         meshes.append(mesh)
     return np.stack([mesh.points for mesh in meshes]), meshes[0].faces

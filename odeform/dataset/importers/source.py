@@ -1,128 +1,38 @@
-"""Sequences that were made elsewhere, on their way into a data set of ours: found in a source, read one at a time."""
+"""What an importer finds: sequences made elsewhere, described, and read one at a time."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
+from odeform.types import Faces, Frames
 
-from odeform.dataset.folder import folder_reader, save_sequence, write_index
-from odeform.dataset.index import Dataset, Entry, assign_splits
-from odeform.errors import InputError
-from odeform.geometry.shape import surface_weights
-from odeform.progress import Progress
-from odeform.schema import Parameter, Schema, Window
-from odeform.types import Faces, Frames, Mesh, MotionSequence
-
-__all__ = ["Found", "Source", "import_source"]
-
-ALIKE = 1e-6  # of their size, or of one: values that differ by less are one value
+__all__ = ["Source", "SourceSequence"]
 
 
 @dataclass(frozen=True)
-class Found:
-    """A sequence of a source. `read` gives vertices (T, N, 3) in metres and faces (F, 3); `split` may be unknown."""
+class SourceSequence:
+    """One sequence, not read yet."""
 
     name: str
     parameters: Mapping[str, float]
     frames: int
     read: Callable[[], tuple[Frames, Faces]]
+    """Returns vertices (T, N, 3) in metres and faces (F, 3). Raises `InputError` for damaged files."""
     split: str = ""
+    """"train", "val" or "test"; empty if the source has no splits."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """What an import found: `rate` in Hz, `units` by parameter; `ratios` are parameters of which ratios matter."""
+    """All sequences of a folder."""
 
     scene: str
     rate: float
-    sequences: tuple[Found, ...]
+    """Frames per second, Hz."""
+    sequences: tuple[SourceSequence, ...]
     units: Mapping[str, str]
-    ratios: frozenset[str] = frozenset()
+    """Unit of each parameter, by name; missing if unknown."""
+    log_scaled: frozenset[str] = frozenset()
+    """Parameters of which ratios matter rather than differences."""
     notes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
-
-
-def import_source(source: Source, out: Path, seed: int = 0) -> Dataset:
-    """Write a source as a data set of ours into the folder `out`.
-
-    Parameters that do not vary are kept as what is fixed. Splits are the source's, or drawn 70/10/20 by `seed` if it
-    has none for some sequence. A sequence that cannot be read is listed with the reason; `InputError` if none can, and
-    for meshes that differ.
-    """
-    if not source.sequences:
-        raise InputError("import: expected at least one sequence")
-    schema, fixed = _schema(source)
-    splits = [found.split for found in source.sequences]
-    drawn = not all(splits)
-    if drawn:
-        splits = assign_splits(len(splits), seed)
-    provenance = {**source.provenance, "rate_hz": source.rate, **({"split_seed": seed} if drawn else {})}
-    entries: list[Entry] = []
-    mesh: Mesh | None = None
-    progress = Progress("import", len(splits))
-    for found, split in zip(source.sequences, splits, strict=True):
-        parameters = schema.complete({p.name: found.parameters[p.name] for p in schema.parameters})
-        entry = Entry(found.name, split, parameters)
-        try:
-            sequence = _sequence(found, source.rate)
-        except InputError as error:
-            entries.append(replace(entry, status=str(error)))
-            progress.advance(note=str(error))
-            continue
-        mesh = mesh or sequence.rest
-        _require_alike(mesh, sequence.rest, found.name)
-        entries.append(replace(entry, sha256=save_sequence(out, found.name, sequence)))
-        progress.advance()
-    progress.close()
-    if mesh is None:
-        raise InputError(f"import: none of {len(entries)} sequences can be read; {entries[0].status}")
-    dataset = Dataset(out, schema, tuple(entries), folder_reader(out), fixed, provenance)
-    write_index(dataset)
-    return dataset
-
-
-def _sequence(found: Found, rate: float) -> MotionSequence:
-    vertices, faces = found.read()
-    if not np.isfinite(vertices).all():
-        raise InputError(f"{found.name}: a vertex that is not finite")
-    weights = surface_weights(Mesh(vertices[0], faces))
-    return MotionSequence(np.arange(len(vertices)) / rate, vertices.astype(np.float32), faces, weights, name=found.name)
-
-
-def _require_alike(mesh: Mesh, other: Mesh, name: str) -> None:
-    """Models learn one body: the same vertices and faces in all sequences."""
-    if mesh.points.shape != other.points.shape or not np.array_equal(mesh.faces, other.faces):
-        sizes = " and ".join(f"{len(m.points)} vertices, {len(m.faces)} faces" for m in (mesh, other))
-        raise InputError(f"import: {name} is of another mesh than those before ({sizes}): import one object at a time")
-
-
-def _schema(source: Source) -> tuple[Schema, dict[str, float]]:
-    """The schema of what varies, and what does not."""
-    names = list(source.sequences[0].parameters)
-    for found in source.sequences:
-        if list(found.parameters) != names:
-            raise InputError(f"import: {found.name} has parameters {', '.join(found.parameters)}, others {names}")
-        if found.frames < 2:
-            raise InputError(f"import: {found.name}: expected at least 2 frames, got {found.frames}")
-    values = {name: np.array([found.parameters[name] for found in source.sequences]) for name in names}
-    varied, fixed = [], {}
-    for name, column in values.items():
-        low, high = float(column.min()), float(column.max())
-        if not np.isfinite(column).all():
-            raise InputError(f"import: parameter {name}: expected finite numbers")
-        if high - low <= ALIKE * max(abs(low), abs(high), 1.0):
-            fixed[name] = float(column[0])
-            continue
-        ratios = name in source.ratios and low > 0.0
-        middle = float(np.sqrt(low * high)) if ratios else 0.5 * (low + high)
-        scale = "log" if ratios else "linear"
-        varied.append(Parameter(name, source.units.get(name, ""), low, high, middle, scale))
-    if not varied:
-        raise InputError(
-            f"import: none of {', '.join(names) or 'no parameters'} varies: there is nothing to learn from"
-        )
-    count = min(found.frames for found in source.sequences)
-    window = Window(0.0, (count - 1) / source.rate, source.rate)
-    return Schema(source.scene, tuple(varied), window, notes=source.notes), fixed

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from odeform.checkpoint import Checkpoint, checkpoint_bytes
-from odeform.dataset.importers.authors import AUTHORS_MASS_ELASTIC, RELEASED_CONTACT_FORCE
+from odeform.dataset.importers.authors import AUTHORS_CONTACT_FORCE, AUTHORS_MASS_ELASTIC
 from odeform.errors import InputError
 from odeform.geometry.primitives import octasphere
 from odeform.models.authors.network import Networks
@@ -27,9 +27,9 @@ PARTS = {"global": "model1_state_dict", "local": "model2_state_dict"}
 MOST_FRAMES = 10_000
 RADIUS, SEGMENTS = 0.1, 8  # of the ball that stands in: metres, and edges of an octant's side
 
-SCENES = {1: AUTHORS_MASS_ELASTIC, 3: RELEASED_CONTACT_FORCE}
+SCENES = {1: AUTHORS_MASS_ELASTIC, 3: AUTHORS_CONTACT_FORCE}
 """By the numbers of an offset: height alone, or all three axes."""
-FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), RELEASED_CONTACT_FORCE: (0, 10, 10)}
+FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), AUTHORS_CONTACT_FORCE: (0, 10, 10)}
 """First frame, frames, and frames a second where `args` does not say."""
 NOTES = (
     "A network of the paper's authors: one latent a point, its answer tied to the frames that it was trained on.",

@@ -1,0 +1,48 @@
+"""The layouts that `odeform import` recognises. A layout is one module and one line here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from odeform.dataset.importers.authors import authors_source, is_authors_layout
+from odeform.dataset.importers.conversion import convert_source
+from odeform.dataset.importers.mesh_frames import has_table, mesh_source
+from odeform.dataset.importers.source import Source
+from odeform.dataset.index import Dataset
+from odeform.errors import InputError
+
+__all__ = ["IMPORTERS", "Importer", "import_dataset"]
+
+
+@dataclass(frozen=True)
+class Importer:
+    """How a folder of some layout becomes a data set."""
+
+    description: str
+    """What the folder contains, for error messages."""
+    recognises: Callable[[Path], bool]
+    source: Callable[[Path, float | None], Source]
+    """(folder, frame rate in Hz if the user gave one) -> its sequences. Raises `InputError`."""
+
+
+IMPORTERS: dict[str, Importer] = {
+    "meshes": Importer("parameters.csv or parameters.json (a folder of mesh frames)", has_table, mesh_source),
+    "released": Importer("folders with params.json (the authors' layout)", is_authors_layout, authors_source),
+}
+
+
+def import_dataset(source: str | Path, out: str | Path, rate: float | None = None, seed: int = 0) -> Dataset:
+    """Convert the folder `source`, of any layout in `IMPORTERS`, to a data set in the folder `out`.
+
+    `rate` in Hz is for layouts that store none; `seed` draws the splits of a source without them. Raises `InputError`
+    for a layout that none recognises, for an inconsistent one, and if no sequence can be read.
+    """
+    root, to = Path(source), Path(out)
+    if not root.is_dir():
+        raise InputError(f"import {root}: no such folder")
+    if to.resolve() == root.resolve():
+        raise InputError(f"import: --out {to}: expected another folder than the source")
+    for importer in IMPORTERS.values():
+        if importer.recognises(root):
+            return convert_source(importer.source(root, rate), to, seed)
+    raise InputError(f"import {root}: expected {', or '.join(i.description for i in IMPORTERS.values())}")
