@@ -1,4 +1,4 @@
-"""From sequences to what the models learn from: one reduced trajectory for each."""
+"""What reduced models are trained on: one reduced trajectory for each sequence of a data set."""
 
 import hashlib
 import json
@@ -11,97 +11,161 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.motion.reduced_space import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
-from odeform.types import Bools, Floats, Mesh
+from odeform.types import Basis, Bools, Floats, Mesh, MotionSequence, Perpoint, Times, Vector
 
-__all__ = ["UNKNOWN", "TrainingData", "prepare"]
+__all__ = ["FILLED_WEIGHT", "TrainingData", "prepare"]
 
-TRUNCATION = 5e-3
+SPLITS = ("train", "val")
+TRUNCATION = 5e-3  # share of the RMS deformation that may be left out
 MOST_MODES = 64
-UNKNOWN = 1e-3
-"""Weight of a frame that a spline through known ones fills in, in training: it holds what nothing else does."""
+FILLED_WEIGHT = 1e-3
+"""Weight in training of a frame that is not observed but filled in by a spline: it constrains what nothing else does."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrainingData:
-    """`theta` (S, P) in [-1, 1], `reduced` (S, T, 6 + K) in metres and radians, for train and val."""
+    """Parameters and reduced motions of the splits train and val."""
 
     schema: Schema
+    """With the window and frame rate of the training."""
     space: ReducedSpace
     times: Floats
+    """(T,) seconds of the frames."""
     rest: Floats
     """(N, 3) canonical rest points of the training mesh, metres."""
     weights: Floats
+    """(N,) share of the mass at each vertex."""
     theta: dict[str, Floats]
+    """(S, P) parameters in [-1, 1] by split."""
     reduced: dict[str, Floats]
-    known: dict[str, Bools]
-    """(S, T) whether the frame is of the data, or a spline through those that are fills it in."""
+    """(S, T, 6 + K) metres and radians by split."""
+    observed: dict[str, Bools]
+    """(S, T) by split: True where the frame is of the data, False where a spline fills it in."""
     truncation_mm: dict[str, float]
-    """RMS of the deformation that the modes leave out, for each split."""
+    """RMS of the deformation that the modes leave out, by split."""
     identity: str
-    """SHA-256 of all that went in: the sequences, the frames, the number of modes."""
+    """SHA-256 of all inputs: the sequences, the frames, the number of modes."""
 
 
-def _largest(motions: list[Floats]) -> float:
-    """Norm of the largest of the vectors (T, n)."""
-    return max(float(np.linalg.norm(motion, axis=1).max()) for motion in motions)
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """The training mesh as it rests: canonical `rest`, mass `weights` (N,), `anchor` (3,) in the scene; and the
+    `times` (T,) of all frames."""
+
+    rest: Mesh
+    weights: Perpoint
+    anchor: Vector
+    times: Times
+
+
+@dataclass(frozen=True, eq=False)
+class _Motions:
+    """The sequences of a split: `theta` (S, P), and of each its pose (T, 6) and its deformation (T, N, 3)."""
+
+    theta: Floats
+    poses: list[Floats]
+    deformations: list[Floats]
+
+    def coefficients(self, modes: Basis, weights: Perpoint) -> list[Floats]:
+        """(T, K) of each sequence, by the modes (N, 3, K)."""
+        shares = weights[:, None]
+        return [np.einsum("tni,nik->tk", motion * shares, modes) for motion in self.deformations]
+
+    def mean_square(self, weights: Perpoint) -> float:
+        """Mean square deformation over the body, the frames and the sequences, m^2."""
+        shares = weights[:, None]
+        return float(np.mean([(shares * motion**2).sum(axis=(1, 2)).mean() for motion in self.deformations]))
 
 
 def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsampling | None = None) -> TrainingData:
-    """Decompose all training and validation sequences; fit the deformation basis on the training ones alone.
+    """Decompose all training and validation sequences; fit the deformation basis to the training sequences alone.
 
-    Without `modes`, as few as leave `TRUNCATION` of the RMS deformation of the validation sequences.
+    Without `modes`, the fewest that leave out at most `TRUNCATION` of the RMS deformation of the validation sequences.
+    `InputError` for a split without sequences, and for sequences of different meshes.
     """
-    schema, subsampling = dataset.schema, subsampling or FrameSubsampling()
-    count = subsampling.count(schema)
-    poses, locals_, theta = {}, {}, {}
-    rest = weights = anchor = times = faces = None
-    for split in ("train", "val"):
-        poses[split], locals_[split], vectors = [], [], []
-        for index, recorded in enumerate(dataset.sequences(split)):
-            whole = recorded.frames((count - 1) / schema.window.rate, schema.window.rate)
-            kept = subsampling.kept(count, index)
-            sequence = replace(whole, times=whole.times[kept], vertices=whole.vertices[kept])
-            if anchor is None:
-                anchor = sequence.weights @ sequence.vertices[0].astype(float)
-                weights, times, faces = sequence.weights, whole.times, sequence.faces
-                rest = to_canonical(sequence.vertices[0], anchor, schema.azimuth(sequence.parameters))
-            assert rest is not None
-            if sequence.vertices.shape[1] != len(rest):
-                raise InputError(f"{sequence.name}: expected {len(rest)} vertices as in the others, got another mesh")
-            pose, local = decompose(sequence, anchor, schema.azimuth(sequence.parameters))
-            poses[split].append(pose)
-            locals_[split].append(local)
-            vectors.append(schema.vector(sequence.parameters))
-        if not vectors:
-            raise InputError(f"{dataset.root}: no sequence in split {split}")
-        theta[split] = np.stack(vectors)
-    assert rest is not None
-    assert weights is not None
-    assert anchor is not None
-    assert times is not None
-    assert faces is not None
-    shapes = fit_modes(locals_["train"], weights, modes or MOST_MODES)
-    shares = weights[:, None]
-    coefficients = {
-        split: [np.einsum("tni,nik->tk", local * shares, shapes) for local in locals_[split]] for split in locals_
-    }
-    total = {split: np.mean([(shares * x**2).sum(axis=(1, 2)).mean() for x in locals_[split]]) for split in locals_}
-    left = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in locals_}
-    if modes is None:
-        enough = total["val"] - np.cumsum(left["val"]) <= TRUNCATION**2 * total["val"]
-        modes = int(enough.argmax()) + 1 if enough.any() else MOST_MODES
-    largest = _largest([p[:, :3] for p in poses["train"]]), _largest([c[:, :modes] for c in coefficients["train"]])
-    space = replace(make_space(Mesh(rest, faces), shapes[..., :modes], weights, anchor), largest=largest)
-    reduced, known, truncation = {}, {}, {}
-    for split in ("train", "val"):
-        pairs = zip(poses[split], coefficients[split], strict=True)
-        both = [np.concatenate([pose, c[:, :modes]], axis=1) for pose, c in pairs]
-        reduced[split] = np.stack([subsampling.filled(y, count, index) for index, y in enumerate(both)])
-        known[split] = subsampling.known(count, len(both))
-        truncation[split] = float(1e3 * np.sqrt(max(total[split] - left[split][:modes].sum(), 0.0)))
+    subsampling = subsampling or FrameSubsampling()
+    count = subsampling.count(dataset.schema)
+    body = _body(dataset, count)
+    motions = {split: _decomposed(dataset, split, subsampling, count, body) for split in SPLITS}
+    basis = fit_modes(motions["train"].deformations, body.weights, modes or MOST_MODES)
+    coefficients = {split: motions[split].coefficients(basis, body.weights) for split in SPLITS}
+    total = {split: motions[split].mean_square(body.weights) for split in SPLITS}
+    by_mode = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in SPLITS}
+    kept = _needed_modes(total["val"], by_mode["val"]) if modes is None else modes
+    largest = _largest([p[:, :3] for p in motions["train"].poses]), _largest([c[:, :kept] for c in coefficients["train"]])
+    space = replace(make_space(body.rest, basis[..., :kept], body.weights, body.anchor), largest=largest)
+    reduced = {}
+    for split in SPLITS:
+        pairs = zip(motions[split].poses, coefficients[split], strict=True)
+        trajectories = [np.concatenate([pose, c[:, :kept]], axis=1) for pose, c in pairs]
+        reduced[split] = np.stack([subsampling.filled(y, count, index) for index, y in enumerate(trajectories)])
+    left_out = {split: max(total[split] - by_mode[split][:kept].sum(), 0.0) for split in SPLITS}
+    return TrainingData(
+        schema=_trained_schema(dataset.schema, body.times, subsampling),
+        space=space,
+        times=body.times,
+        rest=body.rest.points,
+        weights=body.weights,
+        theta={split: motions[split].theta for split in SPLITS},
+        reduced=reduced,
+        observed={split: subsampling.known(count, len(reduced[split])) for split in SPLITS},
+        truncation_mm={split: float(1e3 * np.sqrt(left_out[split])) for split in SPLITS},
+        identity=_identity(dataset, subsampling, count, kept),
+    )
+
+
+def _frames(dataset: Dataset, recorded: MotionSequence, count: int) -> MotionSequence:
+    """The first `count` frames at the rate of the data set."""
+    rate = dataset.schema.window.rate
+    return recorded.frames((count - 1) / rate, rate)
+
+
+def _body(dataset: Dataset, count: int) -> _Body:
+    """From the first training sequence."""
+    first = next(dataset.sequences("train"), None)
+    if first is None:
+        raise InputError(f"{dataset.root}: no sequence in split train")
+    sequence = _frames(dataset, first, count)
+    anchor = sequence.weights @ sequence.vertices[0].astype(float)
+    rest = to_canonical(sequence.vertices[0], anchor, dataset.schema.azimuth(sequence.parameters))
+    return _Body(Mesh(rest, sequence.faces), sequence.weights, anchor, sequence.times)
+
+
+def _decomposed(dataset: Dataset, split: str, subsampling: FrameSubsampling, count: int, body: _Body) -> _Motions:
+    schema, points = dataset.schema, len(body.rest.points)
+    theta, poses, deformations = [], [], []
+    for index, recorded in enumerate(dataset.sequences(split)):
+        whole = _frames(dataset, recorded, count)
+        kept = subsampling.kept(count, index)
+        sequence = replace(whole, times=whole.times[kept], vertices=whole.vertices[kept])
+        if sequence.vertices.shape[1] != points:
+            raise InputError(f"{sequence.name}: expected {points} vertices as in the others, got another mesh")
+        pose, deformation = decompose(sequence, body.anchor, schema.azimuth(sequence.parameters))
+        poses.append(pose)
+        deformations.append(deformation)
+        theta.append(schema.vector(sequence.parameters))
+    if not theta:
+        raise InputError(f"{dataset.root}: no sequence in split {split}")
+    return _Motions(np.stack(theta), poses, deformations)
+
+
+def _needed_modes(total: float, by_mode: Floats) -> int:
+    """The fewest modes that leave out at most `TRUNCATION` of the deformation, from mean squares by mode (K,)."""
+    enough = total - np.cumsum(by_mode) <= TRUNCATION**2 * total
+    return int(enough.argmax()) + 1 if enough.any() else MOST_MODES
+
+
+def _largest(motions: list[Floats]) -> float:
+    """The largest norm of the vectors (T, n)."""
+    return max(float(np.linalg.norm(motion, axis=1).max()) for motion in motions)
+
+
+def _trained_schema(schema: Schema, times: Times, subsampling: FrameSubsampling) -> Schema:
     rate = schema.window.rate if subsampling.stagger else schema.window.rate / subsampling.every
-    schema = replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
-    used = [[entry.name, entry.sha256] for split in ("train", "val") for entry in dataset.select(split)]
-    asked = [used, count, subsampling.every, subsampling.stagger, modes]
-    identity = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
-    return TrainingData(schema, space, times, rest, weights, theta, reduced, known, truncation, identity)
+    return replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
+
+
+def _identity(dataset: Dataset, subsampling: FrameSubsampling, count: int, modes: int) -> str:
+    used = [[entry.name, entry.sha256] for split in SPLITS for entry in dataset.select(split)]
+    inputs = [used, count, subsampling.every, subsampling.stagger, modes]
+    return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()

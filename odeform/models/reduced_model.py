@@ -1,4 +1,4 @@
-"""What all models of reduced motions share: geometry in, cached basis, motion out."""
+"""What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
 
 from abc import abstractmethod
 from collections import OrderedDict
@@ -14,11 +14,11 @@ from odeform.types import Floats, Geometry, MotionSequence
 
 __all__ = ["ReducedModel"]
 
-CACHED = 4  # geometries (or headings) whose basis is kept
+CACHED = 4  # geometries (or azimuths) whose basis is kept
 
 
 class ReducedModel(Predictor):
-    """A predictor of reduced coordinates. Subclasses say how y(t) comes from parameters."""
+    """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
 
     def _read(self, checkpoint: Checkpoint) -> None:
         self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
@@ -26,11 +26,12 @@ class ReducedModel(Predictor):
 
     @abstractmethod
     def _trajectory(
-        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings | None, until: float
-    ) -> Trajectory: ...
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
+    ) -> Trajectory:
+        """y(t) for inputs theta (P,), solved at least to `until` seconds."""
 
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
-        """The basis on a geometry; kept for the last few."""
+        """The basis on a geometry at an azimuth in radians; the last few are kept."""
         key = (id(geometry), azimuth)
         if key not in self._evaluated:
             check_finite(geometry)

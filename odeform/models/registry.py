@@ -1,4 +1,4 @@
-"""All models by name, and how one is loaded from a checkpoint."""
+"""All models by name (`odeform.models.names`), and how one is loaded from a checkpoint."""
 
 import importlib
 from pathlib import Path
@@ -7,25 +7,12 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
+from odeform.models.names import MODELS, TRAINABLE
 from odeform.models.reduced_model import ReducedModel
 from odeform.schema import Schema
 from odeform.types import MotionSequence
 
-__all__ = ["MODELS", "load", "load_continuous", "load_reduced", "model_class", "observations", "open_checkpoint"]
-
-MODELS: dict[str, str] = {
-    "odeform": "odeform.models.odeform.model:ODeform",
-    "odeform-per-point": "odeform.models.baselines.odeform_per_point:OdeformPerPoint",
-    "node": "odeform.models.baselines.node:Node",
-    "rnn": "odeform.models.baselines.rnn:Rnn",
-    "direct": "odeform.models.baselines.direct:Direct",
-    "occupancy-flow": "odeform.models.baselines.occupancy_flow:OccupancyFlow",
-    "pod-rbf": "odeform.models.baselines.pod_rbf:PodRbf",
-    "nearest": "odeform.models.baselines.nearest:Nearest",
-    "released": "odeform.models.authors.predictor:AuthorsModel",
-}
-"""Name in checkpoints -> "module:class", imported when first used."""
-
+__all__ = ["MODELS", "TRAINABLE", "load", "load_continuous", "load_reduced", "model_class", "observations", "open_checkpoint"]
 
 def model_class(name: str) -> type[Predictor]:
     """The class of a registered model; `InputError` for any other name."""

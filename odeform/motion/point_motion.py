@@ -75,7 +75,7 @@ class PointFrame:
     scale: float
     part_scale: float
 
-    def seen(self, rest: Vectors) -> Points:
+    def inputs(self, rest: Vectors) -> Points:
         """(N, 3) metres about the anchor -> units of `arm`, float32.
 
         Points farther than one and a half times the trained body reaches are taken for points below them, at most

@@ -1,7 +1,5 @@
 """The motion of a reduced model: pose and coefficients at any time, and the points that they move."""
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -13,6 +11,7 @@ from odeform.motion.base import Motion, SolveStats
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
+from odeform.motion.threads import thread_map
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
@@ -21,7 +20,6 @@ __all__ = ["ReducedMotion", "Trajectory", "as_reduced"]
 SEVERAL = 4  # points that are turned as one: products with three rows leave most of a processor's width unused
 BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are turned
 MANY = 16  # such blocks are shared among the cores
-CORES = ThreadPoolExecutor(os.cpu_count(), "decode")  # kept: a thread's first product takes longer than a frame
 
 
 @runtime_checkable
@@ -80,7 +78,11 @@ class ReducedMotion(Motion):
             _turn(weights @ self.evaluated.rows[:, place], turned, out[:, place])
 
         begins = range(0, count, size)
-        list((CORES.map if len(begins) >= MANY else map)(fill, begins))
+        if len(begins) >= MANY:
+            thread_map(fill, begins)
+        else:
+            for begin in begins:
+                fill(begin)
         out = out.reshape(len(y), count, 3)
         # P(0) is P0 to the last bit
         out[~y.any(axis=1)] = self.evaluated.points

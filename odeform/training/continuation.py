@@ -88,7 +88,7 @@ def foretold(model: ODeform, data: TrainingData) -> Floats | None:
     the model's own motions. None if they are nearer to motions that stop there, or where a spline filled in frames: it
     knows no contacts."""
     known = round(len(data.times) / (1.0 + REACH))
-    if known < 4 or not data.known["train"].all():
+    if known < 4 or not data.observed["train"].all():
         return None
     dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :known], data.space.gyration_radius)
     window = replace(data.schema.window, stop=float(data.times[known - 1]))

@@ -7,40 +7,20 @@ features of what the decoders see widen them, and one solve in double precision 
 """
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import torch
-from threadpoolctl import threadpool_limits
 
 from odeform.dataset.training_data import TrainingData
 from odeform.models.odeform.network import ODeformNet
 from odeform.training.config import TrainConfig
+from odeform.training.descent import small_batches
 from odeform.training.random_features import affordable, widen
 from odeform.training.trainer import Trainer
 from odeform.types import Arrays
 
-__all__ = ["network_weights", "small_batches", "train_network"]
-
-
-@contextmanager
-def small_batches() -> Iterator[None]:
-    """One thread of the processor: batches are small, results do not depend on the number of cores, and threads of
-    products that wait for each other stand still beside any other program.
-
-    Denormal numbers slow such a run thirty-fold on some processors; elsewhere they count (SciPy's k-d tree recurses
-    without end where they are taken for 0).
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
-    try:
-        with threadpool_limits(1, "blas"):
-            yield
-    finally:
-        torch.set_num_threads(threads)
-        torch.set_flush_denormal(False)
+__all__ = ["network_weights", "train_network"]
 
 
 def _descend(trainer: Trainer, config: TrainConfig, report: Callable[[str], None], part: Path | None) -> None:

@@ -1,4 +1,4 @@
-"""From sequences to what models of points learn from: the displacements of all vertices."""
+"""What models of points are trained on: the displacements of all vertices of all sequences."""
 
 from dataclasses import dataclass, replace
 
@@ -17,29 +17,33 @@ __all__ = ["PointData", "prepare_points"]
 
 @dataclass(frozen=True, eq=False)
 class PointData:
-    """`theta` (S, P) in [-1, 1] and `moved` (S, T, N, 3) float32, for train and val: displacements from the mean motion
-    of the training sequences, in units of the frame's scale."""
+    """Parameters and displacements of the splits train and val."""
 
     schema: Schema
+    """With the window of the training; its rate is that of the observed frames, for models that are given some."""
     frame: PointFrame
     mean: MeanMotion
+    """The mean motion of the training sequences."""
     x: Floats
-    """(N, 3) rest points, float32, as networks see them."""
+    """(N, 3) rest points, float32, as inputs of networks."""
     weights: Floats
     """(N,) share of the mass at each vertex."""
     theta: dict[str, Floats]
+    """(S, P) parameters in [-1, 1] by split."""
     moved: dict[str, Floats]
-    known: dict[str, Bools]
-    """(S, T) whether the frame is of the data, as of `TrainingData`."""
+    """(S, T, N, 3) float32 displacements from the mean motion by split, in units of the frame's scale."""
+    observed: dict[str, Bools]
+    """(S, T) by split: True where the frame is of the data, False where a spline fills it in."""
     given: int = 1
-    """Frames from one given frame to the next; 1 for models that are given none."""
+    """Frames from one observed frame to the next, for models that interpolate between them; 1 for all others."""
 
 
 def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None, given: int = 1) -> PointData:
-    """Displacements in canonical axes of all training and validation sequences; between frames that are known by a
-    cubic spline.
+    """Displacements in canonical axes of all training and validation sequences; frames that are left out are filled in
+    by a cubic spline.
 
-    For models that are `given` every k-th frame, the window ends with a given frame, and has their rate.
+    For models that are given every k-th frame (`given`), the window ends with such a frame, and has their rate.
+    `InputError` for a split without sequences, and for sequences of different meshes.
     """
     subsampling = subsampling or FrameSubsampling()
     count = subsampling.count(dataset.schema) if given == 1 else replace(subsampling, every=given).count(dataset.schema)
@@ -48,29 +52,28 @@ def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None
         raise InputError(f"{dataset.root}: no sequence in split train")
     anchor = first.weights @ first.vertices[0].astype(float)
     rest = to_canonical(first.vertices[0], anchor, dataset.schema.azimuth(first.parameters))
-    theta, moved, known = {}, {}, {}
+    theta, moved, observed = {}, {}, {}
     for split in ("train", "val"):
-        theta[split], moved[split] = _read(dataset, split, subsampling, count, anchor, len(rest))
-        known[split] = subsampling.known(count, len(theta[split]))
+        theta[split], moved[split] = _displacements(dataset, split, subsampling, count, anchor, len(rest))
+        observed[split] = subsampling.known(count, len(theta[split]))
     times = np.arange(count) / dataset.schema.window.rate
     largest = max(float(np.linalg.norm(motion, axis=-1).max()) for motion in moved["train"])
     shifts = np.mean([np.einsum("n,tni->ti", first.weights, motion) for motion in moved["train"]], axis=0)
-    mean = MeanMotion(times, shifts)
     for split in moved:
         moved[split] -= shifts[:, None].astype(np.float32)
     frame = _frame(rest, first.weights, anchor, moved["train"], largest)
     for split in moved:
         moved[split] /= np.float32(frame.scale)
-    rate = 1.0 / float(times[1] - times[0]) / given
-    schema = replace(
-        dataset.schema, window=Window(float(times[0]), float(times[-1]), rate), needs_observations=given > 1
-    )
-    return PointData(schema, frame, mean, frame.seen(rest), first.weights, theta, moved, known, given)
+    window = Window(float(times[0]), float(times[-1]), 1.0 / float(times[1] - times[0]) / given)
+    schema = replace(dataset.schema, window=window, needs_observations=given > 1)
+    mean = MeanMotion(times, shifts)
+    return PointData(schema, frame, mean, frame.inputs(rest), first.weights, theta, moved, observed, given)
 
 
-def _read(
+def _displacements(
     dataset: Dataset, split: str, subsampling: FrameSubsampling, count: int, anchor: Vector, points: int
 ) -> tuple[Floats, Floats]:
+    """Parameters (S, P) and displacements from rest (S, T, N, 3) in metres, canonical, float32."""
     rate = dataset.schema.window.rate
     theta, moved = [], []
     for index, recorded in enumerate(dataset.sequences(split)):
@@ -78,8 +81,8 @@ def _read(
         if sequence.vertices.shape[1] != points:
             raise InputError(f"{sequence.name}: expected {points} vertices as in the others, got another mesh")
         turned = to_canonical(sequence.vertices, anchor, dataset.schema.azimuth(sequence.parameters))
-        shown = (turned - turned[0])[subsampling.kept(count, index)]
-        moved.append(subsampling.filled(shown, count, index).astype(np.float32))
+        kept = (turned - turned[0])[subsampling.kept(count, index)]
+        moved.append(subsampling.filled(kept, count, index).astype(np.float32))
         theta.append(dataset.schema.vector(sequence.parameters))
     if not theta:
         raise InputError(f"{dataset.root}: no sequence in split {split}")

@@ -28,7 +28,7 @@ def needed_modes(model: ODeform, data: TrainingData) -> int:
     motions = [model.integrate(theta, evaluated, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
     truth = data.reduced["val"][..., POSE:]
     size = np.linalg.norm(truth, axis=2)
-    weights = data.known["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
+    weights = data.observed["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
     off = np.stack(motions)[..., POSE:] - truth
     missed, still = (np.einsum("st,stk->k", weights, x**2) for x in (off, truth))
     # what is left out is missed as a whole

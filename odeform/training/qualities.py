@@ -46,7 +46,7 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
     # what a spline filled in is no truth, and at rest nothing is missed
-    frames = data.known["val"] & (data.times > 0.0)
+    frames = data.observed["val"] & (data.times > 0.0)
 
     def errors_mm(motion: Floats, truth: Floats) -> tuple[float, float]:
         motion, truth = motion[frames], truth[frames]

@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 
 from odeform.errors import InputError
+from odeform.models.baselines.fitted_model import FittedModel
+from odeform.models.registry import model_class
 
-__all__ = ["DIRECT_FITS", "TrainRequest"]
-
-DIRECT_FITS = ("pod-rbf", "nearest")
-"""Models that are solved for, and have no budget."""
+__all__ = ["TrainRequest"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class TrainRequest:
     def command(self) -> str:
         """The same request as a command line, without the names of files."""
         options = f" --model {self.model} --seed {self.seed}"
-        if self.model not in DIRECT_FITS:
+        if not issubclass(model_class(self.model), FittedModel):
             options += f" --minutes {self.minutes:g}" if self.steps is None else f" --steps {self.steps}"
         options += f" --window {self.window[0]}:{self.window[1]}" if self.window else ""
         options += f" --every {self.every}" if self.every > 1 else ""

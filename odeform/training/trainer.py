@@ -13,12 +13,13 @@ from safetensors.torch import load, save
 from torch import nn
 
 from odeform.dataset.subsampling import observed_frames
-from odeform.dataset.training_data import UNKNOWN, TrainingData
+from odeform.dataset.training_data import FILLED_WEIGHT, TrainingData
 from odeform.errors import InputError
 from odeform.io import atomic_write, safetensors_metadata
 from odeform.models.odeform.network import ODeformNet
 from odeform.motion.reduced_space import POSE
 from odeform.training.config import FREE, TrainConfig
+from odeform.training.descent import cosine_decay
 from odeform.training.losses import Metric, balanced
 from odeform.training.readout import NormalEquations
 from odeform.training.start import training_shape
@@ -49,12 +50,12 @@ class Trainer:
             k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
             for k, v in data.reduced.items()
         }
-        train, val = (torch.as_tensor(data.known[split]).T.contiguous().to(device) for split in ("train", "val"))
-        self.known = {"train": torch.where(train, 1.0, UNKNOWN), "val": val.float()}
+        train, val = (torch.as_tensor(data.observed[split]).T.contiguous().to(device) for split in ("train", "val"))
+        self.observed = {"train": torch.where(train, 1.0, FILLED_WEIGHT), "val": val.float()}
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.times = torch.as_tensor(data.times).float().to(device)
         self.shown, self.counted = (
-            torch.as_tensor(v.T.copy()).to(device) for v in observed_frames(data.known["train"])
+            torch.as_tensor(v.T.copy()).to(device) for v in observed_frames(data.observed["train"])
         )
         # of whole motions every other frame tells as much, and a solve costs as much as the roll-out; where fewer are
         # known all are solved for, and a batch has more motions
@@ -116,7 +117,7 @@ class Trainer:
         start, grown = config.horizon
         frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
         warm = min(1.0, (self.done + 1) / 20.0)
-        self.optimiser.param_groups[0]["lr"] = warm * config.rate * 0.5 * (1.0 + np.cos(np.pi * share))
+        self.optimiser.param_groups[0]["lr"] = warm * config.rate * cosine_decay(share)
         rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.batch]
         self.optimiser.zero_grad()
         self.loss(rows.to(self.device), max(frames, 2)).backward()
@@ -142,14 +143,14 @@ class Trainer:
             equations = NormalEquations()
             for rows in torch.arange(states.shape[1]).split(CHUNK):
                 features = decoder.features(states[:, rows][..., place], told[:, rows])
-                equations.add(features, self.truth["train"][:, rows][..., out], self.known["train"][:, rows])
+                equations.add(features, self.truth["train"][:, rows][..., out], self.observed["train"][:, rows])
             decoder.readout.weight.data = equations.solve(ridge).to(decoder.readout.weight.dtype)
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         predicted = self.net.decode(self.paths(split)[::2], self.times, self.theta[split])
-        missed = self.metric(predicted[1:], self.truth[split][1:], self.known[split][1:])
+        missed = self.metric(predicted[1:], self.truth[split][1:], self.observed[split][1:])
         rigid, local = (torch.stack(missed) / 3.0).sqrt().tolist()
         return rigid, local
 
@@ -157,8 +158,8 @@ class Trainer:
         """Go on in double precision."""
         self.net.double()
         self.metric.double()
-        self.truth, self.known, self.theta = (
-            {k: v.double() for k, v in x.items()} for x in (self.truth, self.known, self.theta)
+        self.truth, self.observed, self.theta = (
+            {k: v.double() for k, v in x.items()} for x in (self.truth, self.observed, self.theta)
         )
         self.shape = self.shape[0].double(), self.shape[1].double()
         self.times = self.times.double()

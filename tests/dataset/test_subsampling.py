@@ -14,7 +14,7 @@ from odeform.errors import InputError
 @pytest.mark.parametrize("stagger", [False, True])
 def test_known_frames_are_as_they_were(dataset: Dataset, stagger: bool) -> None:
     whole, few = prepare(dataset, modes=8), prepare(dataset, 8, FrameSubsampling(every=3, stagger=stagger))
-    known = few.known["train"]
+    known = few.observed["train"]
     assert known[:, 0].all()
     assert (known.sum(axis=1) <= len(few.times) // 3 + 2).all()
     # poses do not depend on the basis, which is fitted to the frames that are known

@@ -55,7 +55,7 @@ def test_descent_sees_as_many_frames_where_few_are_known(dataset: Dataset, stagg
     # what a spline filled in changes nothing
     rows, losses = torch.arange(trainer.batch), []
     for filled in (0.0, 1e3):
-        reduced = data.reduced["train"] + filled * ~data.known["train"][..., None]
+        reduced = data.reduced["train"] + filled * ~data.observed["train"][..., None]
         other = replace(data, reduced={**data.reduced, "train": reduced})
         trainer = Trainer(build_network(data, 0), other, config, torch.device("cpu"))
         trainer.loss(rows, trainer.frames // 2)

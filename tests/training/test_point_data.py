@@ -16,7 +16,7 @@ def test_displacements_come_back_from_mean_and_scale(dataset: Dataset) -> None:
     moved = data.frame.scale * data.moved["train"][0] + data.mean.shifts[:, None]
     distance = np.linalg.norm(sequence.vertices[:121] - sequence.vertices[0], axis=2)
     apart = np.abs(np.linalg.norm(moved, axis=2) - distance).max(axis=1)
-    assert apart[data.known["train"][0]].max() < 1e-5
+    assert apart[data.observed["train"][0]].max() < 1e-5
     assert apart.max() > 1e-5
 
 

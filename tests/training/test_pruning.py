@@ -24,7 +24,7 @@ def model() -> ODeform:
 @pytest.fixture(scope="module")
 def data(model: ODeform) -> TrainingData:
     whole = prepare(open_dataset("mass-elastic"), modes=model.space.basis.modes)
-    few = {name: {**(of := getattr(whole, name)), "val": of["val"][:4]} for name in ("theta", "reduced", "known")}
+    few = {name: {**(of := getattr(whole, name)), "val": of["val"][:4]} for name in ("theta", "reduced", "observed")}
     return replace(whole, **few)
 
 

@@ -70,6 +70,6 @@ def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
     model = cast(ODeform, predictors["odeform"])
     monkeypatch.setattr(qualities, "_candidates", lambda _: [SolverSettings("rk4", step=0.01)])
     data = prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True))
-    unknown = ~data.known["val"][..., None]
+    unknown = ~data.observed["val"][..., None]
     wrong = replace(data, reduced={**data.reduced, "val": data.reduced["val"] + 9.0 * unknown})
     assert measure_frontier(model, wrong) == measure_frontier(model, data)

@@ -1,25 +1,23 @@
-"""Networks as functions of arrays: written once, run by numpy to predict and by torch to learn."""
+"""Networks as functions of arrays: written once, run by numpy for predictions and by torch for training."""
 
-import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy.special import expit
 
 from odeform.cancellation import check_cancelled
+from odeform.models.layers import Sizes
 
-__all__ = ["CLOCK", "Arithmetic", "Net", "Numpy", "Sizes", "layer_shapes"]
+__all__ = ["CLOCK", "Arithmetic", "Net", "Numpy", "Sizes"]
 
-Sizes = Mapping[str, list[int]]
-"""Widths of the layers of each part of a network, inputs first, outputs last."""
 OCTAVES = 7  # the shortest period of a clock's features is 1/32 of the window: 4.7 frames of 150
 CLOCK = 1 + 2 * OCTAVES
 
 
 @runtime_checkable
 class Arithmetic(Protocol):
-    """What numpy and torch call by other names. Arrays are (..., features)."""
+    """The operations that numpy and torch name differently, on arrays (..., features)."""
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any: ...
     def join(self, parts: list[Any]) -> Any: ...
@@ -61,7 +59,7 @@ class Numpy:
 
 
 class Net:
-    """Weights by name, PART.LAYER.weight and PART.LAYER.bias as a `torch.nn.Sequential` has them, and an arithmetic."""
+    """Weights by name, as `layer_shapes` names them, and the arithmetic to evaluate them with."""
 
     def __init__(self, weights: Mapping[str, Any], arithmetic: Arithmetic) -> None:
         self.weights, self.arithmetic = weights, arithmetic
@@ -81,16 +79,8 @@ class Net:
     def clock(self, times: Any) -> Any:
         """(...) times in windows -> (..., CLOCK): the time, and its sines and cosines over octaves.
 
-        Contacts last a few frames: a plain network of time bends over the window at first, and learns that for long.
+        Contacts last a few frames: without these features a network is too smooth in time at first, and trains slowly.
         """
         time = times[..., None]
         waves = [self.act(wave, np.pi * 2.0**k * time) for k in range(OCTAVES) for wave in ("sin", "cos")]
         return self.join([time, *waves])
-
-
-def layer_shapes(sizes: Sizes) -> Iterable[tuple[str, tuple[int, ...]]]:
-    """Names and shapes of all weights of a network."""
-    for part, widths in sizes.items():
-        for layer, (before, after) in enumerate(itertools.pairwise(widths)):
-            yield f"{part}.{2 * layer}.weight", (after, before)
-            yield f"{part}.{2 * layer}.bias", (after,)

@@ -1,4 +1,4 @@
-"""A trajectory known at frames: what baselines without a clock of their own predict."""
+"""A trajectory that is known at frames: what reduced baselines without dynamics of their own predict."""
 
 import time
 from collections.abc import Callable
@@ -16,6 +16,7 @@ class FrameTrajectory:
     """Reduced coordinates at frames, a cubic spline between them, and the last frame held beyond."""
 
     def __init__(self, name: str, times: Floats, predict: Callable[[], Floats]) -> None:
+        """`predict` returns (T, 6 + K) at the (T,) `times` in seconds; its run time goes into `stats`."""
         begin = time.perf_counter()
         self._spline = CubicSpline(times, predict(), axis=0)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
@@ -27,6 +28,7 @@ class FrameTrajectory:
         return float("inf")
 
     def reduced(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, 6 + K), zero at the first frame."""
         return self._spline(np.clip(times, self._times[0], self._times[-1])) - self._origin
 
     @property

@@ -1,21 +1,23 @@
-"""The training sequence with the nearest parameters: what any model has to beat."""
+"""The training sequence with the nearest parameters: the least that any model has to beat."""
+
+from typing import Any
 
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
+from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.baselines.frame_trajectory import FrameTrajectory
-from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
 
-__all__ = ["Nearest", "fit_nearest"]
+__all__ = ["Nearest"]
 
 
-class Nearest(ReducedModel):
-    """DisplayOptions up; does not learn."""
+class Nearest(FittedModel):
+    """Looks motions up and does not learn."""
 
     model = "nearest"
 
@@ -25,8 +27,15 @@ class Nearest(ReducedModel):
         self._theta = checkpoint.arrays["theta"]
         self._pose, self._local = checkpoint.arrays["pose"], checkpoint.arrays["local"]
 
+    @staticmethod
+    def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
+        """The training motions. Half precision keeps a deformation of 5 mm to within 3 micrometres."""
+        pose, local = np.split(data.reduced["train"], [POSE], axis=2)
+        arrays = {"pose": pose.astype(np.float32), "local": local.astype(np.float16)}
+        return {"times": data.times, "theta": data.theta["train"], **arrays}, {}
+
     def _trajectory(
-        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings | None, until: float
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> FrameTrajectory:
         row = int(((self._theta - theta) ** 2).sum(axis=1).argmin())
 
@@ -34,10 +43,3 @@ class Nearest(ReducedModel):
             return np.concatenate([self._pose[row], self._local[row]], axis=1, dtype=float)
 
         return FrameTrajectory("nearest training sequence", self._times, frames)
-
-
-def fit_nearest(data: TrainingData) -> tuple[Arrays, dict[str, object]]:
-    """Arrays and settings of the checkpoint. Half precision leaves deformations of 5 mm right to 3 micrometres."""
-    pose, local = np.split(data.reduced["train"], [POSE], axis=2)
-    arrays = {"pose": pose.astype(np.float32), "local": local.astype(np.float16)}
-    return {"times": data.times, "theta": data.theta["train"], **arrays}, {}

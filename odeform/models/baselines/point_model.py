@@ -1,4 +1,4 @@
-"""What all models that move each point by itself share: how they are kept and read, and how they solve."""
+"""What all models that move each point by itself share: how they are stored and read, and how they solve."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -24,7 +24,10 @@ PREFIX = "net."
 
 
 class PointModel(Predictor):
-    """A predictor of where each point goes."""
+    """A predictor of where each point goes.
+
+    A subclass sets `model`, its `network`, which `odeform train` trains, and the `trajectory` that evaluates it.
+    """
 
     network: PointNet
     trajectory: type[MomentaryPoints | FramedPoints]
@@ -40,9 +43,9 @@ class PointModel(Predictor):
         self._probes = evaluate_probes(self.rest, np.array(self.frame.anchor))
 
     def _trajectory(self, rest: Points, parameters: Parameters, observed: MotionSequence | None) -> PointTrajectory:
-        """Of points (N, 3) in metres about the anchor, canonical."""
-        seen, theta = self.frame.seen(rest), self.schema.inputs(parameters)
-        return self.trajectory(self.net, self.network, self.frame, self.schema.window, seen, theta)
+        """The trajectory of points (N, 3) in metres about the anchor, canonical."""
+        inputs, theta = self.frame.inputs(rest), self.schema.inputs(parameters)
+        return self.trajectory(self.net, self.network, self.frame, self.schema.window, inputs, theta)
 
     def _solve(
         self,
@@ -74,7 +77,7 @@ def _frame_from_json(data: Mapping[str, Any]) -> PointFrame:
 def point_checkpoint(
     model: str, schema: Schema, frame: PointFrame, mean: MeanMotion, weights: Arrays, config: dict[str, Any]
 ) -> Checkpoint:
-    """What a model of points is read from, but for the body that viewers show."""
+    """The checkpoint of a point model, without the body that viewers show."""
     arrays = {PREFIX + name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
     arrays |= {"mean.times": mean.times, "mean.shifts": mean.shifts}
     return Checkpoint(model, schema, {"frame": _frame_to_json(frame), **config}, arrays)

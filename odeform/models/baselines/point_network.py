@@ -1,7 +1,7 @@
-"""What a network that moves each point by itself is: its sizes, what it is asked, and how it wants to be taught.
+"""What a network that moves each point by itself is: layer sizes, a forward pass, and how it is trained.
 
-It is a function of a rest point x, parameters theta and time, and knows nothing of other points: any shape can be
-moved, and a point moves alike whatever it is asked with.
+The network is a function of a rest point x, parameters theta and time, and knows nothing of other points. It can
+therefore move any shape, and a point moves the same in every shape.
 """
 
 from abc import ABC, abstractmethod
@@ -10,53 +10,58 @@ from typing import Any, Literal
 
 from odeform.models.baselines.arithmetic import Net, Sizes
 
-__all__ = ["PointNet", "Rows", "Trial", "sum_of"]
+__all__ = ["PointBatch", "PointNet", "Trial", "sum_of"]
 
 
 @dataclass(frozen=True)
-class Rows:
-    """What networks are asked: points x (B, 3) in units of the body's arm, parameters (B, P) in [-1, 1], and `times`
-    (F, B) in windows. `begin` (B, 3) is the displacement at the first of them, in units of the data's scale; `finer`
-    that of displacements less their mean over the body, in the same units. Arrays of numpy or tensors of torch."""
+class PointBatch:
+    """Inputs of a network, as arrays of numpy or tensors of torch."""
 
     x: Any
+    """(B, 3) rest points in units of the body's radius of gyration."""
     theta: Any
+    """(B, P) parameters in [-1, 1], or what else the network is conditioned on."""
     times: Any
+    """(F, B) times in windows."""
     begin: Any
+    """(B, 3) displacements at the first time, in units of the data's scale."""
     finer: float
+    """Scale of displacements less their mean over the body, in units of the data's scale."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A setting that validation chooses from."""
+    """Hyperparameters among which validation chooses."""
 
     rate: float
     """Learning rate after the warm-up."""
     width: int
+    """Width of the hidden layers."""
 
 
 class PointNet(ABC):
-    """A network of points: its sizes, its prediction, and how it wants to be taught."""
+    """A network for each point: its layers, its forward pass, and how training samples motions for it."""
 
-    teaching: Literal["moments", "segments", "whole", "between"]
-    """By single moments; by motions from a true state at any frame; by motions from rest; or by those between given
-    frames."""
+    sampling: Literal["moments", "segments", "whole", "between"]
+    """Training samples: single frames ("moments"), motions from a true state at any frame ("segments"), motions from
+    rest ("whole"), or motions between two observed frames ("between")."""
     strides: tuple[int, ...] = (1,)
-    """Frames from one to the next that it is taught by, at the start of training to its end."""
+    """Frames per step of a "whole" motion, from the start of training to its end."""
     work: int = 8192
-    """Rows times frames of a step of training."""
+    """Points times frames in a training step."""
     trials: tuple[Trial, ...] = (Trial(1e-3, 128), Trial(1e-3, 256), Trial(3e-3, 256))
 
     @abstractmethod
     def sizes(self, parameters: int, width: int) -> Sizes:
-        """Of each part, for P parameters."""
+        """Layer widths of each part of the network, for P parameters."""
 
     @abstractmethod
-    def predict(self, net: Net, rows: Rows) -> list[Any]:
-        """Parts (F, B, 3) of the displacement, which is their sum: in all models but one there is one part."""
+    def predict(self, net: Net, batch: PointBatch) -> list[Any]:
+        """Parts (F, B, 3) of the displacement, which is their sum: a single part in all models but one."""
 
 
 def sum_of(parts: list[Any]) -> Any:
+    """The displacement (F, B, 3) from its parts."""
     total = parts[0]
     for part in parts[1:]:
         total = total + part

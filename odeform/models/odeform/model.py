@@ -61,7 +61,7 @@ class ODeform(ReducedModel):
         return pooled
 
     def _trajectory(
-        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings | None, until: float
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert quality is not None
         if self.dynamics is None:

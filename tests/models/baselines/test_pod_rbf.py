@@ -4,8 +4,8 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.base import Predictor
-from odeform.models.baselines.nearest import fit_nearest
-from odeform.models.baselines.pod_rbf import fit_pod_rbf
+from odeform.models.baselines.nearest import Nearest
+from odeform.models.baselines.pod_rbf import PodRbf
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +22,14 @@ def test_nearest_gives_back_the_nearest_sequence(dataset: Dataset, predictors: d
 
 
 def test_nearest_keeps_the_training_data(data: TrainingData) -> None:
-    arrays, _ = fit_nearest(data)
+    arrays, _ = Nearest.fit(data)
     assert np.array_equal(arrays["theta"], data.theta["train"])
     kept = np.concatenate([arrays["pose"], arrays["local"]], axis=2)
     assert np.allclose(kept, data.reduced["train"], rtol=0.0, atol=5e-6)
 
 
 def test_pod_explains_the_training_data(data: TrainingData) -> None:
-    arrays, settings = fit_pod_rbf(data)
+    arrays, settings = PodRbf.fit(data)
     flat = arrays["pod.mean"] + arrays["pod.coefficients"] @ arrays["pod.modes"]
     error = flat.reshape(data.reduced["train"].shape) - data.reduced["train"]
     spread = data.reduced["train"] - data.reduced["train"].mean(axis=0)
@@ -38,14 +38,14 @@ def test_pod_explains_the_training_data(data: TrainingData) -> None:
 
 
 def test_chosen_setting_is_the_best_on_val(data: TrainingData) -> None:
-    _, settings = fit_pod_rbf(data)
+    _, settings = PodRbf.fit(data)
     best = min(settings["trials"], key=lambda trial: trial["val"])
     assert (settings["kernel"], settings["smoothing"]) == (best["kernel"], best["smoothing"])
 
 
 def test_few_sequences(data: TrainingData) -> None:
     few = TrainingData(
-        **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced", "known")}}
+        **{**vars(data), **{k: {s: v[:6] for s, v in getattr(data, k).items()} for k in ("theta", "reduced", "observed")}}
     )
-    arrays, _ = fit_pod_rbf(few)
+    arrays, _ = PodRbf.fit(few)
     assert np.isfinite(arrays["pod.coefficients"]).all()

@@ -1,0 +1,26 @@
+"""A small cache of the values that were used last."""
+
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+__all__ = ["Recent"]
+
+Value = TypeVar("Value")
+
+
+class Recent(Generic[Value]):
+    """Keeps the last `size` values by key. Threads may share it: its entries are replaced, never changed."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._entries: tuple[tuple[Hashable, Value], ...] = ()
+
+    def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """The value of `key`, which is made if it is not kept."""
+        entries = self._entries
+        found = next((entry for entry in entries if entry[0] == key), None)
+        if found is None:
+            found = (key, make())
+        if not entries or found is not entries[0]:
+            self._entries = (found, *(entry for entry in entries if entry is not found))[: self._size]
+        return found[1]

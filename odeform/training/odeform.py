@@ -1,0 +1,27 @@
+"""The training of ODeform from reduced data: its network, its settings, and what a checkpoint keeps of both."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from odeform.dataset.training_data import TrainingData
+from odeform.models.odeform.model import PREFIX
+from odeform.training import config
+from odeform.training.loop import network_weights, train_network
+from odeform.training.request import TrainRequest
+from odeform.training.start import build_network
+from odeform.types import Arrays
+
+__all__ = ["fit_odeform"]
+
+
+def fit_odeform(
+    data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path
+) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and settings of the checkpoint."""
+    net = build_network(data, request.seed)
+    used = config.TrainConfig(request.minutes, request.steps, seed=request.seed)
+    val = train_network(net, data, used, report, part, request.resume)
+    settings = {"network": asdict(net.config), "qualities": {}, "training": asdict(used), "val": val}
+    return {PREFIX + name: value for name, value in network_weights(net).items()}, settings

@@ -1,0 +1,24 @@
+"""The arithmetic of point networks in torch, for training; `odeform.models.baselines.arithmetic` has it in numpy."""
+
+from typing import Any
+
+import torch
+from torch.nn.functional import linear, silu
+
+__all__ = ["Torch"]
+
+
+class Torch:
+    """Arithmetic on tensors, differentiable."""
+
+    def linear(self, x: Any, weight: Any, bias: Any) -> Any:
+        return linear(x, weight, bias)
+
+    def join(self, parts: list[Any]) -> Any:
+        return torch.cat(parts, dim=-1)
+
+    def stack(self, parts: list[Any]) -> Any:
+        return torch.stack(parts)
+
+    def act(self, name: str, x: Any) -> Any:
+        return silu(x) if name == "silu" else getattr(torch, name)(x)
