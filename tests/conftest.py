@@ -20,12 +20,13 @@ import odeform.training.loop  # noqa: F401  (declares types of the real settings
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
+from odeform.models.baselines.point_model import PointModel
 from odeform.models.baselines.point_network import Trial
-from odeform.models.registry import load
+from odeform.models.registry import load, models_of
 from odeform.simulation import runner
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
-from odeform.training.train import POINTS, train
+from odeform.training.train import train
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -146,15 +147,15 @@ def point_models(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
     def fit(folder: Path) -> None:
         folder.mkdir()
         with pytest.MonkeyPatch.context() as patch, _unchecked():
-            for name, model in POINTS.items():
+            for name, model in models_of(PointModel).items():
                 patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
                 patch.setattr(model.network, "work", 256, raising=False)
-                steps = 210 if model.network.teaching == "moments" else 56  # a step of these is cheap
+                steps = 210 if model.network.sampling == "moments" else 56  # a step of these is cheap
                 path = folder / f"{name}.safetensors"
                 train(dataset, path, name, seed=1, steps=steps, every=4, report=_silent)
 
     folder = made_once("points", fit)
-    return {name: folder / f"{name}.safetensors" for name in POINTS}
+    return {name: folder / f"{name}.safetensors" for name in models_of(PointModel)}
 
 
 def _silent(_: str) -> None:

@@ -19,7 +19,7 @@ SPLITS = ("train", "val")
 TRUNCATION = 5e-3  # share of the RMS deformation that may be left out
 MOST_MODES = 64
 FILLED_WEIGHT = 1e-3
-"""Weight in training of a frame that is not observed but filled in by a spline: it constrains what nothing else does."""
+"""Weight in training of a frame that a spline fills in: it constrains what no observed frame does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,10 @@ def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsam
     total = {split: motions[split].mean_square(body.weights) for split in SPLITS}
     by_mode = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in SPLITS}
     kept = _needed_modes(total["val"], by_mode["val"]) if modes is None else modes
-    largest = _largest([p[:, :3] for p in motions["train"].poses]), _largest([c[:, :kept] for c in coefficients["train"]])
-    space = replace(make_space(body.rest, basis[..., :kept], body.weights, body.anchor), largest=largest)
+    shift = _largest([pose[:, :3] for pose in motions["train"].poses])
+    deformation = _largest([c[:, :kept] for c in coefficients["train"]])
+    space = make_space(body.rest, basis[..., :kept], body.weights, body.anchor)
+    space = replace(space, largest=(shift, deformation))
     reduced = {}
     for split in SPLITS:
         pairs = zip(motions[split].poses, coefficients[split], strict=True)

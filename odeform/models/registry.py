@@ -2,6 +2,7 @@
 
 import importlib
 from pathlib import Path
+from typing import TypeVar
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
@@ -12,7 +13,20 @@ from odeform.models.reduced_model import ReducedModel
 from odeform.schema import Schema
 from odeform.types import MotionSequence
 
-__all__ = ["MODELS", "TRAINABLE", "load", "load_continuous", "load_reduced", "model_class", "observations", "open_checkpoint"]
+__all__ = [
+    "MODELS",
+    "TRAINABLE",
+    "load",
+    "load_continuous",
+    "load_reduced",
+    "model_class",
+    "models_of",
+    "observations",
+    "open_checkpoint",
+]
+
+Kind = TypeVar("Kind", bound=Predictor)
+
 
 def model_class(name: str) -> type[Predictor]:
     """The class of a registered model; `InputError` for any other name."""
@@ -20,6 +34,12 @@ def model_class(name: str) -> type[Predictor]:
         raise InputError(f"unknown model {name!r}: expected one of {', '.join(MODELS)}")
     module, _, attribute = MODELS[name].partition(":")
     return getattr(importlib.import_module(module), attribute)
+
+
+def models_of(kind: type[Kind]) -> dict[str, type[Kind]]:
+    """The registered models that are subclasses of `kind`, by name."""
+    classes = {name: model_class(name) for name in MODELS}
+    return {name: model for name, model in classes.items() if issubclass(model, kind)}
 
 
 def open_checkpoint(name: str | Path) -> Checkpoint:

@@ -6,9 +6,7 @@ from typing import Any
 __all__ = ["classic", "three_eighths"]
 
 
-def classic(
-    field: Callable[[Any, Any], Any], state: Any, length: Any, begin: Any, middle: Any, end: Any
-) -> Any:
+def classic(field: Callable[[Any, Any], Any], state: Any, length: Any, begin: Any, middle: Any, end: Any) -> Any:
     """The state after a step of `length` of dz/dt = field(z, t) by the classic rule, known as RK4.
 
     `begin`, `middle` and `end` are what the field is given for t at the start, in the middle and at the end.

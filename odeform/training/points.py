@@ -14,9 +14,10 @@ import numpy as np
 import torch
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.baselines.arithmetic import Net, layer_shapes
+from odeform.models.baselines.arithmetic import Net
 from odeform.models.baselines.point_model import point_checkpoint
 from odeform.models.baselines.point_network import PointNet, Trial, sum_of
+from odeform.models.layers import layer_shapes
 from odeform.schema import REACH
 from odeform.training.descent import cosine_decay, small_batches
 from odeform.training.point_data import PointData

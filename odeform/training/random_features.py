@@ -121,7 +121,10 @@ def widen(trainer: Trainer, count: int) -> None:
             {split: states[split][..., place] for split in states},
             told,
             {split: truth[split][..., out] for split in states},
-            {split: _weights(truth[split] * scale, trainer.observed[split], config.between, deformed) for split in states},
+            {
+                split: _weights(truth[split] * scale, trainer.observed[split], config.between, deformed)
+                for split in states
+            },
             scale[out],
         )
         seen, layers = lesson.seen(rows), []

@@ -68,9 +68,7 @@ class Sampler(ABC):
 
     def batch(self, sample: Sample) -> tuple[PointBatch, torch.Tensor, torch.Tensor]:
         """Inputs, and the true displacements (F, B, 3) of the points and of the body's centre."""
-        sequence, point, frames = (
-            index.to(self.device) for index in (sample.sequence, sample.point, sample.frames)
-        )
+        sequence, point, frames = (index.to(self.device) for index in (sample.sequence, sample.point, sample.frames))
         truth, centre = self.moved[sequence, frames, point], self.centre[sequence, frames]
         return self.inputs(sequence, point, frames, truth), truth, centre
 
@@ -98,8 +96,8 @@ class Moments(Sampler):
 
     def all_frames(self, sequence: torch.Tensor, point: torch.Tensor) -> Sample:
         frames = torch.arange(1, self.last + 1)
-        repeated = (index.repeat(self.last) for index in (sequence, point))
-        return Sample(*repeated, frames.repeat_interleave(len(sequence))[None])
+        repeated = frames.repeat_interleave(len(sequence))[None]
+        return Sample(sequence.repeat(self.last), point.repeat(self.last), repeated)
 
 
 class Segments(Sampler):
@@ -144,9 +142,8 @@ class BetweenFrames(Sampler):
 
     def all_frames(self, sequence: torch.Tensor, point: torch.Tensor) -> Sample:
         starts = torch.arange(0, self.last, self.given)
-        repeated = (index.repeat(len(starts)) for index in (sequence, point))
         frames = torch.arange(self.given + 1)[:, None] + starts.repeat_interleave(len(sequence))
-        return Sample(*repeated, frames)
+        return Sample(sequence.repeat(len(starts)), point.repeat(len(starts)), frames)
 
     def inputs(
         self, sequence: torch.Tensor, point: torch.Tensor, frames: torch.Tensor, truth: torch.Tensor

@@ -18,7 +18,7 @@ from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.residuals import validation_residuals
 from odeform.models.base import Predictor
 from odeform.models.registry import load
-from odeform.simulation.scene import known_scenes
+from odeform.simulation.scenes.registry import find_scene
 from odeform.training.methods import Run, is_resumable, train_model
 from odeform.training.request import TrainRequest
 from odeform.types import Arrays, Mesh
@@ -28,7 +28,7 @@ __all__ = ["print_line", "rest_of", "train"]
 
 def rest_of(dataset: Dataset) -> Mesh:
     """The body that viewers show: the scene's fine mesh, or for imported data that of the first training sequence."""
-    scene = known_scenes().get(dataset.schema.scene)
+    scene = find_scene(dataset.schema.scene)
     if scene is not None:
         return scene.rest_mesh()
     first = next(dataset.sequences("train"), None)

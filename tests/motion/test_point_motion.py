@@ -85,8 +85,8 @@ def test_probes_are_spread_and_share_the_surface() -> None:
 
 
 def test_far_points_are_taken_for_nearer_ones_and_wild_motions_bounded() -> None:
-    seen = FRAME.seen(np.array([[0.1, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 1e30]]))
-    np.testing.assert_allclose(seen, [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]], rtol=1e-6)
+    inputs = FRAME.inputs(np.array([[0.1, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 1e30]]))
+    np.testing.assert_allclose(inputs, [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]], rtol=1e-6)
     moved = np.array([[[12.0, 0.0, 0.0], [0.0, 1e3, 0.0]]])
     bounded = FRAME.bounded(moved)
     assert np.array_equal(bounded[0, 0], moved[0, 0])

@@ -63,7 +63,8 @@ def conditioning(net: Net, observed: list[Any], length: Any) -> Any:
     """Displacements (..., 3) at the observed frames before, at the start, at the end and after an interval of `length`
     (..., 1) windows -> (..., 13): an `Interval`, joined."""
     before, start, end, after = observed
-    return net.join(list(Interval((start - before) / length, (end - start) / length, (after - end) / length, start, length)))
+    velocities = (start - before) / length, (end - start) / length, (after - end) / length
+    return net.join([*Interval(*velocities, start, length)])
 
 
 class OccupancyFlowNet(PointNet):

@@ -9,9 +9,10 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.models.base import Predictor, check_finite
-from odeform.models.baselines.arithmetic import Net, Numpy, layer_shapes
+from odeform.models.baselines.arithmetic import Net, Numpy
 from odeform.models.baselines.point_network import PointNet
 from odeform.models.baselines.point_trajectories import FramedPoints, MomentaryPoints
+from odeform.models.layers import layer_shapes
 from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, PointTrajectory, evaluate_probes
 from odeform.motion.reduced_space import to_canonical
 from odeform.schema import Parameters, Schema

@@ -63,12 +63,12 @@ class ODeform(ReducedModel):
     def _trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        assert quality is not None
+        assert settings is not None
         if self.dynamics is None:
-            return self.integrate(theta, evaluated, quality, until)
+            return self.integrate(theta, evaluated, settings, until)
         window = self.schema.window
-        known = self.integrate(theta, evaluated, quality, min(until, window.stop))
-        return ContinuedTrajectory(known, self.dynamics, theta, window)
+        solved = self.integrate(theta, evaluated, settings, min(until, window.stop))
+        return ContinuedTrajectory(solved, self.dynamics, theta, window)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
         """The initial value problem of parameters in [-1, 1]: field, state at time 0, and the decoder of states."""

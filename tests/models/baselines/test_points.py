@@ -14,21 +14,23 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_z
 from odeform.models.base import Predictor
-from odeform.models.baselines.arithmetic import Net, Numpy, layer_shapes
+from odeform.models.baselines.arithmetic import Net, Numpy
 from odeform.models.baselines.point_model import PointModel
 from odeform.models.baselines.point_network import Trial, sum_of
-from odeform.models.baselines.point_trajectories import rows_of
-from odeform.models.registry import load
+from odeform.models.baselines.point_trajectories import point_batch
+from odeform.models.layers import layer_shapes
+from odeform.models.registry import load, models_of
 from odeform.training.point_data import PointData, prepare_points
-from odeform.training.points import Budget, Torch, fit_points, initial_weights
-from odeform.training.train import POINTS
+from odeform.training.points import Budget, fit_points, initial_weights
+from odeform.training.torch_arithmetic import Torch
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 SETTING = {"mass": 0.6, "force": 110.0, "azimuth": 0.7}
 TIMES = np.arange(0, 121, 8) / 120.0
 ROUNDING = 2e-6  # m; products over more rows round otherwise
 
-PARAMETRIC = [name for name, model in POINTS.items() if model.network.teaching != "between"]
+POINT_MODELS = models_of(PointModel)
+PARAMETRIC = [name for name, model in POINT_MODELS.items() if model.network.sampling != "between"]
 everywhere = pytest.mark.parametrize("model", PARAMETRIC)
 
 
@@ -145,8 +147,8 @@ def test_numpy_predicts_what_torch_learned(models: dict[str, PointModel], model:
     predictor = models[model]
     x = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3)).astype(np.float32)
     times = np.repeat(np.linspace(0.0, 1.0, 9, dtype=np.float32)[:, None], 5, axis=1)
-    times = times[4:5] if predictor.network.teaching == "moments" else times
-    rows = rows_of(x, np.array([0.3, -0.2, 0.5, 0.1]), times, predictor.frame)
+    times = times[4:5] if predictor.network.sampling == "moments" else times
+    rows = point_batch(x, np.array([0.3, -0.2, 0.5, 0.1]), times, predictor.frame)
     ours = sum_of(predictor.network.predict(predictor.net, rows))
     tensors = {key: torch.tensor(value) for key, value in vars(rows).items() if key != "finer"}
     net = Net({name: torch.tensor(value) for name, value in predictor.net.weights.items()}, Torch())
@@ -179,7 +181,7 @@ def test_damaged_weights_are_refused(point_models: dict[str, Path], model: str, 
 def test_splats_are_refused(models: dict[str, PointModel]) -> None:
     points = np.zeros((1, 3))
     splats = GaussianSplats(points, np.eye(3)[None], np.ones((1, 1, 3)), np.ones(1))
-    with pytest.raises(InputError, match="moves meshes and points"):
+    with pytest.raises(InputError, match="cannot deform splats"):
         models["direct"].solve(splats)
 
 
@@ -191,7 +193,7 @@ def test_steps_of_the_ode_tell_their_error(models: dict[str, PointModel]) -> Non
 
 
 def test_the_same_seed_gives_the_same_weights(data: PointData, monkeypatch: pytest.MonkeyPatch) -> None:
-    network = POINTS["direct"].network
+    network = POINT_MODELS["direct"].network
     monkeypatch.setattr(network, "trials", (Trial(3e-3, 8),), raising=False)
     monkeypatch.setattr(network, "work", 64, raising=False)
     one, two = (fit_points("direct", network, data, Budget(0.0, 6), 3, lambda _: None) for _ in range(2))
