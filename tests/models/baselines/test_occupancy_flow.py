@@ -80,7 +80,7 @@ def test_what_it_cannot_do_is_said(
 ) -> None:
     with pytest.raises(InputError, match="none were given"):
         flow.solve(None, record.parameters)
-    with pytest.raises(InputError, match="30 a second"):
+    with pytest.raises(InputError, match="30 per second"):
         flow.solve(None, record.parameters, observed=record)
     with pytest.raises(InputError, match="from 0 s on"):
         flow.solve(None, record.parameters, observed=replace(given, times=given.times + 0.1))
