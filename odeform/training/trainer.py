@@ -33,10 +33,8 @@ CHUNK = 64  # sequences rolled out at once where no gradients are wanted
 def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
     """Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al. 2024): roll-outs bend the loss differently in
     every direction, and it takes hundreds of steps to where Adam takes thousands."""
-    try:
-        from pytorch_optimizer import SOAP
-    except ImportError as error:
-        raise InputError(f"training needs {error.name}: pip install 'odeform[train]'") from None
+    from pytorch_optimizer import SOAP
+
     return SOAP(weights, lr=rate, weight_decay=1e-4)
 
 

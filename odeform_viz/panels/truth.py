@@ -13,13 +13,12 @@ from odeform.schema import Schema
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import MotionSequence
 from odeform_viz.columns import Column, Columns
-from odeform_viz.runtime.jobs import Job, simulate_motion, simulator_installed
+from odeform_viz.runtime.jobs import Job, simulate_motion
 
 __all__ = ["TruthPanel", "entry_label", "other_physics"]
 
 NONE = "none"
 OTHER = "another"  # simulated here, or of another data set
-NEEDS = "*Simulate this* needs the simulator: `pip install 'odeform[simulate]'`."
 NO_SIMULATOR = "This scene was imported: there is no simulator of it here."
 FINER = 4  # times the frames of training: one looks between them
 
@@ -68,7 +67,7 @@ class TruthPanel:
         self._job: Job | None = None
         self._starting = threading.Lock()
         self._opening = asyncio.Lock()  # fair: what was chosen last is opened last
-        installed, scene = simulator_installed(), find_scene(schema.scene)
+        scene = find_scene(schema.scene)
         gui = server.gui
         with gui.add_folder("Truth"):
             if dataset is not None:
@@ -77,7 +76,7 @@ class TruthPanel:
                 self._browser.on_update(self._opened)
             self._start = gui.add_button(
                 "Simulate this",
-                disabled=scene is None or not installed,
+                disabled=scene is None,
                 hint="runs the simulator at the sliders' values",
             )
             self._start.on_click(lambda _: self._simulate())
@@ -88,7 +87,7 @@ class TruthPanel:
             self._back.on_click(lambda _: self._return())
             differs = other_physics(taught, scene.fixed) if scene else ""
             self._physics = PHYSICS.format(differs) if differs else ""
-            note = NO_SIMULATOR if scene is None else self._physics if installed else NEEDS
+            note = NO_SIMULATOR if scene is None else self._physics
             self._note = gui.add_markdown(note, visible=bool(note))
         self.refresh()
 

@@ -1,6 +1,5 @@
 """Long work in a process of its own, with progress, result and cancellation. The page stays responsive meanwhile."""
 
-import importlib.util
 import multiprocessing
 import threading
 from collections.abc import Callable
@@ -13,7 +12,7 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.types import MotionSequence
 
-__all__ = ["Job", "Report", "simulate_motion", "simulator_installed", "stability_image"]
+__all__ = ["Job", "Report", "simulate_motion", "stability_image"]
 
 Report = Callable[[float], None]
 """Called with the fraction of the work that is done, 0 to 1."""
@@ -80,11 +79,6 @@ def _run(outbox: Connection, work: Callable[..., Any], args: tuple[Any, ...]) ->
         outbox.send(("failed", f"{error}" if isinstance(error, InputError | RuntimeError) else f"{error!r}"))
     else:
         outbox.send(("done", result))
-
-
-def simulator_installed() -> bool:
-    """Whether MuJoCo is installed; it is not imported."""
-    return importlib.util.find_spec("mujoco") is not None
 
 
 def simulate_motion(report: Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:

@@ -1,6 +1,5 @@
 """The truth beside the models: opened, left, simulated on the spot."""
 
-import socket
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -159,20 +158,6 @@ def test_a_server_that_closes_ends_its_simulation(kick: Predictor, monkeypatch: 
     app.close()
     assert app._truth._job is not None
     assert not app._truth._job.running
-
-
-def test_without_a_simulator_the_button_is_off_and_says_why(kick: Predictor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(truth, "simulator_installed", lambda: False)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    app = App([Column("odeform", kick, kick.rest)], port=port)
-    try:
-        with LoopbackClient(port) as client:
-            assert client.controls["Simulate this"].props["disabled"]
-            assert "pip install 'odeform[simulate]'" in client.text()
-    finally:
-        app.close()
 
 
 def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve: Callable[..., View]) -> None:
