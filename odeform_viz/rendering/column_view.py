@@ -10,7 +10,7 @@ from odeform.types import Floats
 from odeform_viz.colors import Color
 from odeform_viz.columns import Column
 from odeform_viz.rendering.error_colors import NearestInterpolation
-from odeform_viz.rendering.glyphs import show_glyphs
+from odeform_viz.rendering.glyphs import GlyphView
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.shapes import show_shape
 from odeform_viz.view import INVISIBLE, ColumnFrame
@@ -36,6 +36,7 @@ class ColumnView:
         self._shape = show_shape(server, f"{self.root}/body", column.geometry, color)
         # the title's own position would lag behind the body; that of its parent does not
         self._above = server.scene.add_frame(f"{self.root}/above", show_axes=False)
+        self._glyphs = GlyphView(server, self.root, self._rest)
         self._label: viser.LabelHandle | None = None
         self._motion: Motion | RecordedMotion | None = None
         self._interpolation: tuple[RecordedMotion, NearestInterpolation] | None = None
@@ -110,4 +111,4 @@ class ColumnView:
         with self._server.atomic():
             show_path(self._server, self.root, motion, self._centre, self._color)
             if isinstance(motion, Motion):
-                show_glyphs(self._server, self.root, motion, self._rest)
+                self._glyphs.show(motion.schema.scene, motion.parameters)

@@ -1,4 +1,4 @@
-"""The pattern that shows how a body turns."""
+"""The checkerboard that makes rotations visible."""
 
 import numpy as np
 import trimesh
@@ -25,7 +25,7 @@ def test_parts_are_cut_along_the_planes_and_cover_the_surface() -> None:
         for axis in range(3):  # no face on both sides of a plane
             assert (np.minimum(corners[..., axis].max(axis=1), -corners[..., axis].min(axis=1)) < 1e-5).all()
         assert (sign * np.prod(corners.mean(axis=1), axis=1) > 0.0).all()
-        # outsides stay outside
+        # faces keep their orientation
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         assert ((normals * (corners.mean(axis=1) + centre)).sum(axis=1) > -1e-9).all()
 
@@ -37,7 +37,7 @@ def test_a_mesh_along_the_planes_is_not_cut(kick: Predictor) -> None:
     assert set(map(tuple, together)) == set(map(tuple, np.asarray(kick.rest.points, dtype=np.float32)))
 
 
-def test_what_was_cut_moves_with_the_mesh() -> None:
+def test_new_vertices_deform_with_the_mesh() -> None:
     ball = trimesh.creation.icosphere(1)
     mesh = Mesh(ball.vertices.astype(np.float32), np.asarray(ball.faces, dtype=np.int32))
     stretch = np.array([2.0, 1.0, 0.5], dtype=np.float32)

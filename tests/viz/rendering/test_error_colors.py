@@ -1,4 +1,4 @@
-"""Errors in colours."""
+"""Errors as colors."""
 
 import numpy as np
 import pytest
@@ -7,18 +7,18 @@ from odeform.models.base import Predictor
 from odeform_viz.rendering.error_colors import BANDS, NearestInterpolation, band_indices, scale_for, split_into_bands
 
 
-def test_the_scale_is_round_and_holds_three_times_the_largest() -> None:
+def test_the_scale_is_round_and_at_least_three_times_the_largest_error() -> None:
     assert scale_for(np.array([0.1, np.nan, 1.5])) == 5.0
     assert scale_for(np.array([0.33])) == 1.0
     assert scale_for(np.zeros(3)) == scale_for(np.array([np.nan])) == 1.0
 
 
-def test_levels_follow_the_error_and_end_open() -> None:
+def test_the_last_band_holds_all_larger_errors() -> None:
     values = np.array([0.0, 0.9, 1.0, 7.9, 8.0, 100.0])
     np.testing.assert_array_equal(band_indices(values, 8.0), [0, 0, 1, 7, 7, 7])
 
 
-def test_bands_are_all_faces_once(kick: Predictor) -> None:
+def test_each_face_is_in_one_band(kick: Predictor) -> None:
     mesh = kick.rest
     values = mesh.points[:, 2].astype(float)
     parts = split_into_bands(values, mesh.faces, 0.2)
@@ -31,9 +31,9 @@ def test_bands_are_all_faces_once(kick: Predictor) -> None:
             assert (np.clip(level.astype(int), 0, len(BANDS) - 1) == band).all()
 
 
-def test_values_are_carried_to_other_points_of_the_surface(kick: Predictor) -> None:
+def test_values_are_interpolated_on_the_surface(kick: Predictor) -> None:
     coarse, fine = kick.rest.points[::4], kick.rest.points
-    spread = NearestInterpolation(coarse, fine)
-    assert spread(np.full(len(coarse), 2.5)) == pytest.approx(np.full(len(fine), 2.5))
-    np.testing.assert_allclose(spread(coarse[:, 2].astype(float)), fine[:, 2], atol=0.02)
-    np.testing.assert_allclose(spread(coarse[:, 2].astype(float))[::4], coarse[:, 2], atol=1e-6)
+    interpolate = NearestInterpolation(coarse, fine)
+    assert interpolate(np.full(len(coarse), 2.5)) == pytest.approx(np.full(len(fine), 2.5))
+    np.testing.assert_allclose(interpolate(coarse[:, 2].astype(float)), fine[:, 2], atol=0.02)
+    np.testing.assert_allclose(interpolate(coarse[:, 2].astype(float))[::4], coarse[:, 2], atol=1e-6)

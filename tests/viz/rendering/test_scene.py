@@ -1,6 +1,5 @@
-"""What the viewport is sent."""
+"""What is sent to the page for a frame."""
 
-import socket
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,9 @@ from odeform_viz.session import Session
 from odeform_viz.view import DisplayOptions, ViewRequest
 
 
-def test_splats_are_sent_as_they_deform_and_as_given_at_rest(kick: Predictor, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_splats_are_sent_deformed_and_as_given_at_rest(
+    server: viser.ViserServer, kick: Predictor, monkeypatch: pytest.MonkeyPatch
+) -> None:
     sent = []
     monkeypatch.setattr(viser.GaussianSplatHandle, "set_gaussians", lambda _, *arrays: sent.append(arrays))
     ones = np.ones((len(kick.rest.points), 3))
@@ -23,21 +24,14 @@ def test_splats_are_sent_as_they_deform_and_as_given_at_rest(kick: Predictor, mo
     session = Session(kick.schema)
     columns = Columns.of([Column("splats", kick, splats)]).all
     request = ViewRequest(session.schema.complete({}), 0.02, "balanced", columns)
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    server = viser.ViserServer(port=port, verbose=False)
-    try:
-        view = SceneView(server, 0.2, 1)
-        for time in (0.02, 0.0):
-            view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
-    finally:
-        server.stop()
+    view = SceneView(server, 0.2, 1)
+    for time in (0.02, 0.0):
+        view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
     moved, resting = sent
     motion = kick.solve(splats)
-    # centimetres, in a node a hundredth of the size: half precision would lose square metres
+    # in centimetres: float16 would lose square metres
     np.testing.assert_allclose(moved[0], 100.0 * motion.deformed(0.02), rtol=1e-6)
-    # but for what is subnormal there
+    # except subnormals of float16
     lost = float(np.finfo(np.float16).smallest_normal)
     np.testing.assert_allclose(moved[1], 1e4 * motion.deformed_covariances(0.02), rtol=1e-6, atol=lost)
     np.testing.assert_allclose(resting[1], 1e4 * splats.covariances, rtol=1e-6, atol=lost)

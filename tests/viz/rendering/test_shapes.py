@@ -1,9 +1,6 @@
-"""Shapes in the viewport: what is sent of them."""
-
-from collections.abc import Iterator
+"""What is sent to the page for a shape."""
 
 import numpy as np
-import pytest
 import viser
 
 from odeform.models.base import Predictor
@@ -12,14 +9,7 @@ from odeform_viz.rendering.error_colors import BANDS, band_indices
 from odeform_viz.rendering.shapes import show_shape
 
 
-@pytest.fixture
-def server(port: int) -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(port=port, verbose=False)
-    yield server
-    server.stop()
-
-
-def test_points_are_painted_by_their_error_and_plain_again(server: viser.ViserServer, kick: Predictor) -> None:
+def test_points_show_errors_and_then_their_own_color_again(server: viser.ViserServer, kick: Predictor) -> None:
     points = kick.rest.points
     view = show_shape(server, "/cloud", PointCloud(points), (206, 78, 26))
     values = np.linspace(0.0, 2.0, len(points))
@@ -31,7 +21,7 @@ def test_points_are_painted_by_their_error_and_plain_again(server: viser.ViserSe
     np.testing.assert_array_equal(cloud.points, points + np.float32(0.1))
 
 
-def test_a_mesh_is_painted_seen_through_where_it_overlaps(server: viser.ViserServer, kick: Predictor) -> None:
+def test_an_overlaid_mesh_is_transparent_in_error_colors_too(server: viser.ViserServer, kick: Predictor) -> None:
     view = show_shape(server, "/mesh", kick.rest, (206, 78, 26))
     view.fade(0.45)
     view.paint(kick.rest.points, np.full(len(kick.rest.points), 0.3), 1.0)

@@ -1,0 +1,57 @@
+"""The arrows that a scene describes are drawn, and only these."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+
+from odeform.simulation.glyphs import Arrow
+from odeform.simulation.scenes import kick
+from odeform.types import Points
+from odeform_viz.rendering import glyphs
+from odeform_viz.rendering.glyphs import GlyphView
+
+REST = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.1]], dtype=np.float32)
+
+
+@pytest.fixture
+def view(server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> GlyphView:
+    """Of a scene with `count` arrows of `wind` m each; no other scene is known."""
+
+    def arrows(parameters: Mapping[str, float], rest: Points) -> tuple[Arrow, ...]:
+        wind, x = parameters["wind"], np.array([1.0, 0.0, 0.0])
+        return tuple(
+            Arrow(rest[0] + index * x, wind * x, f"{wind:g} m", 0.0, 1.0) for index in range(int(parameters["count"]))
+        )
+
+    toy = replace(kick.SCENE, glyphs=arrows)
+    monkeypatch.setattr(glyphs, "find_scene", lambda name: toy if name == "toy" else None)
+    return GlyphView(server, "/body", REST)
+
+
+def _labels(server: viser.ViserServer) -> list[str]:
+    nodes = [server.scene.get_handle_by_name(f"/body/arrow_label_{index}") for index in range(4)]
+    return [node.text for node in nodes if isinstance(node, viser.LabelHandle)]
+
+
+def test_arrows_and_labels_follow_the_parameters(view: GlyphView, server: viser.ViserServer) -> None:
+    view.show("toy", {"wind": 2.0, "count": 2})
+    node = server.scene.get_handle_by_name("/body/arrows")
+    assert isinstance(node, viser.ArrowsHandle)
+    np.testing.assert_allclose(node.points, [[[0, 0, 0], [2, 0, 0]], [[1, 0, 0], [3, 0, 0]]])
+    assert _labels(server) == ["2 m", "2 m"]
+    view.show("toy", {"wind": 3.0, "count": 1})
+    assert _labels(server) == ["3 m"]
+    label = server.scene.get_handle_by_name("/body/arrow_label_0")
+    assert label is not None
+    np.testing.assert_allclose(label.position, [3.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("scene", "count"), [("toy", 0), ("imported", 2)])
+def test_scenes_without_arrows_show_none(view: GlyphView, server: viser.ViserServer, scene: str, count: int) -> None:
+    view.show("toy", {"wind": 2.0, "count": 2})
+    view.show(scene, {"wind": 2.0, "count": count})
+    assert server.scene.get_handle_by_name("/body/arrows") is None
+    assert _labels(server) == []
