@@ -5,6 +5,7 @@ A block with a title is a file. A `diff` block adds lines to one. All other bloc
 
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 from blocks import ROOT, Block, blocks_of
 from commands import command_lines, parser_of
 
+PORT = "8123"  # of the page's example; several tests may run at a time
 PAGE = ROOT / "docs" / "extending.md"
 EXAMPLES = {
     line[3:]: [b for b in blocks_of(PAGE) if number < b.line]
@@ -23,6 +25,12 @@ ENDS = [*[blocks[0].line if blocks else 0 for blocks in EXAMPLES.values()][1:], 
 EXAMPLES = {
     name: [b for b in blocks if b.line < end] for (name, blocks), end in zip(EXAMPLES.items(), ENDS, strict=True)
 }
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def apply(block: Block, root: Path) -> None:
@@ -71,7 +79,7 @@ def test_the_example_works(name: str, tmp_path: Path):
             apply(block, tmp_path)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "OMP_NUM_THREADS": "1"}
     program = tmp_path / "example.py"
-    program.write_text(script([b for b in blocks if not b.title]))
+    program.write_text(script([b for b in blocks if not b.title]).replace(PORT, str(free_port())))
     ran = subprocess.run([sys.executable, program], cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     linted = subprocess.run(
