@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta integration with fixed or controlled steps, dense in time.
+"""Integration by one-step methods with fixed or controlled steps, dense in time.
 
 The solver knows nothing of models: it takes a callable, and gives a `Solution` with a status instead of raising.
 Steps follow from the start, the method and its step or tolerance alone. They never depend on the times asked for,
@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from odeform.errors import InputError
+from odeform.solver.method import Field, Method, Stepper
+from odeform.solver.registry import get_method
 from odeform.solver.solution import Solution, Status
-from odeform.solver.stages import Field, Stages
-from odeform.solver.tableau import Tableau, get_method
 
 __all__ = ["SolverSettings", "integrate"]
 
@@ -43,7 +43,7 @@ class SolverSettings:
             raise InputError("quality: expected either a step or a tolerance")
         if self.step is not None and not self.step > 0.0:
             raise InputError(f"quality: expected a positive step, got {self.step}")
-        if self.tolerance is not None and (method.embedded is None or not self.tolerance > 0.0):
+        if self.tolerance is not None and (not method.controls_step or not self.tolerance > 0.0):
             raise InputError(f"quality: {self.method} cannot control its step with tolerance {self.tolerance}")
         if self.dtype not in ("float32", "float64"):
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
@@ -62,14 +62,14 @@ def _rms(values: Any) -> float:
     return math.sqrt(float(values.dot(values)) / values.size)
 
 
-def _first_step(method: Tableau, field: Field, time: float, state: Any, slope: Any, tolerance: float) -> float:
+def _first_step(order: int, field: Field, time: float, state: Any, slope: Any, tolerance: float) -> float:
     """Hairer, Norsett & Wanner, Solving ODEs I, II.4."""
     d0, d1 = (_rms(x) / tolerance for x in (state, slope))
     h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     bent = field(time + h0, state + h0 * slope)
     d2 = _rms(bent - slope) / tolerance / h0
     steep = max(d1, d2)
-    h1 = max(1e-6, 1e-3 * h0) if steep <= 1e-15 else (0.01 / steep) ** (1.0 / method.order)
+    h1 = max(1e-6, 1e-3 * h0) if steep <= 1e-15 else (0.01 / steep) ** (1.0 / order)
     return min(100.0 * h0, h1)
 
 
@@ -88,23 +88,24 @@ def integrate(
         if not (_finite(solution.states[0]) and _finite(solution.slopes[0])):
             solution.status = Status.NON_FINITE
     if solution.status is Status.OK:
-        stages = Stages(get_method(quality.method), start)
+        method = get_method(quality.method)
+        stepper = method.stepper(start)
         if quality.step is not None:
-            _fixed(stages, field, quality.step, solution, until)
+            _fixed(stepper, field, quality.step, solution, until)
         else:
-            _controlled(stages, field, quality.tolerance or 0.0, solution, until)
+            _controlled(method, stepper, field, quality.tolerance or 0.0, solution, until)
     return solution
 
 
-def _fixed(stages: Stages, field: Field, step: float, solution: Solution, until: float) -> None:
+def _fixed(stepper: Stepper, field: Field, step: float, solution: Solution, until: float) -> None:
     origin = solution.times[0]
     while solution.end < until - 1e-9 * step:
         if solution.steps >= MAX_STEPS:
             solution.status = Status.MAX_STEPS
             return
         time, state, slope = solution.times[-1], solution.states[-1], solution.slopes[-1]
-        after, slope = stages.step(field, time, state, slope, step)
-        solution.evaluations += stages.evaluations
+        after, slope = stepper.step(field, time, state, slope, step)
+        solution.evaluations += stepper.evaluations
         if not _finite(after + slope):
             solution.status = Status.NON_FINITE
             return
@@ -114,13 +115,14 @@ def _fixed(stages: Stages, field: Field, step: float, solution: Solution, until:
         solution.slopes.append(slope)
 
 
-def _controlled(stages: Stages, field: Field, tolerance: float, solution: Solution, until: float) -> None:
+def _controlled(
+    method: Method, stepper: Stepper, field: Field, tolerance: float, solution: Solution, until: float
+) -> None:
     """Proportional-integral step control on the embedded error estimate."""
-    method = stages.method
     first, second = NOW / method.order, BEFORE / method.order
     if not solution.next_step:
         begin, state, slope = solution.end, solution.states[0], solution.slopes[0]
-        solution.next_step = _first_step(method, field, begin, state, slope, tolerance)
+        solution.next_step = _first_step(method.order, field, begin, state, slope, tolerance)
         solution.evaluations += 1
     longest = GROW
     while solution.end < until:
@@ -131,9 +133,9 @@ def _controlled(stages: Stages, field: Field, tolerance: float, solution: Soluti
         if time + step <= time:
             solution.status = Status.UNDERFLOW
             return
-        after, slope = stages.step(field, time, state, slope, step)
-        solution.evaluations += stages.evaluations
-        ratio = max(_rms(stages.error(step)) / tolerance, 1e-10)
+        after, slope = stepper.step(field, time, state, slope, step)
+        solution.evaluations += stepper.evaluations
+        ratio = max(_rms(stepper.error(step)) / tolerance, 1e-10)
         if not ratio <= 1.0:
             if not math.isfinite(ratio):
                 ratio = 1e6  # too far: try again closer
@@ -147,5 +149,5 @@ def _controlled(stages: Stages, field: Field, tolerance: float, solution: Soluti
         solution.times.append(time + step)
         solution.states.append(after)
         solution.slopes.append(slope)
-        if method.middle is not None:
-            solution.middles.append(stages.middle(state, step))
+        if method.knows_middle:
+            solution.middles.append(stepper.middle(state, step))

@@ -5,10 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 
-from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["METHODS", "Row", "Tableau", "get_method", "rounded"]
+__all__ = ["BOSH3", "DOPRI5", "EULER", "MIDPOINT", "RK4", "Row", "Tableau", "rounded", "row", "rows"]
 
 Row = tuple[Fraction, ...]
 
@@ -33,39 +32,41 @@ class Tableau:
     """(s,) weights for the state at half the step, where the method has a quartic interpolant."""
 
 
-def rounded(row: Row, dtype: np.dtype) -> Floats:
+def rounded(weights: Row, dtype: np.dtype) -> Floats:
     """The fractions in a precision, each correctly rounded to double precision at least."""
     if dtype.char in "fd":
-        return np.array([float(weight) for weight in row], dtype)
-    return np.array([dtype.type(weight.numerator) / dtype.type(weight.denominator) for weight in row], dtype)
+        return np.array([float(weight) for weight in weights], dtype)
+    return np.array([dtype.type(weight.numerator) / dtype.type(weight.denominator) for weight in weights], dtype)
 
 
-def _row(text: str) -> Row:
+def row(text: str) -> Row:
+    """ "1/2 0 1" as fractions."""
     return tuple(Fraction(number) for number in text.split())
 
 
-def _rows(*texts: str) -> tuple[Row, ...]:
-    return tuple(_row(text) for text in texts)
+def rows(*texts: str) -> tuple[Row, ...]:
+    """A row for each text."""
+    return tuple(row(text) for text in texts)
 
 
-EULER = Tableau("euler", 1, _rows(""), _row("1"), _row("0"))
-MIDPOINT = Tableau("midpoint", 2, _rows("", "1/2"), _row("0 1"), _row("0 1/2"))
-RK4 = Tableau("rk4", 4, _rows("", "1/2", "0 1/2", "0 0 1"), _row("1/6 1/3 1/3 1/6"), _row("0 1/2 1/2 1"))
+EULER = Tableau("euler", 1, rows(""), row("1"), row("0"))
+MIDPOINT = Tableau("midpoint", 2, rows("", "1/2"), row("0 1"), row("0 1/2"))
+RK4 = Tableau("rk4", 4, rows("", "1/2", "0 1/2", "0 0 1"), row("1/6 1/3 1/3 1/6"), row("0 1/2 1/2 1"))
 # Bogacki & Shampine 1989, Appl. Math. Lett. 2(4)
 BOSH3 = Tableau(
     "bosh3",
     3,
-    a=_rows("", "1/2", "0 3/4", "2/9 1/3 4/9"),
-    b=_row("2/9 1/3 4/9 0"),
-    c=_row("0 1/2 3/4 1"),
-    embedded=_row("7/24 1/4 1/3 1/8"),
+    a=rows("", "1/2", "0 3/4", "2/9 1/3 4/9"),
+    b=row("2/9 1/3 4/9 0"),
+    c=row("0 1/2 3/4 1"),
+    embedded=row("7/24 1/4 1/3 1/8"),
     fsal=True,
 )
 # Dormand & Prince 1980; state at half a step from Shampine 1986, Math. Comp. 46(173)
 DOPRI5 = Tableau(
     "dopri5",
     5,
-    a=_rows(
+    a=rows(
         "",
         "1/5",
         "3/40 9/40",
@@ -74,21 +75,12 @@ DOPRI5 = Tableau(
         "9017/3168 -355/33 46732/5247 49/176 -5103/18656",
         "35/384 0 500/1113 125/192 -2187/6784 11/84",
     ),
-    b=_row("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
-    c=_row("0 1/5 3/10 4/5 8/9 1 1"),
-    embedded=_row("5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40"),
+    b=row("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
+    c=row("0 1/5 3/10 4/5 8/9 1 1"),
+    embedded=row("5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40"),
     fsal=True,
-    middle=_row(
+    middle=row(
         "6025192743/60171106304 0 51252292925/130801643196 -2691868925/90256659456 187940372067/3189068634112 "
         "-1776094331/39487288512 11237099/470086768"
     ),
 )
-
-METHODS = {method.name: method for method in (EULER, MIDPOINT, RK4, BOSH3, DOPRI5)}
-
-
-def get_method(name: str) -> Tableau:
-    """The method of that name. Raises `InputError` for an unknown one."""
-    if name not in METHODS:
-        raise InputError(f"unknown solver {name!r}: expected one of {', '.join(METHODS)}")
-    return METHODS[name]

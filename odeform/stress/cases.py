@@ -9,7 +9,7 @@ import numpy as np
 
 from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings
-from odeform.solver.tableau import METHODS
+from odeform.solver.registry import METHODS
 from odeform.types import Floats, Geometry, Mesh, PointCloud
 
 __all__ = ["Case", "draws", "inside", "random_quality", "shapes", "thinned"]
@@ -18,7 +18,7 @@ SPREADS = (1.0, 1.5, 3.0, 10.0)
 """Halves of the trained range, from its middle."""
 ENORMOUS = (0.0, *(sign * size for size in (1e-300, 1e300, 1.7e308, math.inf) for sign in (1.0, -1.0)), math.nan)
 DTYPES = ("float32", "float64")
-CONTROLLED = tuple(name for name, method in METHODS.items() if method.embedded is not None)
+CONTROLLED = tuple(name for name, method in METHODS.items() if method.controls_step)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ from odeform.dataset.index import Dataset
 from odeform.models.odeform.inference import Field, make_field
 from odeform.models.odeform.model import ODeform
 from odeform.solver.integrate import SolverSettings, integrate
-from odeform.solver.tableau import METHODS, Tableau
+from odeform.solver.method import Method
+from odeform.solver.registry import METHODS
 from odeform.stress.cases import inside
 from odeform.stress.check import Check, Checks
 from odeform.types import Floats
@@ -30,7 +31,7 @@ def observed_order(steps: list[float], errors: list[float]) -> float:
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-def _order(field: Field, start: Floats, method: Tableau, span: float) -> float:
+def _order(field: Field, start: Floats, method: Method, span: float) -> float:
     """Of the norm of errors over `NODES` moments.
 
     Dormand and Prince made the leading term of their error so small that on a sharp field the next one rules until

@@ -7,8 +7,8 @@ import torchdiffeq
 
 from odeform.errors import InputError
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.registry import METHODS
 from odeform.solver.solution import Solution, Status
-from odeform.solver.tableau import METHODS
 
 QUALITIES = [
     *(SolverSettings(name, step=0.05) for name in METHODS),

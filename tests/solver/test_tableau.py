@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
-from odeform.solver.stages import Stages
-from odeform.solver.tableau import METHODS, get_method, rounded
+from odeform.solver.registry import get_method
+from odeform.solver.runge_kutta import Stages
+from odeform.solver.tableau import BOSH3, DOPRI5, EULER, MIDPOINT, RK4, rounded
 
+TABLEAUS = (EULER, MIDPOINT, RK4, BOSH3, DOPRI5)
 DOPRI5_A = (
     (),
     (1 / 5,),
@@ -40,7 +42,7 @@ BOSH3_ERROR = (2 / 9 - 7 / 24, 1 / 3 - 1 / 4, 4 / 9 - 1 / 3, -1 / 8)
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_weights_are_those_of_the_shipped_scores(dtype: type) -> None:
     """Bit-exact: scores and recordings were computed with these floating-point literals."""
-    dopri5, bosh3 = (Stages(METHODS[name], np.zeros(3, dtype)) for name in ("dopri5", "bosh3"))
+    dopri5, bosh3 = (Stages(tableau, np.zeros(3, dtype)) for tableau in (DOPRI5, BOSH3))
     for (_, (_, weights), node), row, true in zip(
         dopri5._stages, DOPRI5_A[1:], (1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0), strict=True
     ):
@@ -53,7 +55,7 @@ def test_weights_are_those_of_the_shipped_scores(dtype: type) -> None:
 
 
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision here")
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", TABLEAUS, ids=lambda tableau: tableau.name)
 def test_extended_precision_rounds_every_weight_correctly(method) -> None:
     for row in (*method.a, method.b, method.c, method.embedded or (), method.middle or ()):
         for weight, exact in zip(rounded(row, np.dtype(np.longdouble)), row, strict=True):
@@ -64,13 +66,13 @@ def test_extended_precision_rounds_every_weight_correctly(method) -> None:
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="no extended precision here")
 def test_the_middle_of_a_step_gains_from_extended_precision() -> None:
     """dz/dt = 1 has the state 1/2 at half a step from 0, up to rounding."""
-    stages = Stages(METHODS["dopri5"], np.zeros(1, np.longdouble))
+    stages = Stages(DOPRI5, np.zeros(1, np.longdouble))
     zero, one = np.zeros(1, np.longdouble), np.ones(1, np.longdouble)
     stages.step(lambda _, z: np.ones_like(z), 0.0, zero, one, 1.0)
     assert abs(float(stages.middle(zero, 1.0)[0] - np.longdouble(0.5))) < 1e-18
 
 
-@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+@pytest.mark.parametrize("method", TABLEAUS, ids=lambda tableau: tableau.name)
 def test_order_conditions_hold_exactly(method) -> None:
     """Row sums, and the quadrature conditions sum b c^(k-1) = 1/k (Hairer, Norsett & Wanner 1993, II.1)."""
     assert all(sum(row) == node for row, node in zip(method.a, method.c, strict=True))

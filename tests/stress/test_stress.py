@@ -5,6 +5,7 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.simulation.physics import energy_gained
-from odeform.solver import tableau
+from odeform.solver import registry
+from odeform.solver.runge_kutta import ExplicitRungeKutta
+from odeform.solver.tableau import RK4
 from odeform.stress import cases as cases_module
 from odeform.stress import consistency, convergence, physics, solvers, stress
 from odeform.stress.cases import draws, shapes
@@ -56,7 +59,7 @@ def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform)
     assert repr(draws(model.schema, True, 3000, seed=1)) != repr(some)
     assert {d.shape for d in some} == set(shapes(model.rest))
     ways = {(d.quality.method, d.quality.dtype) for d in some if d.quality}
-    assert ways == set(itertools.product(tableau.METHODS, ("float32", "float64")))
+    assert ways == set(itertools.product(registry.METHODS, ("float32", "float64")))
     mass = np.array([d.values[0] for d in some])
     assert set(np.round([model.schema.parameters[0].normalise(m) for m in mass if 0.0 < m < 1e9], 6)) >= {
         sign * reach for sign in (-1.0, 1.0) for reach in (1.0, 1.5, 3.0, 10.0)
@@ -93,7 +96,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
     sure = {"faults", "non_finite_frames", "start_off_m", "grid_invariance_m", "scrub_order_m", "determinism_m"}
     sure |= {"batch_invariance_m", "single_precision_mm"}
     if name == "odeform":
-        sure |= {f"order_{method}_deviation" for method in tableau.METHODS}
+        sure |= {f"order_{method}_deviation" for method in registry.METHODS}
         sure |= {"sensitivity_relative", "solver_error_rank_correlation"}
     assert sure <= set(result["checks"])
     assert [check for check in sure if not result["checks"][check]["holds"]] == []
@@ -102,9 +105,9 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
 def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "DRAWS", 1)
     monkeypatch.setattr(convergence, "REFINED", REFINED)
-    monkeypatch.setattr(convergence, "METHODS", {name: tableau.METHODS[name] for name in ("midpoint", "rk4")})
-    rk4 = tableau.METHODS["rk4"]
-    monkeypatch.setitem(tableau.METHODS, "rk4", replace(rk4, b=(rk4.b[0], rk4.b[1], rk4.b[3], rk4.b[2])))
+    monkeypatch.setattr(convergence, "METHODS", {name: registry.METHODS[name] for name in ("midpoint", "rk4")})
+    wrong = tuple(Fraction(1, part) for part in (6, 3, 6, 3))
+    monkeypatch.setitem(registry.METHODS, "rk4", ExplicitRungeKutta(replace(RK4, b=wrong)))
     checks = convergence.check_orders(model)
     assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
 
@@ -118,7 +121,7 @@ def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyP
 
 
 def test_refining_that_leads_away_from_the_truth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(convergence, "METHODS", {"rk4": tableau.METHODS["rk4"]})
+    monkeypatch.setattr(convergence, "METHODS", {"rk4": registry.METHODS["rk4"]})
     model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
     assert isinstance(model, ODeform)
     assert convergence.check_refining(model, dataset)["refining_error_ratio"].holds

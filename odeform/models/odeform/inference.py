@@ -17,9 +17,10 @@ from odeform.models.odeform.config import ModelConfig
 from odeform.motion.base import SolveStats
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.method import Field
+from odeform.solver.registry import get_method
+from odeform.solver.runge_kutta import gemv
 from odeform.solver.solution import Solution, Status
-from odeform.solver.stages import Field, gemv
-from odeform.solver.tableau import get_method
 from odeform.types import Arrays, Floats
 
 __all__ = [

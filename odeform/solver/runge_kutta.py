@@ -1,18 +1,17 @@
-"""The stages of a Runge-Kutta step: slopes, and weighted sums of them."""
+"""Explicit Runge-Kutta steps: slopes, and weighted sums of them."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
 
+from odeform.solver.method import Field
 from odeform.solver.tableau import Row, Tableau, rounded
 from odeform.types import Floats
 
-__all__ = ["Field", "Stages", "gemv"]
-
-Field = Callable[[float, Any], Any]
-"""(time in s, state (n,)) -> slope (n,)."""
+__all__ = ["ExplicitRungeKutta", "Stages", "gemv"]
 
 
 def gemv(dtype: np.dtype) -> Callable[..., Any]:
@@ -23,25 +22,24 @@ def gemv(dtype: np.dtype) -> Callable[..., Any]:
 
 
 class Stages:
-    """The slopes within a step of `method`, for states like `start`: arrays (n,) of one dtype.
+    """The slopes within a step by `tableau`, for states like `start`: arrays (n,) of one dtype.
 
     The slopes are columns of one array: for small states, a sum as one matrix product costs a fraction of a sum term by
     term.
     """
 
-    def __init__(self, method: Tableau, start: Any) -> None:
-        self.method = method
+    def __init__(self, tableau: Tableau, start: Any) -> None:
         dtype = start.dtype
-        rows: tuple[Row, ...] = (*method.a[1:], *(() if method.fsal else (method.b,)))
-        nodes = [float(node) for node in (*method.c[1:], *(() if method.fsal else (1,)))]
+        rows: tuple[Row, ...] = (*tableau.a[1:], *(() if tableau.fsal else (tableau.b,)))
+        nodes = [float(node) for node in (*tableau.c[1:], *(() if tableau.fsal else (1,)))]
         self.evaluations = len(rows)
         """Evaluations of the field per step."""
         self._slopes = np.empty((len(start), self.evaluations + 1), dtype, order="F")
         self._product = gemv(dtype)
         weighted = [self._weighted(rounded(row, dtype)) for row in rows]
         self._stages = list(zip(range(1, len(rows) + 1), weighted, nodes, strict=True))
-        self._error = self._weighted(_error_weights(method, dtype))
-        self._middle = self._weighted(rounded(method.middle or (), dtype))
+        self._error = self._weighted(_error_weights(tableau, dtype))
+        self._middle = self._weighted(rounded(tableau.middle or (), dtype))
 
     def _weighted(self, weights: Floats) -> tuple[Floats, Floats]:
         """The slopes that weights belong to, and the weights."""
@@ -72,9 +70,38 @@ class Stages:
         return self._advanced(state, self._middle, step)
 
 
-def _error_weights(method: Tableau, dtype: np.dtype) -> Floats:
+def _error_weights(tableau: Tableau, dtype: np.dtype) -> Floats:
     """(s,) b - embedded; each is rounded first, which step control has always been computed with."""
-    if method.embedded is None:
+    if tableau.embedded is None:
         return np.empty(0, dtype)
     wide = np.promote_types(dtype, np.float64)
-    return (rounded(method.b, wide) - rounded(method.embedded, wide)).astype(dtype)
+    return (rounded(tableau.b, wide) - rounded(tableau.embedded, wide)).astype(dtype)
+
+
+@dataclass(frozen=True)
+class ExplicitRungeKutta:
+    """The method of a tableau."""
+
+    tableau: Tableau
+
+    @property
+    def name(self) -> str:
+        return self.tableau.name
+
+    @property
+    def order(self) -> int:
+        return self.tableau.order
+
+    @property
+    def controls_step(self) -> bool:
+        """Whether there is an embedded method."""
+        return self.tableau.embedded is not None
+
+    @property
+    def knows_middle(self) -> bool:
+        """Whether the interpolant is quartic."""
+        return self.tableau.middle is not None
+
+    def stepper(self, start: Any) -> Stages:
+        """For states like `start`, an array (n,)."""
+        return Stages(self.tableau, start)

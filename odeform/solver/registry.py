@@ -1,0 +1,23 @@
+"""The methods that `SolverSettings` can name."""
+
+from odeform.errors import InputError
+from odeform.solver import tableau
+from odeform.solver.method import Method
+from odeform.solver.runge_kutta import ExplicitRungeKutta
+
+__all__ = ["METHODS", "get_method"]
+
+METHODS: dict[str, Method] = {
+    "euler": ExplicitRungeKutta(tableau.EULER),
+    "midpoint": ExplicitRungeKutta(tableau.MIDPOINT),
+    "rk4": ExplicitRungeKutta(tableau.RK4),
+    "bosh3": ExplicitRungeKutta(tableau.BOSH3),
+    "dopri5": ExplicitRungeKutta(tableau.DOPRI5),
+}
+
+
+def get_method(name: str) -> Method:
+    """The method of that name. Raises `InputError` for an unknown one."""
+    if name not in METHODS:
+        raise InputError(f"unknown solver {name!r}: expected one of {', '.join(METHODS)}")
+    return METHODS[name]
