@@ -34,7 +34,7 @@ class Column:
     key: int = -1
     """Assigned by `Columns`; constant while a column is hidden, shown or given another shape."""
     color_index: int = -1
-    """Assigned by `Columns`: the lowest that no other model has, so that each keeps a color of its own."""
+    """Assigned by `Columns`: the lowest that no other model has, so that each keeps a colour of its own."""
 
     @property
     def foreign(self) -> bool:

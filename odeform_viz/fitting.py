@@ -1,4 +1,4 @@
-"""Another shape than the body that was trained: read, limited, fitted, and what the user is told of it."""
+"""Loaded shapes: reading one, fitting it to the trained body, and describing the fit."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -17,15 +17,15 @@ from odeform.types import GaussianSplats, Mesh
 
 __all__ = ["MOST_POINTS", "describe_fit", "fit_from_json", "fit_to_json", "shape_from"]
 
-MOST_POINTS = 200_000  # what is moved and sent at interactive rates
-ALIKE = 0.05  # of the body's size; shapes that lie closer are the body in another discretisation
+MOST_POINTS = 200_000  # that can be deformed and sent at interactive rates
+ALIKE = 0.05  # of the body's size; a closer shape is the trained body in another discretization
 
 
 def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None) -> FittedShape:
-    """Read a file or a bundled shape and fit it to the body, or place it by `transform`. Of many splats the most
-    visible are kept.
+    """Read a file or a bundled shape, and fit it to the body, or place it by `transform`.
 
-    `InputError` for what cannot be read or is too large to be shown.
+    Gaussian splats are reduced to the most visible `MOST_POINTS`. `InputError` for a file that cannot be read, or has
+    too many points.
     """
     geometry, region = read_shape(name)
     if isinstance(geometry, GaussianSplats):
@@ -39,7 +39,7 @@ def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None
 
 
 def fit_to_json(fit: FittedShape) -> dict[str, Any]:
-    """Where a shape comes from, what moves of it and how it lies, in plain values."""
+    """The origin, moving part and transform of a shape, as plain values."""
     region = None if fit.region is None else region_to_json(fit.region)
     file = Path(fit.origin)
     origin = str(file.resolve()) if file.is_file() else fit.origin
@@ -47,14 +47,14 @@ def fit_to_json(fit: FittedShape) -> dict[str, Any]:
 
 
 def fit_from_json(raw: Mapping[str, Any], body: Mesh) -> FittedShape:
-    """The shape read again, in the same part and place. `InputError` where that cannot be."""
+    """Read the shape again, with the same part and transform. `InputError` where that is impossible."""
     fit = shape_from(str(raw["origin"]), body)
     region = None if raw["region"] is None else region_from_json(raw["region"])
     return replace(fit_to(fit.source, body, region, transform=Similarity.from_json(raw["place"])), origin=fit.origin)
 
 
 def describe_fit(fit: FittedShape, name: str, body: Mesh) -> str:
-    """Size, factor, what was wrong with the file, and by how much the shape differs from what was trained."""
+    """One line: points, scale, distance from the trained body if it differs visibly, and notes of the reader."""
     size = float(np.ptp(body.points, axis=0).max())
     off = mean_distance(fit.geometry, body)
     text = f"{Path(name).name}: {len(fit.geometry.points):,} points"
@@ -62,5 +62,7 @@ def describe_fit(fit: FittedShape, name: str, body: Mesh) -> str:
         text += f" move, {len(fit.remainder.points):,} stand still"
     text += f", scaled by {fit.transform.factor:.4g} to the trained size"
     if off > ALIKE * size:
-        text += f"; its surface lies {1e3 * off:.0f} mm from the trained body's on average: no such shape was trained"
+        text += (
+            f"; its surface is on average {1e3 * off:.0f} mm from the trained body's: the model never saw such a shape"
+        )
     return "; ".join([text, *(fit.source.notes if isinstance(fit.source, GaussianSplats) else ())])

@@ -15,6 +15,7 @@ __all__ = [
     "REACH",
     "ColumnFrame",
     "Curves",
+    "Description",
     "DisplayOptions",
     "Error",
     "Frame",
@@ -40,7 +41,7 @@ class ViewRequest:
 
 @dataclass(frozen=True)
 class DisplayOptions:
-    """How columns are drawn: overlaid or in a row, with errors as colors, with the camera following the body."""
+    """How columns are drawn: overlaid or in a row, with errors as colours, with the camera following the body."""
 
     overlay: bool = False
     error_colors: bool = True
@@ -142,3 +143,15 @@ class Curves:
 def same_motions(one: Frame, other: Frame) -> bool:
     """Whether two frames show the same motions, at any times."""
     return [c.motion for c in one.columns] == [c.motion for c in other.columns]
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """A frame with what panels show beside it: the top of the error colour scale in mm, and the curves by column."""
+
+    frame: Frame
+    curves: tuple[Curves, ...]
+    error_scale: float | None
+    """None where errors are not coloured."""
+    settled: bool
+    """Whether the motions have not changed for a moment: time for numbers that are expensive to compute."""

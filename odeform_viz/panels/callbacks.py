@@ -1,21 +1,21 @@
-"""Controls that the viewer itself sets too: telling its hand from the user's, and one hand from the next."""
+"""Controls that both the user and the viewer set: who changed one, and one callback at a time."""
 
 import threading
 from collections.abc import Callable
 
 import viser
 
-__all__ = ["LOCK", "on_user_change", "serialized"]
+__all__ = ["LOCK", "on_user_change", "serialized", "set_content"]
 
 Control = viser.GuiDropdownHandle | viser.GuiCheckboxHandle | viser.GuiSliderHandle | viser.GuiNumberHandle
 Controls = Control | viser.GuiVector3Handle
 
 LOCK = threading.RLock()
-"""Callbacks run side by side; those that build on what is there take turns, and then read the newest values."""
+"""viser runs callbacks in parallel. Those that read and then change shared state hold this lock meanwhile."""
 
 
 def serialized(action: Callable[[], None]) -> Callable[[object], None]:
-    """A callback, of a button or the like, that waits for its turn."""
+    """A callback, of a button for instance, that runs `action` under `LOCK`."""
 
     def called(_: object) -> None:
         with LOCK:
@@ -25,10 +25,16 @@ def serialized(action: Callable[[], None]) -> Callable[[object], None]:
 
 
 def on_user_change(control: Controls, action: Callable[[], None]) -> None:
-    """Call `action` in turn when a user changes a control, not when the viewer does."""
+    """Call `action` under `LOCK` when a user changes a control, not when the viewer does."""
 
     def changed(event: viser.GuiEvent) -> None:
         if event.client_id is not None:
             serialized(action)(event)
 
     control.on_update(changed)
+
+
+def set_content(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:
+    """Replace a text; nothing is sent if it is the same."""
+    if text.content != content:
+        text.content = content

@@ -5,40 +5,39 @@ from collections.abc import Callable, Mapping
 
 import viser
 
+from odeform_viz.page import Page, Panel
+
 __all__ = ["HelpPanel", "help_text"]
 
 TABS = {
-    "Explore": "move the body's parameters; ticks and bands at a slider show where the model was trained",
-    "Compare": "put models, pinned copies and the truth side by side; with truth, errors are painted and plotted",
-    "Record": "take it away: a recording, the state of the page, the motion as a file",
+    "Explore": "change the parameters; marks at each slider show where the model was trained",
+    "Compare": "show models, pinned copies and the truth side by side; with a truth, errors are coloured and plotted",
+    "Record": "save a recording, the state of the page, or the motion as a file",
 }
-MOUSE = "Drag turns the view, the right button moves it, the wheel zooms. Numbers beside sliders can be typed."
+MOUSE = "Drag to rotate, right-drag to pan, scroll to zoom. You can also type numbers beside the sliders."
 
 
-def help_text(keys: Mapping[str, str]) -> str:
-    """Markdown; `keys` are the hot keys and what they do."""
+def help_text(hotkeys: Mapping[str, str]) -> str:
+    """Markdown; `hotkeys` are keys and what they do."""
     tabs = "  \n".join(f"**{name}**: {what}." for name, what in TABS.items())
-    rows = " · ".join(f"**{key}** {what}" for key, what in keys.items())
-    return f"{tabs}\n\n{MOUSE}\n\nKeys: {rows}"
+    keys = " · ".join(f"**{key}** {what}" for key, what in hotkeys.items())
+    return f"{tabs}\n\n{MOUSE}\n\nKeys: {keys}"
 
 
-class HelpPanel:
-    """Hot keys, and the text that explains them: in a tab, and over the page of who presses its key."""
+class HelpPanel(Panel):
+    """The help text in a tab, and in a dialog for the client that presses `H`."""
 
     KEY = "H"
 
-    def __init__(self, server: viser.ViserServer, keys: Mapping[str, tuple[str, Callable[[], None]]]) -> None:
-        """`keys` are hot keys, each with what it does in words and the doing; `H` is added."""
-        for key, (label, action) in keys.items():
-            command = server.gui.add_command(label.capitalize(), hotkey=key)  # pyright: ignore[reportArgumentType]
-            command.on_trigger(lambda _, action=action: action())
-        self._text = help_text({**{key: label for key, (label, _) in keys.items()}, self.KEY: "help"})
-        server.gui.add_markdown(self._text)
+    def __init__(self, page: Page) -> None:
+        gui = page.server.gui
+        self._text = help_text({**page.hotkeys, self.KEY: "help"})
+        gui.add_markdown(self._text)
         self._close: dict[int, Callable[[], None]] = {}
-        """How to close what is open, by client."""
+        """Closes the open dialog of a client."""
         self._lock = threading.Lock()
-        server.gui.add_command("Help", hotkey=self.KEY).on_trigger(lambda event: self._toggle(event.client))
-        server.on_client_disconnect(self._forget)
+        gui.add_command("Help", hotkey=self.KEY).on_trigger(lambda event: self._toggle(event.client))
+        page.server.on_client_disconnect(self._forget)
 
     def _forget(self, client: viser.ClientHandle) -> None:
         self._close.pop(client.client_id, None)

@@ -1,124 +1,126 @@
 """Time: a slider past the trained window, play and pause, speed, steps."""
 
 import asyncio
-from collections.abc import Callable
 
 import viser
 
 from odeform.errors import InputError
-from odeform.schema import Window
-from odeform_viz.runtime.clock import Clock
-from odeform_viz.view import REACH
+from odeform_viz.page import Page, Panel
+from odeform_viz.state import PageState
+from odeform_viz.view import REACH, Description
 
 __all__ = ["PlaybackPanel"]
 
-SPEEDS = {"true speed": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/50": 0.02}
+SPEEDS = {"real time": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/50": 0.02}
 
 
-class PlaybackPanel:
-    """Drives a clock. A hand on the time slider stops the playing; the slider follows the clock otherwise."""
+class PlaybackPanel(Panel):
+    """Drives the clock. Dragging the time slider pauses; otherwise the slider follows the clock."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        window: Window,
-        clock: Clock,
-        wake: Callable[[], None],
-        largest: Callable[[], float],
-        say: Callable[[str], None],
-    ) -> None:
-        """`largest` finds the moment of the largest deformation; `say` shows a message."""
-        self._say = say
-        self._clock, self._wake, self._window, self._largest = clock, wake, window, largest
-        self._asked = 0  # moments that a hand has asked for: a peak takes a while to find, and may come too late
-        span = window.stop - window.start
-        with server.gui.add_folder("Time"):
-            self._time = server.gui.add_slider(
+    def __init__(self, page: Page) -> None:
+        self._page, self._clock, self._window = page, page.clock, page.schema.window
+        self._seeks = 0  # by the user; finding a peak takes a while, and a later seek cancels it
+        start, stop = self._window.start, self._window.stop
+        gui = page.server.gui
+        with gui.add_folder("Time"):
+            self._time = gui.add_slider(
                 "time (s)",
-                min=window.start,
-                max=round(window.start + REACH * span, 4),
+                min=start,
+                max=round(start + REACH * (stop - start), 4),
                 step=0.0005,
-                initial_value=window.start,
-                marks=((window.start, f"{window.start:g}"), (window.stop, f"trained to {window.stop:g}")),
-                hint="beyond the trained window the motion is extrapolated",
+                initial_value=start,
+                marks=((start, f"{start:g}"), (stop, f"trained until {stop:g} s")),
+                hint="after the trained window, the motion is extrapolated",
             )
             self._time.on_update(self._dragged)
-            self._play = server.gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+            self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._play.on_click(lambda _: self.toggle())
-            go = server.gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
+            go = gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
             go.on_click(self._clicked)
-            go.hint = "start, frame before, frame after, largest deformation"
-            self._speed = server.gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
+            go.hint = "start, previous frame, next frame, largest deformation"
+            self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
             self._speed.on_update(lambda _: self._changed())
-            self._loop = server.gui.add_checkbox("loop", initial_value=True)
+            self._loop = gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())
+        page.add_hotkey("K", "play or pause", self.toggle)
+        page.add_hotkey("J", "previous frame", lambda: self.step("◀"))
+        page.add_hotkey("L", "next frame", lambda: self.step("▶"))
+        page.add_hotkey("0", "go to the start", lambda: self.step("start"))
+        page.add_hotkey("P", "go to the peak of the deformation", lambda: self.step("peak"))
         self._changed()
 
+    def describe(self, description: Description) -> None:
+        self._follow(description.frame.request.time)
+
+    def restore(self, state: PageState) -> None:
+        self.jump(state.time)
+
+    def toggle(self) -> None:
+        """Play or pause."""
+        self._clock.pause() if self._clock.playing else self._clock.play()
+        self._refresh_button()
+        self._page.wake()
+
+    def step(self, target: str) -> None:
+        """Go to the "start", the previous ("◀") or next ("▶") frame, or the "peak" of the deformation."""
+        self._seeks += 1
+        self._to_peak(self._seeks) if target == "peak" else self._to_frame(target)
+
+    def jump(self, time: float) -> None:
+        """Pause at a time in seconds."""
+        self._page.pause_at(min(max(time, self._time.min), self._time.max))
+        self._refresh_button()
+
     async def _dragged(self, event: viser.GuiEvent) -> None:
-        # a coroutine runs at once where the message came in, before the clock moves the slider on
-        if event.client_id is not None:  # a hand, not the clock
-            moment = self._time.value
-            if not self._time.min <= moment <= self._time.max:
-                self._say(f"time: expected seconds from {self._time.min:g} to {self._time.max:g}, got {moment:g}")
-                self.show(self._clock.time())
-                return
-            self._asked += 1
-            self.jump(moment)
+        # a coroutine runs at once where the message arrives, before the clock moves the slider on
+        if event.client_id is None:
+            return  # set by the clock
+        time = self._time.value
+        if not self._time.min <= time <= self._time.max:
+            expected = f"expected seconds from {self._time.min:g} to {self._time.max:g}"
+            self._page.notices.show("Time not set", f"time: {expected}, got {time:g}")
+            self._follow(self._clock.time())
+            return
+        self._seeks += 1
+        self.jump(time)
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
-        which, self._asked = event.target.value, self._asked + 1
-        if which == "peak":
-            await asyncio.to_thread(self._to_peak, self._asked)
+        target, self._seeks = event.target.value, self._seeks + 1
+        if target == "peak":
+            await asyncio.to_thread(self._to_peak, self._seeks)
         else:
-            self._to_frame(which)
+            self._to_frame(target)
 
     def _changed(self) -> None:
         if self._speed.value in SPEEDS:
             self._clock.set_speed(SPEEDS[self._speed.value])
         else:
-            self._say(f"speed: expected one of {', '.join(SPEEDS)}, got {self._speed.value!r}")
+            expected = f"expected one of {', '.join(SPEEDS)}"
+            self._page.notices.show("Speed not set", f"speed: {expected}, got {self._speed.value!r}")
         self._clock.loop = bool(self._loop.value)
-        self._wake()
+        self._page.wake()
 
-    def toggle(self) -> None:
-        self._clock.pause() if self._clock.playing else self._clock.play()
-        self._refresh_button()
-        self._wake()
-
-    def step(self, which: str) -> None:
-        """To the `start`, the frame before (`◀`) or after (`▶`), or the `peak` of the deformation."""
-        self._asked += 1
-        self._to_peak(self._asked) if which == "peak" else self._to_frame(which)
-
-    def _to_frame(self, which: str) -> None:
+    def _to_frame(self, target: str) -> None:
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
-        if which in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
-            self.jump(self._window.start + max(steps[which], 0) * frame)
+        if target in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
+            self.jump(self._window.start + max(steps[target], 0) * frame)
 
-    def _to_peak(self, asked: int) -> None:
+    def _to_peak(self, seek: int) -> None:
         try:
-            peak = self._largest()
+            peak = self._page.session.largest_deformation(self._page.request())
         except InputError as error:
-            self._say(str(error))
+            self._page.notices.show("Peak not found", str(error))
             return
-        if asked == self._asked:
+        if seek == self._seeks:
             self.jump(peak)
-
-    def jump(self, moment: float) -> None:
-        """Pause at a moment."""
-        self._clock.pause()
-        self._clock.seek(min(max(moment, self._time.min), self._time.max))
-        self._refresh_button()
-        self._wake()
 
     def _refresh_button(self) -> None:
         playing = self._clock.playing
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
 
-    def show(self, moment: float) -> None:
-        """Let the slider follow; called by the worker."""
-        self._time.value = min(max(round(moment, 4), self._time.min), self._time.max)
-        if self._play.label == "Pause" and not self._clock.playing:
+    def _follow(self, time: float) -> None:
+        self._time.value = min(max(round(time, 4), self._time.min), self._time.max)
+        if (self._play.label == "Pause") != self._clock.playing:
             self._refresh_button()

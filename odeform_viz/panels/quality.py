@@ -1,75 +1,89 @@
-"""How finely the ODE is integrated: by name, or as cheaply as a bound on time or error allows."""
+"""The accuracy of the ODE solver: by name, or the cheapest settings within a budget of time or error."""
 
 import json
-from collections.abc import Callable
-
-import viser
 
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.frontier import cheapest_within_error, finest_within_budget
+from odeform_viz.page import Page, Panel
+from odeform_viz.state import PageState
 
 __all__ = ["QualityPanel", "quality_names"]
 
-WITHIN_MS, WITHIN_MM = "within a time", "within a solver error"
-TRIALS = 5  # solves of which the quickest says what an evaluation costs here
+TIME_BUDGET, ERROR_BUDGET = "time budget", "error budget"
+TRIALS = 5  # solves; the fastest gives the time of one evaluation on this machine
 
 
 def quality_names(predictor: Predictor) -> tuple[str, ...]:
-    """What can be chosen: bounds only where the checkpoint knows what settings cost and how far they are off."""
-    return (*predictor.qualities, *((WITHIN_MS, WITHIN_MM) if predictor.frontier else ()))
+    """The choices: budgets only where the checkpoint has measured settings."""
+    return (*predictor.qualities, *((TIME_BUDGET, ERROR_BUDGET) if predictor.frontier else ()))
 
 
-class QualityPanel:
-    """A choice, with the bound it asks for."""
+def _integrated(page: Page) -> Predictor | None:
+    """The first model that solves an ODE."""
+    return next((c.predictor for c in page.columns.all if c.predictor and c.predictor.qualities), None)
 
-    def __init__(self, server: viser.ViserServer, predictor: Predictor, wake: Callable[[], None]) -> None:
-        self._predictor, self._wake = predictor, wake
+
+class QualityPanel(Panel):
+    """A dropdown, and the budget of the chosen kind."""
+
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        return _integrated(page) is not None
+
+    def __init__(self, page: Page) -> None:
+        predictor = _integrated(page)
+        assert predictor is not None
+        self._predictor, self._wake = predictor, page.wake
         self._names = quality_names(predictor)
-        self._pace: float | None = None
-        gui = server.gui
+        self._ms_per_evaluation: float | None = None
+        gui = page.server.gui
         self._choice = gui.add_dropdown(
-            "quality", self._names, initial_value="balanced", hint="how finely the ODE is integrated"
+            "quality", self._names, initial_value="balanced", hint="accuracy of the ODE solver"
         )
-        self._budget = gui.add_number("at most (ms)", 5.0, min=0.1, max=1000.0, step=0.1, visible=False)
-        self._bound = gui.add_number("at most (mm)", 0.1, min=1e-6, max=100.0, step=1e-6, visible=False)
-        for control in (self._choice, self._budget, self._bound):
+        self._budget_ms = gui.add_number("at most (ms)", 5.0, min=0.1, max=1000.0, step=0.1, visible=False)
+        self._budget_mm = gui.add_number("at most (mm)", 0.1, min=1e-6, max=100.0, step=1e-6, visible=False)
+        for control in (self._choice, self._budget_ms, self._budget_mm):
             control.on_update(lambda _: self._changed())
+        page.controls.quality = self.quality
 
-    def _changed(self) -> None:
-        self._budget.visible = self._choice.value == WITHIN_MS
-        self._bound.visible = self._choice.value == WITHIN_MM
-        self._wake()
-
-    def _ms_per_evaluation(self) -> float:
-        """Measured once, so that a bound means the same setting however one came to it."""
-        if self._pace is None:
-            solved = [self._predictor.solve().stats for _ in range(TRIALS)]
-            self._pace = min(s.wall_ms / s.evaluations for s in solved)
-        return self._pace
-
-    def request(self) -> str:
-        """A name, or a setting of the frontier as JSON. `InputError` for what no hand could choose."""
+    def quality(self) -> str:
+        """A name, or the settings within the budget as JSON. `InputError` for values no control can have."""
         choice = self._choice.value
         if choice not in self._names:
             raise InputError(f"quality: expected one of {', '.join(self._names)}, got {choice!r}")
-        if choice not in (WITHIN_MS, WITHIN_MM):
+        if choice not in (TIME_BUDGET, ERROR_BUDGET):
             return choice
-        control = self._budget if choice == WITHIN_MS else self._bound
-        if not 0.0 < control.value < float("inf"):
-            raise InputError(f"quality: expected a positive bound, got {control.value}")
+        budget = (self._budget_ms if choice == TIME_BUDGET else self._budget_mm).value
+        if not 0.0 < budget < float("inf"):
+            raise InputError(f"quality: expected a positive budget, got {budget}")
         frontier = self._predictor.frontier
-        if choice == WITHIN_MS:
-            point = finest_within_budget(frontier, control.value, self._ms_per_evaluation())
+        if choice == TIME_BUDGET:
+            point = finest_within_budget(frontier, budget, self._measured_pace())
         else:
-            point = cheapest_within_error(frontier, control.value)
+            point = cheapest_within_error(frontier, budget)
         return json.dumps(point.quality.to_json())
 
-    def set(self, request: str) -> None:
-        """Choose what was once requested, as far as this predictor knows it."""
-        if request in self._predictor.qualities:
-            self._choice.value = request
+    def set(self, quality: str) -> None:
+        """Choose what `quality` once returned; nothing changes if this predictor does not have it."""
+        if quality in self._predictor.qualities:
+            self._choice.value = quality
         for point in self._predictor.frontier:
-            if json.dumps(point.quality.to_json()) == request:
-                self._choice.value, self._bound.value = WITHIN_MM, point.solver_error_mm
+            if json.dumps(point.quality.to_json()) == quality:
+                self._choice.value, self._budget_mm.value = ERROR_BUDGET, point.solver_error_mm
                 self._changed()
+
+    def restore(self, state: PageState) -> None:
+        self.set(state.quality)
+
+    def _changed(self) -> None:
+        self._budget_ms.visible = self._choice.value == TIME_BUDGET
+        self._budget_mm.visible = self._choice.value == ERROR_BUDGET
+        self._wake()
+
+    def _measured_pace(self) -> float:
+        """Milliseconds per evaluation; measured once, so that a budget always means the same settings."""
+        if self._ms_per_evaluation is None:
+            solved = [self._predictor.solve().stats for _ in range(TRIALS)]
+            self._ms_per_evaluation = min(s.wall_ms / s.evaluations for s in solved)
+        return self._ms_per_evaluation

@@ -1,4 +1,4 @@
-"""The shape that moves: the body that was trained, a bundled one, or one from a file, as a whole or in part."""
+"""The shape that moves: the trained body, a bundled shape, or one from a file, as a whole or in part."""
 
 import tempfile
 from collections.abc import Callable
@@ -13,139 +13,139 @@ from odeform.formats.bundled import bundled_shapes
 from odeform.geometry.region import Region
 from odeform.geometry.shape import FittedShape, fit_to
 from odeform.geometry.similarity import Similarity
-from odeform.types import Mesh, Rotations
-from odeform_viz.columns import Columns
-from odeform_viz.fitting import describe_fit, shape_from
-from odeform_viz.panels.alignment import AlignmentPanel
+from odeform.types import Rotations
+from odeform_viz.fitting import MOST_POINTS, describe_fit, shape_from
+from odeform_viz.page import Page, Panel
+from odeform_viz.panels.alignment import Alignment
 from odeform_viz.panels.callbacks import LOCK, serialized
-from odeform_viz.panels.part import PartPanel
+from odeform_viz.panels.region import RegionEditor
+from odeform_viz.state import PageState
 
 __all__ = ["ShapePanel"]
 
 LARGEST = 256 << 20  # bytes of an upload
-TRAINED = "The body that was trained."
+TRAINED = "The trained body."
 
 
-class ShapePanel:
-    """Which shape, which part of it, and how it lies; and the way back."""
+class ShapePanel(Panel):
+    """Loads a shape, and changes which part of it moves and how it lies; all models get the same shape."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        columns: Columns,
-        body: Mesh,
-        hold: Callable[[], None],
-        changed: Callable[[], None],
-        say: Callable[[str], None],
-    ) -> None:
-        """`hold` stops the motion at rest; `changed` is called after the columns have; `say` shows a message."""
-        self._columns, self._body, self._hold, self._changed, self._say = columns, body, hold, changed, say
-        self._fit = next((column.fit for column in columns.all if column.fit), None)
+    def __init__(self, page: Page) -> None:
+        self._page, self._body = page, page.body
+        self._fit = _fit_of(page)
         self._name = "the shape"
-        self._turned: Rotations | None = None  # by hand; None as guessed
-        self._guess = self._fit.transform.factor if self._fit else 1.0
-        gui = server.gui
+        self._rotation: Rotations | None = None  # chosen by the user; None for the automatic one
+        self._automatic_scale = self._fit.transform.factor if self._fit else 1.0
+        server, gui = page.server, page.server.gui
         with gui.add_folder("Shape", expand_by_default=False):
             self._text = gui.add_markdown(TRAINED)
             upload = gui.add_upload_button(
-                "Move another shape", color="gray", hint="a mesh, points or Gaussian splats, up to 200,000 points"
+                "Load a shape...", color="gray", hint=f"a mesh, points or Gaussian splats, up to {MOST_POINTS:,} points"
             )
-            upload.on_upload(lambda event: self._guarded(lambda: self._uploaded(event.target.value)))
+            upload.on_upload(lambda event: self._guarded(lambda: self._upload(event.target.value)))
             for name in bundled_shapes():
-                button = gui.add_button(f"Move the bundled {name}", color="gray", hint="Gaussian splats")
-                button.on_click(lambda _, name=name: self._guarded(lambda: self._read(name, name, kept=True)))
-            self._part = PartPanel(server, self._lay_out, self._use, changed)
-            self._alignment = AlignmentPanel(server, hold, self._turn, self._put, changed)
+                button = gui.add_button(f"Load the {name}", color="gray", hint="bundled Gaussian splats")
+                button.on_click(lambda _, name=name: self._guarded(lambda: self._load(name, name)))
+            self._region = RegionEditor(server, self._show_whole, self._use_region, page.wake)
+            self._alignment = Alignment(server, self._rest, self._rotate, self._transform, page.wake)
             self._back = gui.add_button("Back to the trained body", color="gray", visible=False)
-            self._back.on_click(serialized(self._return))
+            self._back.on_click(serialized(lambda: self._adopt(None)))
+        page.controls.arranging = lambda: self._region.editing or self._alignment.dragging
         self._show()
 
+    def set(self, fit: FittedShape | None) -> None:
+        """Another shape, or the same in another part or transform; None for the trained body."""
+        with LOCK:
+            if fit is not None:
+                self._name, self._rotation = fit.origin, fit.transform.rotation
+                automatic = fit_to(fit.source, self._body, fit.region, fit.transform.rotation)
+                self._automatic_scale = automatic.transform.factor
+            self._adopt(fit, automatic=False)
+
+    def restore(self, state: PageState) -> None:
+        self.set(_fit_of(self._page))
+
     def _guarded(self, action: Callable[[], None]) -> None:
+        """Change the shape, or show why not."""
         try:
             with LOCK:
                 action()
         except (InputError, OSError) as error:
-            self._say(str(error))
-            self._text.content = f"⚠ **{error}**"  # what is said elsewhere goes with the next frame
+            self._page.notices.show("Shape not loaded", str(error))
+            self._text.content = f"⚠ **{error}**"  # stays after the notification
 
-    def _uploaded(self, file: viser.UploadedFile) -> None:
+    def _upload(self, file: viser.UploadedFile) -> None:
         if len(file.content) > LARGEST:
-            raise InputError(f"{file.name}: expected at most {LARGEST >> 20} MB")
-        # the readers take paths: the file exists only as long as it is read
+            raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
+        # readers take paths, so the file exists while it is read
         with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
             path = Path(folder) / f"shape{Path(file.name).suffix}"
             path.write_bytes(file.content)
             try:
-                self._read(path, file.name)
+                self._load(path, file.name, origin="")
             except InputError as error:
                 raise InputError(str(error).replace(str(path), file.name).replace(path.name, file.name)) from None
 
-    def _read(self, path: str | Path, name: str, kept: bool = False) -> None:
+    def _load(self, path: str | Path, name: str, origin: str | None = None) -> None:
+        """`origin`, if given, replaces the path that a saved state refers to."""
         fit = shape_from(path, self._body)
-        self._name, self._turned = name, None
-        self._adopt(fit if kept else replace(fit, origin=""))
+        self._name, self._rotation = name, None
+        self._adopt(fit if origin is None else replace(fit, origin=origin))
 
-    def set(self, fit: FittedShape | None) -> None:
-        """Another shape, or the same in another part or place; None for the body that was trained."""
-        with LOCK:
-            if fit is not None:
-                self._name, self._turned = fit.origin, fit.transform.rotation
-                self._guess = fit_to(fit.source, self._body, fit.region, fit.transform.rotation).transform.factor
-            self._adopt(fit, guessed=False)
-
-    @property
-    def arranging(self) -> bool:
-        """Whether a hand is choosing a part or putting the shape into place."""
-        return self._part.choosing or self._alignment.dragging
-
-    def _adopt(self, fit: FittedShape | None, guessed: bool = True) -> None:
+    def _adopt(self, fit: FittedShape | None, automatic: bool = True) -> None:
+        """Show a fit in all columns; `automatic` if its scale is what 100 % means."""
         self._fit = fit
-        if fit is not None and guessed:
-            self._guess = fit.transform.factor
-        self._columns.set_shape(fit)
+        if fit is not None and automatic:
+            self._automatic_scale = fit.transform.factor
+        self._page.columns.set_shape(fit)
         self._show()
-        self._changed()
+        self._page.columns_changed()
 
     def _show(self) -> None:
         self._text.content = describe_fit(self._fit, self._name, self._body) if self._fit else TRAINED
         self._back.visible = self._fit is not None
-        self._part.show(self._fit)
-        self._alignment.show(self._fit, self._guess)
+        self._region.show(self._fit)
+        self._alignment.show(self._fit, self._automatic_scale)
 
     def _refit(self, region: Region | None, rotation: Rotations | None, transform: Similarity | None = None) -> None:
-        """The same shape, otherwise; it stays as it is where that cannot be."""
+        """FittedShape the same shape again; it stays as it is where that is impossible."""
         fit = self._fit
-        if fit is not None:
-            self._guarded(lambda: self._move(fit, region, rotation, transform))
+        if fit is None:
+            return
 
-    def _move(
-        self, fit: FittedShape, region: Region | None, rotation: Rotations | None, transform: Similarity | None
-    ) -> None:
-        moved = fit_to(fit.source, self._body, region, rotation, transform)
-        self._adopt(replace(moved, origin=fit.origin), guessed=transform is None)
+        def refit() -> None:
+            moved = fit_to(fit.source, self._body, region, rotation, transform)
+            self._adopt(replace(moved, origin=fit.origin), automatic=transform is None)
 
-    def _lay_out(self) -> FittedShape | None:
-        """The whole shape at rest, upright as it was; a part taken from it then stays so."""
+        self._guarded(refit)
+
+    def _rest(self) -> None:
+        self._page.pause_at(self._page.schema.window.start)
+
+    def _show_whole(self) -> FittedShape | None:
+        """Show the whole shape at rest, with its present rotation; a part selected from it keeps that."""
         if self._fit is not None:
-            self._hold()
-            upright = self._fit.transform.rotation
-            if not np.array_equal(upright, np.eye(3)):
-                self._turned = upright
-            self._refit(None, upright)
+            self._rest()
+            rotation = self._fit.transform.rotation
+            if not np.array_equal(rotation, np.eye(3)):
+                self._rotation = rotation
+            self._refit(None, rotation)
         return self._fit
 
-    def _use(self, region: Region | None) -> None:
-        self._refit(region, self._turned)
+    def _use_region(self, region: Region | None) -> None:
+        self._refit(region, self._rotation)
 
-    def _turn(self, rotation: Rotations | None) -> None:
-        self._turned = rotation
+    def _rotate(self, rotation: Rotations | None) -> None:
+        self._rotation = rotation
         if self._fit is not None:
             self._refit(self._fit.region, rotation)
 
-    def _put(self, transform: Similarity) -> None:
-        self._turned = transform.rotation
+    def _transform(self, transform: Similarity) -> None:
+        self._rotation = transform.rotation
         if self._fit is not None:
             self._refit(self._fit.region, None, transform)
 
-    def _return(self) -> None:
-        self._adopt(None)
+
+def _fit_of(page: Page) -> FittedShape | None:
+    """The fit of the shape that the columns have now."""
+    return next((column.fit for column in page.columns.all if column.fit), None)

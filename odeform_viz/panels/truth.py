@@ -1,192 +1,195 @@
-"""The truth of a setting: a sequence of a data set, or one simulated on the spot."""
+"""The truth to compare with: a test sequence of the scene's data set, or one simulated now."""
 
 import asyncio
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import viser
 
-from odeform.dataset.index import Dataset, Entry
+from odeform.dataset.index import Entry
+from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Schema
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import MotionSequence
-from odeform_viz.columns import Column, Columns
+from odeform_viz.columns import Column
+from odeform_viz.page import Page, Panel
 from odeform_viz.runtime.jobs import Job, simulate_motion
+from odeform_viz.view import Description
 
-__all__ = ["TruthPanel", "entry_label", "other_physics"]
+__all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
-NONE = "none"
-OTHER = "another"  # simulated here, or of another data set
-NO_SIMULATOR = "This scene was imported: there is no simulator of it here."
-FINER = 4  # times the frames of training: one looks between them
+NONE, SIMULATED = "none", "simulated here"
+NO_SIMULATOR = "This scene was imported, so it cannot be simulated here."
+OVERSAMPLING = 4  # simulated frames per frame of training, to compare between those too
 
 PHYSICS = (
-    "⚠ **The simulator's physics are not those the model was taught**: errors against what is simulated here are not "
-    "the model's alone. {}."
+    "⚠ **The simulator's constants differ from those the model was trained on**, so errors against a simulation are "
+    "not the model's alone: {}."
 )
 
 
 def entry_label(entry: Entry, schema: Schema) -> str:
-    """A sequence by its number and what was varied."""
+    """The number of a sequence and its parameters."""
     values = ", ".join(f"{p.name} {entry.parameters[p.name]:.3g}" for p in schema.learned)
     return f"{entry.name.rsplit('_', 1)[-1].lstrip('0') or '0'}: {values}"
 
 
-def other_physics(taught: Mapping[str, float], simulated: Mapping[str, float]) -> str:
-    """What of the physics that a scene leaves fixed differs from what a model was taught, in words; empty if none."""
-    names = [name for name in {**taught, **simulated} if taught.get(name) != simulated.get(name)]
+def physics_difference(trained: Mapping[str, float], simulated: Mapping[str, float]) -> str:
+    """The constants in which the training data and the simulator differ, in words; empty if in none."""
+    names = [name for name in {**trained, **simulated} if trained.get(name) != simulated.get(name)]
 
     def value(physics: Mapping[str, float], name: str) -> str:
         return f"{physics[name]:.4g}" if name in physics else "none"
 
-    return ", ".join(f"{name} {value(simulated, name)} (taught {value(taught, name)})" for name in names)
+    return ", ".join(f"{name} {value(simulated, name)} (trained on {value(trained, name)})" for name in names)
 
 
-class TruthPanel:
-    """A browser of the test sequences at hand, and the simulator in a process of its own."""
+class TruthPanel(Panel):
+    """A list of test sequences, and the simulator in a process of its own."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        schema: Schema,
-        columns: Columns,
-        dataset: Dataset | None,
-        taught: Mapping[str, float],
-        parameters: Callable[[], dict[str, float]],
-        set_parameters: Callable[[Mapping[str, float]], None],
-        changed: Callable[[], None],
-        say: Callable[[str], None],
-    ) -> None:
-        """`taught` is the fixed physics that the model learned; `set_parameters` moves the sliders; `changed` is
-        called after the columns have; `say` shows a message.
-        """
-        self._schema, self._columns, self._dataset = schema, columns, dataset
-        self._parameters, self._set, self._changed, self._say = parameters, set_parameters, changed, say
+    def __init__(self, page: Page) -> None:
+        self._page, self._schema, self._columns = page, page.schema, page.columns
+        scene = self._schema.scene
+        self._scene = find_scene(scene)  # None for imported data, which cannot be simulated
+        self._dataset = open_dataset(scene) if scene in bundled_datasets() else None
+        self._entries = {entry_label(e, self._schema): e for e in self._dataset.select("test")} if self._dataset else {}
         self._job: Job | None = None
         self._starting = threading.Lock()
-        self._opening = asyncio.Lock()  # fair: what was chosen last is opened last
-        scene = find_scene(schema.scene)
-        gui = server.gui
+        self._opening = asyncio.Lock()  # fair: sequences are opened in the order in which they were chosen
+        gui = page.server.gui
         with gui.add_folder("Truth"):
-            if dataset is not None:
-                self._entries = {entry_label(e, schema): e for e in dataset.select("test")}
-                self._browser = gui.add_dropdown("test sequence", (NONE, OTHER, *self._entries))
-                self._browser.on_update(self._opened)
-            self._start = gui.add_button(
-                "Simulate this",
-                disabled=scene is None,
-                hint="runs the simulator at the sliders' values",
-            )
-            self._start.on_click(lambda _: self._simulate())
-            self._bar = gui.add_progress_bar(0.0, visible=False)
-            self._cancel = gui.add_button("Cancel", color="gray", visible=False)
-            self._cancel.on_click(lambda _: self.cancel())
-            self._back = gui.add_button("Sliders to the truth's parameters", color="gray", visible=False)
-            self._back.on_click(lambda _: self._return())
-            differs = other_physics(taught, scene.fixed) if scene else ""
-            self._physics = PHYSICS.format(differs) if differs else ""
-            note = NO_SIMULATOR if scene is None else self._physics
+            if self._dataset is not None:
+                self._browser = gui.add_dropdown("test sequence", (NONE, *self._entries))
+                self._browser.on_update(self._chosen)
+            self._build_simulation(gui)
+            self._back = gui.add_button("Set sliders to the truth", color="gray", visible=False)
+            self._back.on_click(lambda _: self._set_sliders())
+            self._physics = self._physics_note()
+            note = self._physics if self._scene else NO_SIMULATOR
             self._note = gui.add_markdown(note, visible=bool(note))
-        self.refresh()
+        page.on_columns_changed(self._refresh)
+        self._refresh()
+
+    def _build_simulation(self, gui: viser.GuiApi) -> None:
+        self._start = gui.add_button(
+            "Simulate this",
+            disabled=self._scene is None,
+            hint="run the simulator with the parameters of the sliders",
+        )
+        self._start.on_click(lambda _: self._simulate())
+        self._bar = gui.add_progress_bar(0.0, visible=False)
+        self._cancel = gui.add_button("Cancel", color="gray", visible=False)
+        self._cancel.on_click(lambda _: self.close())
+
+    def _physics_note(self) -> str:
+        predictor = self._page.model.predictor
+        trained = predictor.checkpoint.provenance.get("fixed", {}) if predictor else {}
+        difference = physics_difference(trained, self._scene.fixed) if self._scene else ""
+        return PHYSICS.format(difference) if difference else ""
+
+    def describe(self, description: Description) -> None:
+        self._back.visible = description.frame.off_truth
+
+    def close(self) -> None:
+        """Cancel the simulation in progress, if any."""
+        with self._starting:
+            if self._job is not None and self._job.running:
+                self._job.cancel()
+                self._show_working(False)
 
     def open(self, sequence: MotionSequence, origin: str = "") -> None:
         """Show a sequence as truth, and move the sliders to its parameters."""
         motion = RecordedMotion(self._schema, sequence)
         self._columns.add(Column("truth", motion, motion.geometry, origin=origin))
-        self._set(sequence.parameters)
-        self._changed()
+        self._page.controls.set_parameters(sequence.parameters)
+        self._page.columns_changed()
+
+    async def _chosen(self, event: viser.GuiEvent) -> None:
+        # a coroutine runs at once where the message arrives, before `_refresh` shows the old choice again
+        if event.client_id is not None:
+            label = self._browser.value
+            async with self._opening:
+                await asyncio.to_thread(self._choose, label)
+
+    def _choose(self, label: str) -> None:
+        try:
+            if label == NONE:
+                self._remove()
+            elif label in self._entries and self._dataset is not None:
+                entry = self._entries[label]
+                self.open(self._dataset.read(entry), self._origin(entry))
+            elif label not in self._browser.options:
+                raise InputError(f"test sequence: expected one of the list, got {label!r}")
+        except InputError as error:
+            self._page.notices.show("Sequence not opened", str(error))
+        self._refresh()
 
     def _origin(self, entry: Entry) -> str:
         return f"{self._schema.scene}/{entry.name}"
 
-    async def _opened(self, event: viser.GuiEvent) -> None:
-        # a coroutine reads the request at once where the message came in, before `refresh` says what is still shown
-        if event.client_id is not None:
-            chosen = self._browser.value
-            async with self._opening:
-                await asyncio.to_thread(self._choose, chosen)
+    def _remove(self) -> None:
+        if (truth := self._columns.truth) is not None:
+            self._columns.remove(truth.key)
+        self._page.columns_changed()
 
-    def _choose(self, chosen: str) -> None:
-        try:
-            if chosen == NONE:
-                self._drop()
-            elif chosen in self._entries and self._dataset is not None:
-                entry = self._entries[chosen]
-                self.open(self._dataset.read(entry), self._origin(entry))
-            elif chosen != OTHER:
-                raise InputError(f"test sequence: expected one of the list, got {chosen!r}")
-        except InputError as error:
-            self._say(str(error))
-        self.refresh()
+    def _set_sliders(self) -> None:
+        column = self._columns.truth
+        if column is not None and column.truth is not None:
+            self._page.controls.set_parameters(self._schema.known(column.truth.setting))
+            self._page.wake()
 
-    def _drop(self) -> None:
-        for column in self._columns.all:
-            if column.truth:
-                self._columns.remove(column.key)
-        self._changed()
-
-    def _return(self) -> None:
-        truth = next((c.truth for c in self._columns.all if c.truth), None)
-        if truth is not None:
-            self._set(self._schema.known(truth.setting))
-            self._changed()
-
-    def refresh(self) -> None:
-        """Let the browser name the truth that is shown, wherever it came from."""
+    def _refresh(self) -> None:
+        """Let the list name the visible truth, also one that is not from the list."""
         if self._dataset is None:
             return
-        truth = next((c for c in self._columns.all if c.truth), None)
+        truth = self._columns.truth
         labels = {self._origin(entry): label for label, entry in self._entries.items()}
-        shown = NONE if truth is None else labels.get(truth.origin, OTHER)
-        if self._browser.value != shown:
-            self._browser.value = shown
-
-    def show(self, away: bool) -> None:
-        """`away`: there is a truth, but the sliders have left its parameters."""
-        self._back.visible = away
+        label = NONE if truth is None else labels.get(truth.origin, truth.origin or SIMULATED)
+        options = tuple(dict.fromkeys((NONE, label, *self._entries)))
+        if label in self._entries:
+            options = (NONE, *self._entries)
+        if self._browser.value != label:
+            # the value has to be an option at any time
+            self._browser.options = tuple(dict.fromkeys((*self._browser.options, label)))
+            self._browser.value = label
+        if self._browser.options != options:
+            self._browser.options = options
 
     def _simulate(self) -> None:
         try:
-            parameters = self._schema.complete(self._parameters())
+            parameters = self._schema.complete(self._page.controls.parameters())
         except InputError as error:
-            self._say(str(error))
+            self._page.notices.show("Simulation not started", str(error))
             return
-        arguments = (self._schema.scene, parameters, FINER * self._schema.window.rate)
+        arguments = (self._schema.scene, parameters, OVERSAMPLING * self._schema.window.rate)
         with self._starting:
             if self._job is not None and self._job.running:
                 return
-            self._working(True)
+            self._show_working(True)
             self._job = Job(simulate_motion, arguments, self._simulated, self._failed, self._progress)
             self._job.start()
 
     def _simulated(self, sequence: MotionSequence) -> None:
-        self._working(False)
+        self._show_working(False)
         try:
             self.open(sequence)
         except InputError as error:
             self._failed(str(error))
 
     def _failed(self, message: str) -> None:
-        self._working(False)
-        self._tell(f"⚠ **The simulation failed**: {message}")
+        self._show_working(False)
+        self._show_note(f"⚠ **The simulation failed**: {message}")
 
-    def _progress(self, share: float) -> None:
-        self._bar.value = 100.0 * min(share, 1.0)
+    def _progress(self, fraction: float) -> None:
+        self._bar.value = 100.0 * min(fraction, 1.0)
 
-    def _tell(self, note: str) -> None:
+    def _show_note(self, note: str) -> None:
         self._note.content, self._note.visible = note, bool(note)
 
-    def _working(self, working: bool) -> None:
-        self._tell(self._physics)
+    def _show_working(self, working: bool) -> None:
+        self._show_note(self._physics)
         self._bar.value = 0.0
         self._bar.visible = self._cancel.visible = working
         self._start.visible = not working
-
-    def cancel(self) -> None:
-        """End the simulation under way, if any."""
-        with self._starting:
-            if self._job is not None and self._job.running:
-                self._job.cancel()
-                self._working(False)

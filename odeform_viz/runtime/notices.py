@@ -19,12 +19,12 @@ class Notices:
         self._lock = threading.Lock()
         self._last = ("", -REPEAT)
 
-    def show(self, message: str) -> None:
-        """Show a message for ten seconds."""
+    def show(self, title: str, message: str) -> None:
+        """Show for ten seconds what failed, and why."""
         with self._lock:
             now = time.monotonic()
             if message == self._last[0] and now - self._last[1] < REPEAT:
                 return
             self._last = (message, now)
         for client in self._server.get_clients().values():
-            client.add_notification("That did not work", message, auto_close_seconds=VISIBLE, color="orange")
+            client.add_notification(title, message, auto_close_seconds=VISIBLE, color="orange")

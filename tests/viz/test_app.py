@@ -146,18 +146,18 @@ def test_a_slow_column_stops_no_scrubbing(drop: Predictor, port: int, monkeypatc
     try:
         with LoopbackClient(port) as client:
             client.set("time (s)", 0.3)
-            assert client.until(lambda: app._shown is not None and len(app._shown.columns) == 2, 20.0)
+            assert client.until(lambda: app.presenter.frame is not None and len(app.presenter.frame.columns) == 2, 20.0)
             client.set("mass (kg)", 0.8)
             times = set()
             for moment in np.linspace(0.27, 0.33, 40):
                 client.set("time (s)", float(moment))
                 client.collect(0.05)
-                assert app._shown is not None
-                times.add(app._shown.request.time)
-            assert app._shown is not None
-            assert app._shown.pending == ("slow",)
+                assert app.presenter.frame is not None
+                times.add(app.presenter.frame.request.time)
+            assert app.presenter.frame is not None
+            assert app.presenter.frame.pending == ("slow",)
             assert len(times) > 10
             # at rest it joins
-            assert client.until(lambda: app._shown is not None and not app._shown.pending, 20.0)
+            assert client.until(lambda: app.presenter.frame is not None and not app.presenter.frame.pending, 20.0)
     finally:
         app.close()

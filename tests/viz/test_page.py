@@ -10,6 +10,7 @@ from browsing import Tab, needs_chromium, open_tab, until
 
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column
+from odeform_viz.panels.parameters import ParameterPanel
 
 pytestmark = needs_chromium
 
@@ -37,7 +38,7 @@ def test_it_moves_within_two_seconds(kicked: Tab) -> None:
     assert kicked.errors == []
 
 
-def test_mass_bending_force_and_time_change_the_picture(kicked: Tab) -> None:
+def test_mass_bending_force_and_time_change_the_image(kicked: Tab) -> None:
     thumb = kicked.slider("time (s)")
     thumb.focus()
     thumb.press("Home")
@@ -51,19 +52,19 @@ def test_mass_bending_force_and_time_change_the_picture(kicked: Tab) -> None:
         thumb.press(key)
         assert kicked.changes(before), f"{label} changed nothing"
         before = kicked.settled()
-    assert kicked.app._parameters.parameters()["mass"] > 1.0
+    assert kicked.app.panel(ParameterPanel).parameters()["mass"] > 1.0
     assert kicked.app.clock.time() == pytest.approx(1.5, abs=0.01)
     assert kicked.says("extrapolated")
-    assert kicked.says("beyond the trained")
+    assert kicked.says("outside the trained range")
     assert kicked.errors == []
 
 
 def test_presets_reset_play_and_peak_work_by_click(kicked: Tab) -> None:
     app = kicked.app
     kicked.choose("preset", "high mass, low bending")
-    assert until(lambda: app._parameters.parameters()["mass"] == 1.0)
+    assert until(lambda: app.panel(ParameterPanel).parameters()["mass"] == 1.0)
     kicked.button("all").click()
-    assert until(lambda: app._parameters.parameters()["mass"] < 1.0)
+    assert until(lambda: app.panel(ParameterPanel).parameters()["mass"] < 1.0)
     kicked.button("peak").click()
     assert until(lambda: 0.005 < app.clock.time() < 0.03)
     kicked.button("Play").click()
@@ -99,9 +100,9 @@ def test_another_shape_is_moved_a_broken_one_refused(kicked: Tab, tmp_path: Path
     broken.write_text("ply\n")
     good.write_text(TETRAHEDRON)
     page.get_by_role("button", name=re.compile("^Shape")).or_(page.get_by_text("Shape", exact=True)).first.click()
-    for path, said in ((broken, "broken.ply"), (good, "no such shape was trained")):
+    for path, said in ((broken, "broken.ply"), (good, "the model never saw such a shape")):
         with page.expect_file_chooser() as chooser:
-            kicked.button("Move another shape").click()
+            kicked.button("Load a shape...").click()
         chooser.value.set_files(path)
         assert kicked.says(said)
     assert kicked.changes(before)

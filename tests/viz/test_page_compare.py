@@ -10,6 +10,8 @@ from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform_viz.columns import Column, truth_column
+from odeform_viz.panels.record import RecordPanel
+from odeform_viz.panels.truth import TruthPanel
 
 pytestmark = needs_chromium
 
@@ -54,19 +56,19 @@ def test_columns_are_compared_with_the_truth(compared: Tab) -> None:
 def test_a_sequence_is_opened_left_and_found_again(compared: Tab) -> None:
     app = compared.app
     compared.turn_to("Compare")
-    option = next(iter(app._truth._entries))
+    option = next(iter(app.panel(TruthPanel)._entries))
     compared.choose("test sequence", option)
     assert until(lambda: any(c.truth for c in app.columns.all))
     compared.box("odeform").click()
-    assert compared.says("now off the truth by")
+    assert compared.says("error now:")
     compared.turn_to("Explore")
     thumb = compared.slider("mass (kg)")
     thumb.focus()
     thumb.press("Home")
-    assert compared.says("The truth is of other parameters")
+    assert compared.says("The truth was simulated with other parameters")
     compared.turn_to("Compare")
-    compared.button("Sliders to the truth's parameters").click()
-    assert compared.says("now off the truth by")
+    compared.button("Set sliders to the truth").click()
+    assert compared.says("error now:")
     assert compared.errors == []
 
 
@@ -90,7 +92,8 @@ def test_a_state_a_file_and_a_recording_are_taken_away(compared: Tab, tmp_path: 
     field = compared.row("file", "input")
     field.fill(str(tmp_path / "page.rrd"))
     field.press("Enter")
-    assert until(lambda: app._take._path.value.endswith("page.rrd") and str(tmp_path) in app._take._path.value)
+    path = app.panel(RecordPanel)._path
+    assert until(lambda: path.value == str(tmp_path / "page.rrd"))
     compared.button("Start recording").click()
     assert compared.says("frames")
     compared.button("Stop recording").click()

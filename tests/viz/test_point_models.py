@@ -14,7 +14,7 @@ from odeform.models.registry import load
 from odeform.motion.point_motion import PointMotion
 from odeform.motion.recorded import RecordedMotion
 from odeform_viz.columns import Column, Columns
-from odeform_viz.panels.status import moment_in_words
+from odeform_viz.panels.summary import summarize
 from odeform_viz.session import Session
 from odeform_viz.view import ViewRequest
 
@@ -54,7 +54,7 @@ def test_between_frames_needs_a_truth_of_these_parameters(models: dict[str, Pred
     frame = session.frame(ViewRequest(session.schema.complete({"mass": 0.55}), 0.4, "balanced", both))
     assert [shown.column.label for shown in frame.columns] == ["truth"]  # one that refuses stops no other
     assert frame.refused == ("flow interpolates observed frames: expected a truth of these parameters",)
-    assert "flow interpolates observed frames" in moment_in_words(frame)
+    assert "flow interpolates observed frames" in summarize(frame)
 
 
 def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,7 +70,7 @@ def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypa
     first = session.frame(request, include_slow=False)
     assert [shown.column.label for shown in first.columns] == ["fast"]
     assert first.pending == ("node",)
-    assert "node** is being computed" in moment_in_words(first)
+    assert "node** is being computed" in summarize(first)
     assert first.differs_in_time_only(replace(request, time=0.5))
     whole = session.frame(request)
     assert [shown.column.label for shown in whole.columns] == ["fast", "node"]

@@ -12,7 +12,8 @@ from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
-from odeform_viz.panels.status import describe, moment_in_words
+from odeform_viz.panels.status import describe_column
+from odeform_viz.panels.summary import summarize
 from odeform_viz.session import Session, visible_deformation
 from odeform_viz.view import INVISIBLE, ViewRequest
 
@@ -160,13 +161,13 @@ def test_impossible_times_are_refused(session: Session, view_request: ViewReques
         session.frame(replace(view_request, time=time))
 
 
-def test_the_moment_in_words(session: Session, view_request: ViewRequest) -> None:
-    assert "between two" in moment_in_words(session.frame(replace(view_request, time=0.02)))
-    assert "on a trained frame" in moment_in_words(session.frame(replace(view_request, time=0.025)))
-    late = moment_in_words(session.frame(replace(view_request, time=1.3)))
+def test_the_summarize(session: Session, view_request: ViewRequest) -> None:
+    assert "between two" in summarize(session.frame(replace(view_request, time=0.02)))
+    assert "on a trained frame" in summarize(session.frame(replace(view_request, time=0.025)))
+    late = summarize(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
-    heavy = moment_in_words(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.1})))
+    heavy = summarize(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.1})))
     assert "mass" in heavy
 
 
@@ -174,19 +175,19 @@ def test_a_body_below_the_floor_is_remarked(session: Session, view_request: View
     frame = session.frame(view_request)
     sunk = replace(frame.columns[0], depth=0.012)
     assert sunk.sunk
-    assert "12 mm below the floor" in moment_in_words(replace(frame, columns=(sunk,)))
+    assert "12 mm below the floor" in summarize(replace(frame, columns=(sunk,)))
 
 
 def test_status_names_solver_error_as_such(session: Session, view_request: ViewRequest) -> None:
     shown = session.frame(view_request).columns[0]
-    text = describe(shown, view_request.time)
+    text = describe_column(shown, view_request.time)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
     assert f"{shown.stats.evaluations} evaluations" in text
     assert "model error here ≈" in text
-    assert "a guess" not in text
+    assert "extrapolated: rough" not in text
     later = replace(view_request, time=1.2 * session.schema.window.stop)
-    assert "⚠ a guess" in describe(session.frame(later).columns[0], later.time)
+    assert "(extrapolated: rough)" in describe_column(session.frame(later).columns[0], later.time)
 
 
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:

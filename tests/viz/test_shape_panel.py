@@ -17,7 +17,9 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import describe_fit, shape_from
-from odeform_viz.panels.part import region_like
+from odeform_viz.panels.playback import PlaybackPanel
+from odeform_viz.panels.region import region_like
+from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.rendering.gizmos import RegionGizmo
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
@@ -44,7 +46,7 @@ def server(port: int) -> Iterator[viser.ViserServer]:
 def app(kick: Predictor, port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[App]:
     fit = shape_from("volleyball", kick.rest)
     app = App([Column("odeform", kick, fit.geometry, fit=fit)], port=port)
-    app._playback.jump(0.0)
+    app.panel(PlaybackPanel).jump(0.0)
     yield app
     app.close()
     assert "Traceback" not in capfd.readouterr().err
@@ -134,7 +136,7 @@ def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
 def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
     before = app.columns.all
     with LoopbackClient(port) as client:
-        app._shape._use(Box(np.full(3, 50.0), np.ones(3)))
+        app.panel(ShapePanel)._use(Box(np.full(3, 50.0), np.ones(3)))
         client.collect(0.5)
         assert f"the region holds 0 of the {BALL + REST:,} points" in client.text()
     assert app.columns.all is before
@@ -152,12 +154,12 @@ def test_alignment_by_hand_and_back(app: App, port: int) -> None:
         client.collect(1.0)
         assert place().factor == pytest.approx(1.5 * guessed.factor)
         assert app.columns.all[0].geometry.points[:, 2].min() == pytest.approx(0.0, abs=1e-5)
-        client.set("up in the file", "+y")
+        client.set("up axis", "+y")
         client.collect(1.0)
         assert np.array_equal(place().rotation, UPRIGHT["+y"])
-    app._shape._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
+    app.panel(ShapePanel)._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
     assert np.allclose(place().rotation, UPRIGHT["-z"] @ UPRIGHT["+y"])
-    app._shape._turn(None)
+    app.panel(ShapePanel)._turn(None)
     assert place().factor == guessed.factor
     assert np.array_equal(place().rotation, guessed.rotation)
     assert np.array_equal(place().shift, guessed.shift)

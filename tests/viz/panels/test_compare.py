@@ -10,9 +10,16 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.colors import MODELS, color_of
 from odeform_viz.columns import MOST, Column
+from odeform_viz.view import Frame
 
 Kicked = tuple[App, LoopbackClient]
 Serve = Callable[..., Kicked]
+
+
+def _frame(app: App) -> Frame:
+    frame = app.presenter.frame
+    assert frame is not None
+    return frame
 
 
 def _labels(app: App) -> list[str]:
@@ -44,9 +51,8 @@ def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Pre
     assert moved is not None
     # what did not move is not sent again, or sent as it was
     still = kick.solve(kick.rest, {"mass": 0.6}).deformed(0.03)
-    assert client.until(lambda: app._shown is not None and app._shown.request.parameters["mass"] == 0.9)
-    assert app._shown is not None
-    np.testing.assert_array_equal(app._shown.columns[1].points, still)
+    assert client.until(lambda: _frame(app).request.parameters["mass"] == 0.9)
+    np.testing.assert_array_equal(_frame(app).columns[1].points, still)
 
 
 def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
@@ -89,11 +95,11 @@ def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
 
 def test_overlaid_columns_stand_in_one_place_by_box_and_by_key(serve: Serve, kick: Predictor) -> None:
     app, client = serve(Column("one", kick, kick.rest), Column("two", kick, kick.rest))
-    one, two = (view for _, view in app._scene._views.values())
+    one, two = (view for _, view in app.scene._views.values())
     assert one.lane != two.lane
     client.set("overlay", True)
     assert client.until(lambda: one.lane == two.lane)
-    client.press("Columns overlaid or in a row")
+    client.press("Overlay on or off")
     assert client.until(lambda: one.lane != two.lane)
     assert client.until(lambda: client.controls["overlay"].value is False)
 

@@ -6,7 +6,7 @@ import pytest
 from odeform.models.base import Predictor
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.panels.parameters import OWN, presets, samples_svg, slider_range, slider_step
+from odeform_viz.panels.parameters import NO_PRESET, ParameterPanel, presets, samples_svg, slider_range, slider_step
 from odeform_viz.runtime import notices
 
 Kicked = tuple[App, LoopbackClient]
@@ -18,10 +18,10 @@ def test_a_preset_moves_the_sliders_and_can_be_chosen_again(kicked: Kicked, kick
     name = "high mass, low bending"
     for _ in range(2):
         client.set("preset", name)
-        assert client.until(lambda: app._parameters.parameters() == presets(kick.schema)[name])
+        assert client.until(lambda: app.panel(ParameterPanel).parameters() == presets(kick.schema)[name])
         assert client.until(lambda: mass.value == 1.0)
         client.set("mass (kg)", 0.7)
-        assert client.until(lambda: client.controls["preset"].value == OWN)
+        assert client.until(lambda: client.controls["preset"].value == NO_PRESET)
 
 
 def test_reset_of_one_and_of_all(kicked: Kicked, kick: Predictor) -> None:
@@ -30,10 +30,10 @@ def test_reset_of_one_and_of_all(kicked: Kicked, kick: Predictor) -> None:
     client.set("mass (kg)", 0.9)
     client.set("force (N)", 110.0)
     client.set("reset", "mass")
-    assert client.until(lambda: app._parameters.parameters() == {**default, "force": 110.0})
+    assert client.until(lambda: app.panel(ParameterPanel).parameters() == {**default, "force": 110.0})
     client.set("reset", "nonsense")
     client.set("reset", "all")
-    assert client.until(lambda: app._parameters.parameters() == default)
+    assert client.until(lambda: app.panel(ParameterPanel).parameters() == default)
     assert client.until(lambda: client.controls["preset"].value == "defaults")
 
 
@@ -41,7 +41,7 @@ def test_reset_of_one_and_of_all(kicked: Kicked, kick: Predictor) -> None:
 def test_what_no_hand_could_reach_is_refused_and_reset_helps(
     kicked: Kicked, value: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notices, "AGAIN", 0.0)
+    monkeypatch.setattr(notices, "REPEAT", 0.0)
     app, client = kicked
     client.set("mass (kg)", value)
     assert client.until(lambda: "mass: expected a finite number from" in client.text())
@@ -57,9 +57,9 @@ def test_what_no_hand_could_reach_is_refused_and_reset_helps(
 def test_beyond_the_trained_range_a_slider_says_so(kicked: Kicked) -> None:
     _, client = kicked
     client.set("bending (N m)", 2.2)
-    assert client.until(lambda: "beyond the trained 0.3 to 2 N m" in client.text())
+    assert client.until(lambda: "outside the trained range, 0.3 to 2 N m" in client.text())
     client.set("bending (N m)", 1.9)
-    assert client.until(lambda: "beyond the trained" not in client.text())
+    assert client.until(lambda: "outside the trained range, 0.3" not in client.text())
 
 
 def test_training_samples_are_marked_where_they_lie(kick: Predictor) -> None:

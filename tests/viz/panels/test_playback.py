@@ -16,7 +16,7 @@ def test_steps_lie_on_frames_by_button_and_by_key(kicked: Kicked) -> None:
     for way, frame in (("▶", 5), ("▶", 6), ("◀", 5)):
         client.set("go to", way)
         assert client.until(lambda frame=frame: app.clock.time() == pytest.approx(frame * FRAME))
-    for key, frame in (("A frame on", 6), ("A frame back", 5), ("To the start", 0), ("A frame back", 0)):
+    for key, frame in (("Next frame", 6), ("Previous frame", 5), ("Go to the start", 0), ("Previous frame", 0)):
         client.press(key)
         assert client.until(lambda frame=frame: app.clock.time() == pytest.approx(frame * FRAME))
 
@@ -27,7 +27,7 @@ def test_peak_is_at_the_kick_and_start_at_rest(kicked: Kicked) -> None:
     assert client.until(lambda: 0.005 < app.clock.time() < 0.029)
     client.set("go to", "start")
     assert client.until(lambda: app.clock.time() == 0.0)
-    client.press("To the peak of the deformation")
+    client.press("Go to the peak of the deformation")
     assert client.until(lambda: 0.005 < app.clock.time() < 0.029)
 
 
@@ -40,7 +40,7 @@ def test_a_peak_found_too_late_is_let_go(kicked: Kicked, monkeypatch: pytest.Mon
         assert found.wait(10.0)
         return 0.02
 
-    monkeypatch.setattr(app._playback, "_largest", search)
+    monkeypatch.setattr(app.session, "largest_deformation", lambda request: search())
     client.set("go to", "peak")
     assert searching.wait(10.0)
     client.set("time (s)", 0.5)

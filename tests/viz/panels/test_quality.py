@@ -9,7 +9,7 @@ from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
-from odeform_viz.panels.quality import WITHIN_MM, WITHIN_MS, quality_names
+from odeform_viz.panels.quality import ERROR_BUDGET, TIME_BUDGET, QualityPanel, quality_names
 from odeform_viz.session import settings_of
 
 
@@ -23,7 +23,7 @@ def test_an_error_chooses_the_cheapest_setting_that_keeps_to_it(
 ) -> None:
     app, client = kicked
     assert not client.controls["at most (mm)"].visible
-    client.set("quality", WITHIN_MM)
+    client.set("quality", ERROR_BUDGET)
     for point in (kick.frontier[0], kick.frontier[len(kick.frontier) // 2], kick.frontier[-1]):
         client.set("at most (mm)", 1.001 * point.solver_error_mm)
         assert client.until(lambda point=point: chosen(app) == point.quality.to_json())
@@ -34,14 +34,13 @@ def test_an_error_chooses_the_cheapest_setting_that_keeps_to_it(
 
 def test_a_longer_time_never_chooses_a_coarser_setting(kicked: tuple[App, LoopbackClient], kick: Predictor) -> None:
     app, client = kicked
-    panel = app._quality
-    assert panel is not None
-    client.set("quality", WITHIN_MS)
+    panel = app.panel(QualityPanel)
+    client.set("quality", TIME_BUDGET)
     settings = [point.quality.to_json() for point in kick.frontier]
     places = []
     for budget in (0.1, 2.0, 8.0, 30.0, 1000.0):
         client.set("at most (ms)", budget)
-        assert client.until(lambda budget=budget: panel._budget.value == budget and chosen(app) != {})
+        assert client.until(lambda budget=budget: panel._budget_ms.value == budget and chosen(app) != {})
         places.append(settings.index(chosen(app)))
     assert places == sorted(places)
     assert (places[0], places[-1]) == (0, len(settings) - 1)
@@ -49,21 +48,21 @@ def test_a_longer_time_never_chooses_a_coarser_setting(kicked: tuple[App, Loopba
 
 def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: Predictor) -> None:
     app, client = kicked
-    assert app._quality is not None
+    assert app.panel(QualityPanel) is not None
     setting = json.dumps(kick.frontier[1].quality.to_json())
-    app._quality.set(setting)
+    app.panel(QualityPanel).set(setting)
     assert app.request().quality == setting
-    app._quality.set("draft")
+    app.panel(QualityPanel).set("draft")
     assert app.request().quality == "draft"
     client.set("at most (mm)", -1.0)
-    client.set("quality", WITHIN_MM)
-    assert client.until(lambda: "expected a positive bound" in client.text())
+    client.set("quality", ERROR_BUDGET)
+    assert client.until(lambda: "expected a positive budget" in client.text())
 
 
 def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
-    assert quality_names(kick)[-2:] == (WITHIN_MS, WITHIN_MM)
+    assert quality_names(kick)[-2:] == (TIME_BUDGET, ERROR_BUDGET)
     app, client = serve(Column("pod-rbf", load("kick/pod-rbf"), kick.rest))
-    assert app._quality is None
+    assert not any(isinstance(panel, QualityPanel) for panel in app.page.panels)
     assert "quality" not in client.controls
 
 

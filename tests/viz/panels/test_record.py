@@ -15,6 +15,7 @@ from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, truth_column
+from odeform_viz.panels.parameters import ParameterPanel
 
 View = tuple[App, LoopbackClient]
 STATE = "odeform-mass-elastic.json"
@@ -52,8 +53,8 @@ def test_the_state_of_the_page_goes_round(serve: Callable[..., View], drop: Pred
     assert client.until(lambda: client.controls["overlay"].value and client.controls["quality"].value == "draft")
     # the state keeps the truth behind the models
     assert sorted((c.label, c.visible, c.pinned) for c in app.columns.all) == sorted(labels)
-    assert app._parameters.parameters() == pytest.approx(json.loads(saved)["parameters"])
-    assert client.until(lambda: "now off the truth by" in client.text())
+    assert app.panel(ParameterPanel).parameters() == pytest.approx(json.loads(saved)["parameters"])
+    assert client.until(lambda: "error now:" in client.text())
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff", b"[]", b'{"odeform_state": 1}', b'{"odeform_state": 9}'])
@@ -74,7 +75,7 @@ def test_this_moment_and_the_whole_motion_as_files(dropped: View, drop: Predicto
     client.collect(0.5)
     mesh = trimesh.load(io.BytesIO(client.downloads["motion_00000.ply"]), file_type="ply", process=False)
     np.testing.assert_allclose(mesh.vertices, motion.vertices(0.3), atol=1e-6)  # pyright: ignore
-    client.set("what", "the whole motion (.npz)")
+    client.set("format", "whole motion (.npz)")
     client.click("Download")
     assert client.until(lambda: "motion.npz" in client.downloads)
     client.collect(1.0)
@@ -87,10 +88,10 @@ def test_without_a_model_or_a_known_format_there_is_nothing_to_download(dropped:
     client.set("odeform", False)
     client.collect(0.3)
     client.click("Download")
-    assert client.until(lambda: "export: no model is shown" in client.notifications)
-    client.set("what", "nonsense")
+    assert client.until(lambda: "export: no model is visible" in client.notifications)
+    client.set("format", "nonsense")
     client.click("Download")
-    assert client.until(lambda: any("export: expected one of" in said for said in client.notifications))
+    assert client.until(lambda: any("format: expected one of" in said for said in client.notifications))
     assert client.downloads == {}
 
 
@@ -109,4 +110,4 @@ def test_a_recording_starts_and_ends(dropped: View, tmp_path: Path) -> None:
     client.click("Start recording")
     assert client.until(lambda: "cannot be written" in client.text())
     assert client.controls["Start recording"].visible
-    assert app._recorder is None
+    assert not app.recording.active

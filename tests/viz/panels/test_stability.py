@@ -5,7 +5,7 @@ import pytest
 
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.panels import stability
+from odeform_viz.panels.stability import StabilityPanel
 from odeform_viz.runtime.jobs import Report
 
 
@@ -19,14 +19,13 @@ def broken(report: Report, checkpoint: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("work", "shown"), [(small, True), (broken, False)])
-def test_a_picture_or_why_there_is_none(kicked: tuple[App, LoopbackClient], work, shown: bool) -> None:
+def test_an_image_or_why_there_is_none(kicked: tuple[App, LoopbackClient], work, shown: bool) -> None:
     app, client = kicked
-    panel = app._stability
-    assert isinstance(panel, stability.StabilityPanel)
+    panel = app.panel(StabilityPanel)
     panel._job.work = work
-    assert not panel._picture.visible
+    assert not panel._image.visible
     client.click("Map stability")
-    assert client.until(lambda: not panel._job.running and (panel._picture.visible or "No map" in panel._text.content))
-    assert panel._picture.visible == shown
+    assert client.until(lambda: panel._image.visible or "The map failed" in panel._text.content)
+    assert panel._image.visible == shown
     assert panel._button.visible != shown
     assert "no such model" in panel._text.content or shown

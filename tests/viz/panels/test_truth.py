@@ -17,7 +17,8 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels import truth
-from odeform_viz.panels.truth import NONE, OTHER, entry_label, other_physics
+from odeform_viz.panels.parameters import ParameterPanel
+from odeform_viz.panels.truth import NONE, SIMULATED, TruthPanel, entry_label, physics_difference
 from odeform_viz.runtime.jobs import Report
 
 View = tuple[App, LoopbackClient]
@@ -51,25 +52,26 @@ def test_a_test_sequence_moves_the_sliders_and_stands_beside_the_model(dropped: 
     app, client = dropped
     for entry in ENTRIES[:2]:
         client.set("test sequence", entry_label(entry, app.session.schema))
-        assert client.until(lambda entry=entry: app._parameters.parameters() == pytest.approx(entry.parameters))
+        expected = pytest.approx(entry.parameters)
+        assert client.until(lambda expected=expected: app.panel(ParameterPanel).parameters() == expected)
     assert [c.label for c in app.columns.all] == ["odeform", "truth"]
-    assert client.until(lambda: "now off the truth by" in client.text() and "mm from the truth" in client.text())
+    assert client.until(lambda: "error now:" in client.text() and "mm from the truth" in client.text())
     assert client.until(lambda: "error RMS, mm" in client.text())
 
 
 def test_away_from_its_parameters_nothing_is_compared_and_there_is_a_way_back(dropped: View) -> None:
     app, client = dropped
-    back = "Sliders to the truth's parameters"
+    back = "Set sliders to the truth"
     client.set("test sequence", entry_label(ENTRIES[0], app.session.schema))
-    assert client.until(lambda: "now off the truth by" in client.text())
+    assert client.until(lambda: "error now:" in client.text())
     assert not client.controls[back].visible
     client.set("mass (kg)", 0.9)
-    assert client.until(lambda: "The truth is of other parameters" in client.text())
-    assert client.until(lambda: "now off the truth by" not in client.text())
+    assert client.until(lambda: "The truth was simulated with other parameters" in client.text())
+    assert client.until(lambda: "error now:" not in client.text())
     assert client.until(lambda: client.controls[back].visible)
     client.click(back)
-    assert client.until(lambda: "now off the truth by" in client.text())
-    assert "The truth is of other parameters" not in client.text()
+    assert client.until(lambda: "error now:" in client.text())
+    assert "The truth was simulated with other parameters" not in client.text()
 
 
 def test_the_truth_goes_and_what_is_not_in_the_list_is_refused(dropped: View) -> None:
@@ -87,10 +89,10 @@ def test_the_truth_goes_and_what_is_not_in_the_list_is_refused(dropped: View) ->
 def test_the_list_names_the_truth_that_was_opened_otherwise(serve: Callable[..., View], drop: Predictor) -> None:
     schema, sequence = drop.schema, open_dataset("mass-elastic").read(ENTRIES[0])
     app, client = serve(Column("odeform", drop, drop.rest), moment=0.3)
-    app._truth.open(sequence, f"mass-elastic/{ENTRIES[0].name}")
+    app.panel(TruthPanel).open(sequence, f"mass-elastic/{ENTRIES[0].name}")
     assert client.until(lambda: client.controls["test sequence"].value == entry_label(ENTRIES[0], schema))
-    app._truth.open(sequence)
-    assert client.until(lambda: client.controls["test sequence"].value == OTHER)
+    app.panel(TruthPanel).open(sequence)
+    assert client.until(lambda: client.controls["test sequence"].value == SIMULATED)
 
 
 def test_simulate_this_shows_its_progress_and_then_the_truth(kicked: View, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,26 +105,26 @@ def test_simulate_this_shows_its_progress_and_then_the_truth(kicked: View, monke
     shares, end = [0.0], time.monotonic() + 60.0
     while len(app.columns.all) == 1 and time.monotonic() < end:
         client.receive(0.1)
-        shares.append(app._truth._bar.value)
+        shares.append(app.panel(TruthPanel)._bar.value)
     assert max(shares) > 10.0
     record = app.columns.all[1].truth
     assert record is not None
     assert record.parameters["mass"] == 0.6
     assert record.rate == pytest.approx(4 * 120.0)
     assert client.until(lambda: not client.controls["Cancel"].visible and client.controls["Simulate this"].visible)
-    assert client.until(lambda: "now off the truth by" in client.text())
+    assert client.until(lambda: "error now:" in client.text())
 
 
 def test_a_simulation_can_be_cancelled(kicked: View, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(truth, "simulate_motion", endless)
     app, client = kicked
     client.click("Simulate this")
-    assert client.until(lambda: app._truth._bar.value > 0.0, 30.0)
-    job = app._truth._job
+    assert client.until(lambda: app.panel(TruthPanel)._bar.value > 0.0, 30.0)
+    job = app.panel(TruthPanel)._job
     assert job is not None
     client.click("Simulate this")  # from another tab, say: one at a time
     client.collect(0.3)
-    assert app._truth._job is job
+    assert app.panel(TruthPanel)._job is job
     client.click("Cancel")
     assert client.until(lambda: not job.running and client.controls["Simulate this"].visible)
     assert len(app.columns.all) == 1
@@ -136,7 +138,7 @@ def test_a_failing_simulation_says_why_until_the_next(kicked: View, monkeypatch:
     monkeypatch.setattr(truth, "simulate_motion", endless)
     client.click("Simulate this")
     assert client.until(lambda: "the ball burst" not in client.text())
-    app._truth.cancel()
+    app.panel(TruthPanel).cancel()
 
 
 def test_the_simulation_of_a_closed_tab_completes(kicked: View, monkeypatch: pytest.MonkeyPatch, port: int) -> None:
@@ -154,34 +156,34 @@ def test_a_server_that_closes_ends_its_simulation(kick: Predictor, monkeypatch: 
     app = App([Column("odeform", kick, kick.rest)], port=port)
     with LoopbackClient(port) as client:
         client.click("Simulate this")
-        assert client.until(lambda: app._truth._job is not None)
+        assert client.until(lambda: app.panel(TruthPanel)._job is not None)
     app.close()
-    assert app._truth._job is not None
-    assert not app._truth._job.running
+    assert app.panel(TruthPanel)._job is not None
+    assert not app.panel(TruthPanel)._job.running
 
 
 def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve: Callable[..., View]) -> None:
     made = kick.checkpoint.provenance
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
     _, client = serve(Column("odeform", ODeform(other), kick.rest))
-    assert "young_pa 1.3e+05 (taught 1.7e+05)" in client.text()
+    assert "young_pa 1.3e+05 (trained on 1.7e+05)" in client.text()
     taught = load("mass-elastic").checkpoint.provenance["fixed"]
-    assert other_physics(taught, open_dataset("mass-elastic").fixed) == ""
-    assert other_physics({"a": 1.0}, {"b": 2.0}) == "a none (taught 1), b 2 (taught none)"
+    assert physics_difference(taught, open_dataset("mass-elastic").fixed) == ""
+    assert physics_difference({"a": 1.0}, {"b": 2.0}) == "a none (trained on 1), b 2 (trained on none)"
 
 
 def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:
     app, client = dropped
     client.set("test sequence", entry_label(ENTRIES[0], app.session.schema))
     assert client.until(lambda: any("/body/band_" in node for node in client.nodes))
-    assert app._heat is not None
-    assert client.until(lambda: app._shown is not None and app._shown.columns[0].error is not None)
-    assert app._shown is not None
-    error = app._shown.columns[0].error
+    assert app.presenter.error_scale is not None
+    assert client.until(lambda: app.presenter.frame is not None and app.presenter.frame.columns[0].error is not None)
+    assert app.presenter.frame is not None
+    error = app.presenter.frame.columns[0].error
     assert error is not None
-    assert 1e3 * np.median(error.distances) < app._heat
+    assert 1e3 * np.median(error.distances) < app.presenter.error_scale
     assert client.until(lambda: "mm from the truth" in client.text())
     client.press("Error colours on or off")
     assert client.until(lambda: "mm from the truth" not in client.text())
-    view = app._scene._views[app.columns.all[0].key][1]._shape
+    view = app.scene._views[app.columns.all[0].key][1]._shape
     assert all(handle.visible for handle, _ in view._parts)  # pyright: ignore

@@ -1,0 +1,149 @@
+"""What a panel is and what it is built from."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import viser
+
+from odeform.schema import Schema
+from odeform.types import Mesh
+from odeform_viz.columns import Column, Columns
+from odeform_viz.fitting import fit_from_json
+from odeform_viz.layout import Layout
+from odeform_viz.recording.control import RecordingControl
+from odeform_viz.runtime.clock import Clock
+from odeform_viz.runtime.notices import Notices
+from odeform_viz.session import Session
+from odeform_viz.state import PageState, capture, columns_of, state_from_json, state_to_json
+from odeform_viz.view import Description, DisplayOptions, ViewRequest
+
+__all__ = ["Controls", "Page", "Panel"]
+
+
+class Panel:
+    """A part of the page. The constructor builds its controls; `panels.registry` says where they stand.
+
+    All other methods may stay as they are. `describe` and `show_error` are called on the worker's thread.
+    """
+
+    def __init__(self, page: "Page") -> None:
+        """Add controls to `page.server.gui`."""
+
+    @classmethod
+    def needed(cls, page: "Page") -> bool:
+        """Whether this page has any use for the panel; otherwise it is not built."""
+        return True
+
+    def describe(self, description: Description) -> None:
+        """Show what belongs to a frame; called several times a second while frames change."""
+
+    def show_error(self, message: str) -> None:
+        """Say why the newest request cannot be met."""
+
+    def restore(self, state: PageState) -> None:
+        """Move the panel's controls to a saved state. The columns are already restored."""
+
+    def close(self) -> None:
+        """End the panel's work in other processes."""
+
+
+@dataclass
+class Controls:
+    """The controls that more than one panel needs. Panels that build them replace these defaults."""
+
+    parameters: Callable[[], dict[str, float]] = dict
+    """The values of the sliders. `InputError` for values that no slider can have."""
+    set_parameters: Callable[[Mapping[str, float]], None] = lambda _: None
+    """Moves the sliders of these names."""
+    quality: Callable[[], str] = lambda: "balanced"
+    overlay: Callable[[], bool] = lambda: False
+    error_colors: Callable[[], bool] = lambda: True
+    follow: Callable[[], bool] = lambda: True
+    arranging: Callable[[], bool] = lambda: False
+    """Whether a shape is being placed, for which all columns are overlaid."""
+
+
+@dataclass
+class Page:
+    """One page: the server, the columns, and the services that panels share."""
+
+    server: viser.ViserServer
+    columns: Columns
+    session: Session
+    clock: Clock
+    recording: RecordingControl
+    notices: Notices
+    wake: Callable[[], None]
+    """Asks the worker to read the newest request."""
+    layout: Layout
+    controls: Controls = field(default_factory=Controls)
+    panels: list[Panel] = field(default_factory=list)
+    hotkeys: dict[str, str] = field(default_factory=dict)
+    """What each hot key does, in words; see `add_hotkey`."""
+    _on_columns_changed: list[Callable[[], None]] = field(default_factory=list)
+
+    @property
+    def schema(self) -> Schema:
+        return self.session.schema
+
+    @property
+    def model(self) -> Column:
+        """The first model under the sliders."""
+        return next(c for c in self.columns.all if c.predictor is not None and c.pinned is None)
+
+    @property
+    def body(self) -> Mesh:
+        """The trained body of the first model; loaded shapes are fitted to it."""
+        predictor = self.model.predictor
+        assert predictor is not None
+        return predictor.rest
+
+    def request(self) -> ViewRequest:
+        """The newest request. `InputError` for parameters or a quality that no control can have."""
+        parameters = self.schema.complete(self.controls.parameters())
+        return ViewRequest(parameters, self.clock.time(), self.controls.quality(), self.columns.all)
+
+    def options(self) -> DisplayOptions:
+        """The newest display options, as the user set them."""
+        return DisplayOptions(self.controls.overlay(), self.controls.error_colors(), self.controls.follow())
+
+    def pause_at(self, time: float) -> None:
+        """Stop playing and go to `time` in seconds."""
+        self.clock.pause()
+        self.clock.seek(time)
+        self.wake()
+
+    def on_columns_changed(self, action: Callable[[], None]) -> None:
+        """Call `action` after each change of the columns, on the thread that changed them."""
+        self._on_columns_changed.append(action)
+
+    def columns_changed(self) -> None:
+        """To be called after a change of the columns or their shape."""
+        for action in self._on_columns_changed:
+            action()
+        self.wake()
+
+    def add_hotkey(self, key: str, label: str, action: Callable[[], None]) -> None:
+        command = self.server.gui.add_command(label.capitalize(), hotkey=key)  # pyright: ignore[reportArgumentType]
+        command.on_trigger(lambda _: action())
+        self.hotkeys[key] = label
+
+    def save(self) -> bytes:
+        """The state of the page as a file."""
+        return state_to_json(capture(self.schema.scene, self.request(), self.options()))
+
+    def restore(self, data: bytes) -> Sequence[str]:
+        """Move everything to a saved state; returns notes of what it could not hold.
+
+        `InputError` for anything but a state of this scene, and for missing files; then nothing has changed.
+        """
+        state = state_from_json(data, self.schema.scene)
+        columns = columns_of(state, self.schema)
+        if state.shape:
+            fit = fit_from_json(state.shape, self.body)
+            columns = [replace(c, geometry=fit.geometry, fit=fit) if c.predictor else c for c in columns]
+        self.columns.replace_all(columns)
+        for panel in self.panels:
+            panel.restore(state)
+        self.columns_changed()
+        return state.notes

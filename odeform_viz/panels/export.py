@@ -1,0 +1,38 @@
+"""Downloading the motion as a file."""
+
+import tempfile
+from pathlib import Path
+
+import viser
+
+from odeform.errors import InputError
+from odeform_viz.export import export, export_formats
+from odeform_viz.page import Page, Panel
+
+__all__ = ["ExportPanel"]
+
+
+class ExportPanel(Panel):
+    """A choice of format, and a button."""
+
+    def __init__(self, page: Page) -> None:
+        self._page, gui, self._formats = page, page.server.gui, export_formats()
+        with gui.add_folder("Export"):
+            self._format = gui.add_dropdown("format", tuple(self._formats))
+            download = gui.add_button(
+                "Download", color="gray", hint="the first visible model, in the units of the shape's file"
+            )
+            download.on_click(lambda event: self._download(event.client))
+
+    def _download(self, client: viser.ClientHandle | None) -> None:
+        if client is None:
+            return
+        try:
+            suffix = self._formats.get(self._format.value)
+            if suffix is None:
+                raise InputError(f"format: expected one of {', '.join(self._formats)}, got {self._format.value!r}")
+            with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
+                file = export(self._page.session, self._page.request(), Path(folder) / f"motion{suffix}")
+                client.send_file_download(file.name, file.read_bytes(), save_immediately=True)
+        except (InputError, OSError) as error:
+            self._page.notices.show("Export failed", str(error))

@@ -1,0 +1,38 @@
+"""Saving and restoring the state of the page."""
+
+import viser
+
+from odeform.errors import InputError
+from odeform_viz.page import Page, Panel
+
+__all__ = ["StatePanel"]
+
+
+class StatePanel(Panel):
+    """A button for each."""
+
+    def __init__(self, page: Page) -> None:
+        self._page, gui = page, page.server.gui
+        self._file = f"odeform-{page.schema.scene}.json"
+        with gui.add_folder("State of the page"):
+            save = gui.add_button("Save state", color="gray", hint="columns, parameters and time, as a small file")
+            save.on_click(lambda event: self._save(event.client))
+            restore = gui.add_upload_button("Restore state", color="gray", mime_type="application/json")
+            restore.on_upload(lambda event: self._restore(event.target.value.content))
+
+    def _save(self, client: viser.ClientHandle | None) -> None:
+        if client is None:
+            return
+        try:
+            client.send_file_download(self._file, self._page.save(), save_immediately=True)
+        except InputError as error:
+            self._page.notices.show("State not saved", str(error))
+
+    def _restore(self, content: bytes) -> None:
+        try:
+            notes = self._page.restore(content)
+        except (InputError, OSError) as error:
+            self._page.notices.show("State not restored", str(error))
+            return
+        for note in notes:
+            self._page.notices.show("State restored in part", note)

@@ -1,0 +1,137 @@
+"""The loop of the viewer: computes the newest request and shows it. Knows no GUI types."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from odeform.cancellation import Cancelled, cancel_unless
+from odeform.errors import InputError
+from odeform_viz.rendering.error_colors import scale_for
+from odeform_viz.runtime.clock import Clock
+from odeform_viz.session import Session
+from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest, same_motions
+
+__all__ = ["Output", "Presenter", "Recording"]
+
+TICK = 1.0 / 30.0  # s between frames while playing
+SETTLE = 0.15  # s without a new request after which the view counts as settled
+DESCRIBE = 0.2  # s between updates of numbers and curves; nobody reads faster
+
+
+class Output(Protocol):
+    """Where frames go."""
+
+    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
+        """Draw a frame; errors are coloured up to `error_scale` mm, if given."""
+        ...
+
+    def describe(self, description: Description) -> None:
+        """Update everything beside the viewport."""
+        ...
+
+    def show_error(self, message: str) -> None:
+        """Say why a request cannot be met; the last frame stays visible."""
+        ...
+
+    def settle(self) -> None:
+        """Called once after the view has settled: the time to tidy up."""
+        ...
+
+
+class Recording(Protocol):
+    """A recording of the frames, if any is in progress."""
+
+    def sync(self) -> bool:
+        """Start or stop as requested; whether a recording has just started."""
+        ...
+
+    def log(self, frame: Frame) -> None: ...
+
+
+class Presenter:
+    """Serves requests on the worker's thread; a new one cancels the one being computed.
+
+    While the user scrubs or plays, fast columns are shown immediately and slow ones follow. Numbers and curves are
+    updated less often than frames, and completed once the view has settled.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        clock: Clock,
+        read: Callable[[], tuple[ViewRequest, DisplayOptions]],
+        output: Output,
+        recording: Recording,
+        up_to_date: Callable[[], bool],
+    ) -> None:
+        """`read` returns the newest request, or raises `InputError`; `up_to_date` is false once there is a newer."""
+        self._session, self._clock, self._read = session, clock, read
+        self._output, self._recording, self._up_to_date = output, recording, up_to_date
+        self.frame: Frame | None = None
+        """The frame on screen; None before the first, and after a request that could not be met."""
+        self.error_scale: float | None = None
+        self._options = DisplayOptions()
+        self._settled = False
+        self._described: Frame | None = None
+        self._described_at = 0.0
+
+    def serve(self) -> float | None:
+        """One round. Returns the seconds until the next, or None if nothing will change without a new request."""
+        try:
+            if self._recording.sync():
+                self.frame = None  # the current frame is shown again, so that the recording has it
+            request, options = self._read()
+            with cancel_unless(self._up_to_date):
+                self._update(request, options)
+        except Cancelled:
+            return 0.0
+        except InputError as error:
+            self._output.show_error(str(error))
+            # the next frame is shown even if it is the same as before the error
+            self.frame, self._described, self._settled = None, None, True
+        if self.frame and self.frame.pending:
+            return 0.0
+        if self._clock.playing:
+            return TICK
+        return None if self._settled and self._described is self.frame else SETTLE
+
+    def _update(self, request: ViewRequest, options: DisplayOptions) -> None:
+        frame = self.frame
+        if frame is None or request != frame.request or options != self._options or frame.pending:
+            # slow columns wait for the second round of the same request; while playing each round differs in time,
+            # so there they are computed in the first round that has the same motions
+            include_slow = frame is not None and (
+                request == frame.request or (self._clock.playing and frame.differs_in_time_only(request))
+            )
+            self._show(self._session.frame(request, include_slow), options)
+        elif not self._settled:
+            self._settled = True
+            self._describe(frame)
+            self._output.settle()
+        elif self._described is not frame:
+            self._describe(frame)
+
+    def _show(self, frame: Frame, options: DisplayOptions) -> None:
+        # the scale is that of the whole motion, so it has to be known before the first frame
+        self.error_scale = self._scale(frame) if options.error_colors else None
+        self._settled = self.frame is not None and same_motions(frame, self.frame)
+        self._output.publish(frame, options, self.error_scale)
+        self.frame, self._options = frame, options
+        with cancel_unless(lambda: True):  # a frame that was shown is recorded, whatever came since
+            self._recording.log(frame)
+        if frame.pending or time.monotonic() - self._described_at > DESCRIBE:
+            self._describe(frame)
+
+    def _scale(self, frame: Frame) -> float | None:
+        """The top of the error scale in mm, for all columns; None without errors."""
+        curves = [self._session.curves(column, frame.request) for column in frame.columns if column.error]
+        stop = self._session.schema.window.stop
+        errors = [c.error[c.times <= stop] for c in curves if c.error is not None]
+        return scale_for(np.concatenate(errors)) if errors else None
+
+    def _describe(self, frame: Frame) -> None:
+        curves = tuple(self._session.curves(column, frame.request) for column in frame.columns)
+        self._output.describe(Description(frame, curves, self.error_scale, self._settled))
+        self._described, self._described_at = frame, time.monotonic()
