@@ -161,8 +161,8 @@ def test_impossible_times_are_refused(session: Session, view_request: ViewReques
         session.frame(replace(view_request, time=time))
 
 
-def test_the_summarize(session: Session, view_request: ViewRequest) -> None:
-    assert "between two" in summarize(session.frame(replace(view_request, time=0.02)))
+def test_the_summary(session: Session, view_request: ViewRequest) -> None:
+    assert "between frames" in summarize(session.frame(replace(view_request, time=0.02)))
     assert "on a trained frame" in summarize(session.frame(replace(view_request, time=0.025)))
     late = summarize(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
@@ -174,7 +174,7 @@ def test_the_summarize(session: Session, view_request: ViewRequest) -> None:
 def test_a_body_below_the_floor_is_remarked(session: Session, view_request: ViewRequest) -> None:
     frame = session.frame(view_request)
     sunk = replace(frame.columns[0], depth=0.012)
-    assert sunk.sunk
+    assert sunk.below_floor
     assert "12 mm below the floor" in summarize(replace(frame, columns=(sunk,)))
 
 

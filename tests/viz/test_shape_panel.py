@@ -77,12 +77,12 @@ def test_what_stands_still_is_sent_once_for_all_columns(
         ("/world/still/splats", REST),
     ]
     assert {handle.name for handle in moved} == {name for name, count in made if count == BALL}
-    assert not view._floor.visible
+    assert not view._stage._floor.visible
     # back to the trained body: it goes, and the floor of the viewer is there again
     columns.set_shape(None)
     view.publish(session.frame(replace(request, columns=columns.all)), DisplayOptions(), None)
-    assert view._still is None
-    assert view._floor.visible
+    assert view._stage._background is None
+    assert view._stage._floor.visible
 
 
 def test_small_splats_keep_their_size_as_float16(
@@ -136,7 +136,7 @@ def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
 def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
     before = app.columns.all
     with LoopbackClient(port) as client:
-        app.panel(ShapePanel)._use(Box(np.full(3, 50.0), np.ones(3)))
+        app.panel(ShapePanel)._use_region(Box(np.full(3, 50.0), np.ones(3)))
         client.collect(0.5)
         assert f"the region holds 0 of the {BALL + REST:,} points" in client.text()
     assert app.columns.all is before
@@ -159,7 +159,7 @@ def test_alignment_by_hand_and_back(app: App, port: int) -> None:
         assert np.array_equal(place().rotation, UPRIGHT["+y"])
     app.panel(ShapePanel)._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
     assert np.allclose(place().rotation, UPRIGHT["-z"] @ UPRIGHT["+y"])
-    app.panel(ShapePanel)._turn(None)
+    app.panel(ShapePanel)._rotate(None)
     assert place().factor == guessed.factor
     assert np.array_equal(place().rotation, guessed.rotation)
     assert np.array_equal(place().shift, guessed.shift)
@@ -173,8 +173,8 @@ def test_a_region_as_it_is_dragged(server: viser.ViserServer) -> None:
     again = gizmo.region
     assert isinstance(again, Box)
     assert np.allclose(again.rotation, box.rotation)
-    assert gizmo._shown is not None
-    gizmo._shown[1].position = (1.0, 1.0, 1.0)
+    assert gizmo._visible is not None
+    gizmo._visible[1].position = (1.0, 1.0, 1.0)
     moved = gizmo.region
     assert isinstance(moved, Box)
     assert np.allclose(moved.centre, 1.0)
