@@ -1,12 +1,105 @@
-"""ODeform: learned continuous motion of soft bodies."""
+"""ODeform: learned continuous motion of soft bodies.
 
-from importlib.metadata import version
+Load a model, predict a motion, and evaluate it at any time:
 
-from odeform.errors import InputError
-from odeform.formats.reading import read_geometry
-from odeform.models.base import Predictor
-from odeform.models.registry import load
+    import odeform
 
-__all__ = ["InputError", "Predictor", "__version__", "load", "read_geometry"]
+    predictor = odeform.load("kick")
+    motion = predictor.solve(parameters={"mass": 0.6, "force": 140.0})
+    motion.vertices(0.02)  # (N, 3) metres
 
-__version__ = version("odeform")
+Lengths are metres, times seconds, masses kilograms, forces newtons and angles radians, unless a name says otherwise.
+Names are imported when they are first used, so that `import odeform` takes a few milliseconds.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from odeform.dataset.index import Dataset
+    from odeform.dataset.store import open_dataset
+    from odeform.errors import InputError
+    from odeform.evaluation.metrics import evaluate
+    from odeform.formats.reading import read_geometry
+    from odeform.formats.writing import write_motion, write_shape
+    from odeform.identification.discrepancy import calibrate
+    from odeform.identification.identify import identify
+    from odeform.identification.observation import Observation
+    from odeform.models.base import Predictor
+    from odeform.models.registry import load
+    from odeform.motion.base import Motion
+    from odeform.schema import Parameter, Schema
+    from odeform.simulation.runner import simulate
+    from odeform.solver.integrate import SolverSettings
+    from odeform.training.train import train
+    from odeform.types import GaussianSplats, Mesh, MotionSequence, PointCloud
+
+    __version__: str
+
+__all__ = [
+    "Dataset",
+    "GaussianSplats",
+    "InputError",
+    "Mesh",
+    "Motion",
+    "MotionSequence",
+    "Observation",
+    "Parameter",
+    "PointCloud",
+    "Predictor",
+    "Schema",
+    "SolverSettings",
+    "__version__",
+    "calibrate",
+    "evaluate",
+    "identify",
+    "load",
+    "open_dataset",
+    "read_geometry",
+    "simulate",
+    "train",
+    "write_motion",
+    "write_shape",
+]
+
+_MODULES = {
+    "Dataset": "dataset.index",
+    "GaussianSplats": "types",
+    "InputError": "errors",
+    "Mesh": "types",
+    "Motion": "motion.base",
+    "MotionSequence": "types",
+    "Observation": "identification.observation",
+    "Parameter": "schema",
+    "PointCloud": "types",
+    "Predictor": "models.base",
+    "Schema": "schema",
+    "SolverSettings": "solver.integrate",
+    "calibrate": "identification.discrepancy",
+    "evaluate": "evaluation.metrics",
+    "identify": "identification.identify",
+    "load": "models.registry",
+    "open_dataset": "dataset.store",
+    "read_geometry": "formats.reading",
+    "simulate": "simulation.runner",
+    "train": "training.train",
+    "write_motion": "formats.writing",
+    "write_shape": "formats.writing",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value = version("odeform")
+    elif name in _MODULES:
+        value = getattr(import_module(f"odeform.{_MODULES[name]}"), name)
+    else:
+        raise AttributeError(f"module 'odeform' has no attribute {name!r}")
+    globals()[name] = value  # found directly from now on
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
