@@ -1,4 +1,4 @@
-"""Real spherical harmonics as splats use them: a colour that depends on the direction it is seen from.
+"""Real spherical harmonics, which give splats a colour that depends on the viewing direction.
 
 Coefficient l (l + 1) + m belongs to degree l, order m = -l ... l, with the signs of Kerbl et al., "3D Gaussian
 Splatting for Real-Time Radiance Field Rendering" (2023): orthonormal, with the Condon-Shortley phase (-1)^m.
@@ -13,17 +13,17 @@ from odeform.types import Harmonics, Rotations, Vectors
 
 __all__ = ["harmonic_basis", "rotated_harmonics"]
 
-BLOCK = 4096  # splats at a time: what they need in between fits the cache
-DIRECTIONS = 10
+BLOCK = 4096  # splats at a time: intermediate values fit the cache
+DIRECTIONS = 10  # in which a harmonic is sampled; degree 3 has 7 coefficients
 
 
 def harmonic_basis(directions: Vectors, degree: int) -> Float[np.ndarray, "*batch basis"]:
-    """(..., 3) unit vectors -> (..., (degree + 1)^2) values, by the recurrences of the Legendre functions."""
+    """(..., 3) unit vectors -> (..., (degree + 1)^2) values, by the recurrences of Legendre functions."""
     x, y, z = np.moveaxis(np.asarray(directions, dtype=float), -1, 0)
     out = np.empty((*x.shape, (degree + 1) ** 2))
     real, imaginary = np.ones_like(x), np.zeros_like(x)  # (x + i y)^m
     for m in range(degree + 1):
-        # without the factor sin(theta)^m, which (x + i y)^m brings
+        # without the factor sin(theta)^m, which (x + i y)^m contains
         below, here = np.zeros_like(z), np.full_like(z, (-1.0) ** m * prod(range(1, 2 * m, 2)))
         for n in range(m, degree + 1):
             size = sqrt((2.0 if m else 1.0) * (2 * n + 1) / (4 * pi) * factorial(n - m) / factorial(n + m))
@@ -36,31 +36,33 @@ def harmonic_basis(directions: Vectors, degree: int) -> Float[np.ndarray, "*batc
 
 
 def rotated_harmonics(harmonics: Harmonics, rotations: Rotations) -> Harmonics:
-    """(N, H, 3) coefficients turned with their splats by (3, 3) or (N, 3, 3): what was seen from d is seen from R d.
+    """Rotate (N, H, 3) coefficients by (3, 3) or (N, 3, 3): the colour from direction R d is that from d before.
 
-    A degree keeps to itself under rotation, so its turned coefficients follow from its values in as many directions:
-    B c' = B(R^-1 d) c, solved with the fixed pseudo-inverse of B.
+    Rotation does not mix degrees, so the rotated coefficients of a degree follow from its values in a fixed set of
+    directions d: B c' = B(R^-1 d) c, solved with the pseudo-inverse of B.
     """
     degree = isqrt(harmonics.shape[1]) - 1
     if degree == 0:
         return harmonics
     directions = _hemisphere(DIRECTIONS)
-    inverses = [np.linalg.pinv(harmonic_basis(directions, degree)[:, _of(n)]) for n in range(degree + 1)]
+    inverses = [np.linalg.pinv(harmonic_basis(directions, degree)[:, _coefficients(n)]) for n in range(degree + 1)]
     out = harmonics.copy()
     for start in range(0, len(harmonics), BLOCK):
         block = slice(start, start + BLOCK)
         values = harmonic_basis(directions @ (rotations if rotations.ndim == 2 else rotations[block]), degree)
         for n in range(1, degree + 1):
-            out[block, _of(n)] = inverses[n] @ values[..., _of(n)] @ harmonics[block, _of(n)]
+            own = _coefficients(n)
+            out[block, own] = inverses[n] @ values[..., own] @ harmonics[block, own]
     return out
 
 
-def _of(degree: int) -> slice:
+def _coefficients(degree: int) -> slice:
+    """The columns of one degree."""
     return slice(degree**2, (degree + 1) ** 2)
 
 
 def _hemisphere(count: int) -> Vectors:
-    """(K, 3) directions well apart (a Fibonacci spiral); the other half of the sphere would tell the same."""
+    """(K, 3) evenly spread directions (a Fibonacci spiral); the other half of the sphere is redundant by parity."""
     index = np.arange(count)
     z, angle = (index + 0.5) / count, index * pi * (3.0 - sqrt(5.0))
     flat = np.sqrt(1.0 - z**2)

@@ -1,4 +1,4 @@
-"""Which way a surface faces, at its vertices and at the points near it."""
+"""Surface normals, at the vertices of a mesh and at points near it."""
 
 import numpy as np
 import trimesh
@@ -10,7 +10,7 @@ __all__ = ["nearest_normals", "vertex_normals"]
 
 
 def vertex_normals(points: Points, faces: Faces) -> Points:
-    """(N, 3) area-weighted unit normals of the vertices `points` (N, 3); zero where no face has an area."""
+    """(N, 3) area-weighted unit normals at the vertices `points` (N, 3); zero where all faces have no area."""
     corners = points[faces]
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total = np.zeros_like(points)
@@ -22,16 +22,15 @@ def vertex_normals(points: Points, faces: Faces) -> Points:
 def nearest_normals(surface: Mesh, points: Points) -> Points:
     """(M, 3) unit normals of `surface` at its points nearest to `points` (M, 3), interpolated over the faces.
 
-    The nearest point is looked for on the faces around the nearest vertex. Where the surface has no normal, any
-    direction is as good.
+    The nearest point is searched on the faces around the nearest vertex. +z where the surface has no normal.
     """
     vertices, points = np.asarray(surface.points, dtype=float), np.asarray(points, dtype=float)
     normals = vertex_normals(vertices, surface.faces)
-    # vertices of one place, as along the seams of a texture, count as one
-    places, place = np.unique(vertices[surface.faces].reshape(-1, 3), axis=0, return_inverse=True)
-    nearest = KDTree(places).query(points)[1]
+    # vertices that coincide, as along texture seams, count as one
+    unique, corner = np.unique(vertices[surface.faces].reshape(-1, 3), axis=0, return_inverse=True)
+    nearest = KDTree(unique).query(points)[1]
     distance, found = np.full(len(points), np.inf), np.zeros_like(points)
-    for face in _faces_around(place.reshape(-1, 3), len(places))[nearest].T:
+    for face in _faces_around(corner.reshape(-1, 3), len(unique))[nearest].T:
         corners = vertices[surface.faces[face]]
         foot = trimesh.triangles.closest_point(corners, points)
         away = ((foot - points) ** 2).sum(axis=1)
@@ -44,7 +43,7 @@ def nearest_normals(surface: Mesh, points: Points) -> Points:
 
 
 def _faces_around(faces: Faces, count: int) -> Ints:
-    """(count, most) faces at each vertex, of which each has some; rows of fewer repeat their first."""
+    """(count, K) faces at each vertex, of which each has at least one; shorter rows repeat their first."""
     corners = faces.ravel()
     degree = np.bincount(corners, minlength=count)
     first, column = np.cumsum(degree) - degree, np.arange(degree.max())
@@ -52,7 +51,7 @@ def _faces_around(faces: Faces, count: int) -> Ints:
 
 
 def _barycentric(corners: Floats, points: Points) -> Points:
-    """(M, 3) weights of the corners (M, 3, 3) that give `points`; those of a face without an area are equal."""
+    """(M, 3) barycentric coordinates of `points` in triangles (M, 3, 3); equal where a triangle has no area."""
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = trimesh.triangles.points_to_barycentric(corners, points)
     return np.where(np.isfinite(weights).all(axis=1, keepdims=True), weights, 1.0 / 3.0)

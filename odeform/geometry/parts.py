@@ -1,4 +1,4 @@
-"""Parts of shapes: what lies within a region, what is left, and both together again."""
+"""Subsets of geometries: split by a region, select by a mask, concatenate."""
 
 from dataclasses import replace
 from typing import TypeVar
@@ -11,28 +11,28 @@ from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
 
 __all__ = ["concatenated", "most_visible", "split", "subset"]
 
-Bare = TypeVar("Bare", bound=GaussianSplats | PointCloud)
+Unstructured = TypeVar("Unstructured", bound=GaussianSplats | PointCloud)
 
 
 def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None]:
-    """What lies within a region, and the rest, None if there is none.
+    """The part within a region and the remainder, None if it is empty.
 
-    Of a mesh the faces that lie within as a whole, and all others. `InputError` where nothing lies within.
+    A mesh is split by faces: those with all corners within, and all others. Raises `InputError` if the part is empty.
     """
     inside = region.contains(geometry.points)
     if isinstance(geometry, Mesh):
         within = np.asarray(inside[geometry.faces].all(axis=1))
         if not within.any():
-            raise InputError(f"the region holds none of the {len(within):,} faces; move it or make it larger")
+            raise InputError(f"the region contains none of the {len(within):,} faces; move it or make it larger")
         return _of_faces(geometry, within), None if within.all() else _of_faces(geometry, ~within)
     count = int(inside.sum())
     if count < 2 or np.ptp(geometry.points[inside], axis=0).max() <= 0.0:
-        raise InputError(f"the region holds {count} of the {len(inside):,} points; move it or make it larger")
+        raise InputError(f"the region contains {count} of the {len(inside):,} points; move it or make it larger")
     return subset(geometry, inside), None if inside.all() else subset(geometry, ~inside)
 
 
-def subset(geometry: Bare, kept: Mask) -> Bare:
-    """The points of a mask, with all that they have."""
+def subset(geometry: Unstructured, kept: Mask) -> Unstructured:
+    """The points where `kept` (N,) is true, with their attributes."""
     if not isinstance(geometry, GaussianSplats):
         return replace(geometry, points=geometry.points[kept])
     return replace(
@@ -45,7 +45,7 @@ def subset(geometry: Bare, kept: Mask) -> Bare:
 
 
 def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
-    """Two parts of one shape as one, the points of `one` first."""
+    """Both geometries as one, the points of `one` first; points alone where their kinds differ."""
     if other is None:
         return one
     points = np.concatenate([one.points, other.points])
@@ -62,18 +62,18 @@ def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
     return PointCloud(points)
 
 
-def most_visible(splats: GaussianSplats, most: int) -> GaussianSplats:
-    """As many of the splats as told, those that cover most of a picture: by opacity times area; said in the notes."""
-    count = len(splats.points)
-    if count <= most:
+def most_visible(splats: GaussianSplats, count: int) -> GaussianSplats:
+    """The `count` splats that cover most of an image, by opacity times projected area; `notes` say so."""
+    total = len(splats.points)
+    if total <= count:
         return splats
-    # the principal minors sum up to about the square of the product of the two longer axes
+    # the sum of the principal minors is about the squared product of the two longer axes
     trace = np.trace(splats.covariances, axis1=1, axis2=2)
     square = np.einsum("nij,nji->n", splats.covariances, splats.covariances)
     cover = splats.opacities * np.sqrt(np.maximum(trace**2 - square, 0.0))
-    kept = np.zeros(count, dtype=bool)
-    kept[np.argpartition(cover, count - most)[count - most :]] = True
-    note = f"the {most:,} most visible of {count:,} splats"
+    kept = np.zeros(total, dtype=bool)
+    kept[np.argpartition(cover, total - count)[total - count :]] = True
+    note = f"the {count:,} most visible of {total:,} splats"
     return replace(subset(splats, kept), notes=(*splats.notes, note))
 
 

@@ -1,4 +1,4 @@
-"""Shapes made by formula."""
+"""Meshes of simple shapes."""
 
 import numpy as np
 import trimesh
@@ -9,9 +9,10 @@ __all__ = ["octasphere"]
 
 
 def octasphere(radius: float, segments: int) -> Mesh:
-    """A sphere about the origin, each octant a triangle grid of `segments` edges a side: 4 segments^2 + 2 vertices.
+    """A sphere of `radius` in m about the origin, each octant a triangle grid with `segments` edges per side:
+    4 segments^2 + 2 vertices.
 
-    Its edges follow the three coordinate planes, so that a pattern by octants has straight borders.
+    Edges follow the three coordinate planes, so a pattern by octants has straight borders.
     """
     index = {(i, j): n for n, (i, j) in enumerate((i, j) for i in range(segments + 1) for j in range(segments + 1 - i))}
     grid = np.array([(i, j, segments - i - j) for i, j in index], dtype=float)

@@ -1,4 +1,8 @@
-"""Rigid motion: rotations, rotation vectors, and the best rigid fit between two shapes. All float64 numpy."""
+"""Rigid motion: rotations, rotation vectors, and the best rigid fit between two shapes. All float64 NumPy.
+
+`rotation_from_vector` is not scipy's, which is faster but rounds differently: packed data sets and motions are
+reproduced bit for bit.
+"""
 
 import numpy as np
 from jaxtyping import Float
@@ -23,25 +27,25 @@ def rotation_z(angle: float) -> Rotations:
 
 
 def is_rotation(matrix: Floats) -> bool:
-    """Whether a matrix is (3, 3), orthonormal within 1e-6 and no reflection."""
+    """Whether a matrix is (3, 3), orthonormal within 1e-6, and not a reflection."""
     square = matrix.shape == (3, 3) and np.isfinite(matrix).all()
     return bool(square and np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) and np.linalg.det(matrix) > 0.0)
 
 
 def rotation_from_vector(vector: Vectors) -> Rotations:
-    """(..., 3) rotation vectors in radians of any length -> (..., 3, 3) (Rodrigues)."""
+    """(..., 3) rotation vectors in radians, of any length -> (..., 3, 3) (Rodrigues)."""
     vector = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]
     x, y, z = np.moveaxis(vector, -1, 0)
     o = np.zeros_like(x)
     skew = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(*vector.shape[:-1], 3, 3)
-    # sinc keeps both coefficients exact at a vanishing angle
+    # sinc is exact at a vanishing angle
     half = np.sinc(angle / (2 * np.pi))
     return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
 
 
 def body_spin(vector: Float[np.ndarray, "*#batch 3"], change: Float[np.ndarray, "*#batch 3"]) -> Vectors:
-    """The rotation, in the body's own axes, by which R(w) turns as w (..., 3) changes by (..., 3).
+    """The rotation vector (..., 3) in body axes by which R(w) changes, to first order, as w (..., 3) does by `change`.
 
     The right Jacobian of SO(3) (Chirikjian 2012, Stochastic Models, Information Theory, and Lie Groups 2, 10.86).
     """
@@ -55,7 +59,7 @@ def body_spin(vector: Float[np.ndarray, "*#batch 3"], change: Float[np.ndarray, 
 
 
 def vector_from_rotation(rotation: Rotations) -> Vectors:
-    """(..., 3, 3) -> (..., 3) rotation vector of angle at most pi, through a unit quaternion for accuracy near pi."""
+    """(..., 3, 3) -> (..., 3) rotation vectors of angle at most pi, through unit quaternions for accuracy near pi."""
     from scipy.spatial.transform import Rotation
 
     flat = Rotation.from_matrix(np.asarray(rotation, dtype=float).reshape(-1, 3, 3)).as_rotvec()
@@ -63,15 +67,15 @@ def vector_from_rotation(rotation: Rotations) -> Vectors:
 
 
 def unwrapped_vectors(rotations: Rotations) -> Vectors:
-    """(T, 3, 3) -> (T, 3) rotation vectors without jumps: each frame takes the turn count nearest to the last one.
+    """(T, 3, 3) -> (T, 3) rotation vectors without jumps: each frame takes the number of turns nearest to the last one.
 
-    A ball that rolls makes several turns; its rotation vector then grows past pi instead of flipping back.
+    The rotation vector of a ball that rolls over several times grows past pi instead of flipping back.
     """
     vectors = vector_from_rotation(rotations)
     for index in range(1, len(vectors)):
         angle = np.linalg.norm(vectors[index])
         if angle < 1e-9:
-            # whole turns about any axis: keep the last one's
+            # whole turns have no axis: keep the last one
             last = np.linalg.norm(vectors[index - 1])
             axis = vectors[index - 1] / last if last > 1e-9 else np.zeros(3)
             vectors[index] = axis * 2 * np.pi * round(last / (2 * np.pi))
@@ -85,7 +89,7 @@ def unwrapped_vectors(rotations: Rotations) -> Vectors:
 def best_rigid(
     rest: Float[np.ndarray, "*#batch points 3"], moved: Float[np.ndarray, "*batch points 3"], weights: Perpoint
 ) -> tuple[Rotations, Vectors]:
-    """Weighted best-fit rigid motion of `rest` (N, 3), or one each (..., N, 3), onto `moved` (..., N, 3) (Kabsch 1976).
+    """Weighted least-squares rigid motion of `rest` (N, 3) or (..., N, 3) onto `moved` (..., N, 3) (Kabsch 1976).
 
     Returns rotations R (..., 3, 3) and shifts p (..., 3) of the weighted centroid c:
     moved ~ R (rest - c) + c + p. `weights` (N,) sum to 1.

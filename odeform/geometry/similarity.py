@@ -1,4 +1,4 @@
-"""Similarities: a turn, a factor and a shift, of anything that lies in space."""
+"""Similarity transforms: uniform scale, rotation and translation."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -25,7 +25,7 @@ UPRIGHT: dict[str, Rotations] = {
         "-x": (0.0, 1.0, 0.0),
     }.items()
 }
-"""By the axis of a file that points up, the turn that makes it z."""
+"""Axis of a file that points up -> the rotation that makes it +z."""
 
 
 def _eye() -> Rotations:
@@ -34,19 +34,19 @@ def _eye() -> Rotations:
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """x -> factor * rotation x + shift, the shift in metres. The identity unless told otherwise."""
+    """x -> factor * rotation x + shift, with the shift in the units of the result. The identity by default."""
 
     factor: float = 1.0
     rotation: Rotations = field(default_factory=_eye)
     shift: Vector = field(default_factory=lambda: np.zeros(3))
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values, which `Similarity.from_json` takes."""
+        """Plain values for JSON; `Similarity.from_json` is the inverse."""
         return {"factor": float(self.factor), "rotation": self.rotation.tolist(), "shift": self.shift.tolist()}
 
     @classmethod
     def from_json(cls, raw: Any) -> "Similarity":
-        """`InputError` for what is no similarity."""
+        """The inverse of `to_json`. Raises `InputError` for anything else."""
         try:
             factor = float(raw["factor"])
             rotation, shift = np.array(raw["rotation"], dtype=float), np.array(raw["shift"], dtype=float)
@@ -59,23 +59,24 @@ class Similarity:
 
     @property
     def inverse(self) -> "Similarity":
+        """The similarity that undoes this one."""
         back = self.rotation.T
         return Similarity(1.0 / self.factor, back, -(back @ self.shift) / self.factor)
 
     def __matmul__(self, first: "Similarity") -> "Similarity":
-        """Both, `first` before this one."""
+        """The composition that applies `first` before this one."""
         return Similarity(self.factor * first.factor, self.rotation @ first.rotation, self.points(first.shift))
 
     def points(self, points: Vectors) -> Vectors:
-        """(..., 3) metres, in double precision."""
+        """Transform (..., 3) points, in double precision."""
         return self.factor * (np.asarray(points, dtype=float) @ self.rotation.T) + self.shift
 
     def covariances(self, covariances: Floats) -> Floats:
-        """(..., 3, 3) m^2."""
+        """Transform (..., 3, 3) covariances."""
         return self.factor**2 * (self.rotation @ covariances @ self.rotation.T)
 
     def shape(self, shape: Shape) -> Shape:
-        """A shape with all that has a place or a direction, its points as float32."""
+        """Transform a geometry with all its attributes; its points become float32."""
         moved = replace(shape, points=self.points(shape.points).astype(np.float32))
         if not isinstance(moved, GaussianSplats):
             return moved

@@ -52,7 +52,7 @@ def test_a_mesh_is_split_between_faces() -> None:
 
 @pytest.mark.parametrize("shape", [SPLATS, PointCloud(POINTS), Mesh(POINTS, np.arange(300).reshape(100, 3))])
 def test_a_region_that_holds_nothing_is_refused(shape: GaussianSplats | PointCloud | Mesh) -> None:
-    with pytest.raises(InputError, match="region holds"):
+    with pytest.raises(InputError, match="region contains"):
         split(shape, NOWHERE)
 
 

@@ -124,5 +124,5 @@ def test_undone_it_is_the_file_again() -> None:
 
 def test_an_empty_region_is_refused() -> None:
     shape, _ = scene("+z")
-    with pytest.raises(InputError, match="region holds 0 of"):
+    with pytest.raises(InputError, match="region contains 0 of"):
         fit_to(shape, ball(2), Sphere(np.array([1e3, 0.0, 0.0]), 1.0))

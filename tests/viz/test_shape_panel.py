@@ -138,7 +138,7 @@ def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App
     with LoopbackClient(port) as client:
         app.panel(ShapePanel)._use_region(Box(np.full(3, 50.0), np.ones(3)))
         client.collect(0.5)
-        assert f"the region holds 0 of the {BALL + REST:,} points" in client.text()
+        assert f"the region contains 0 of the {BALL + REST:,} points" in client.text()
     assert app.columns.all is before
 
 
