@@ -23,7 +23,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs", type=int, default=cores, metavar="N", help=f"trainings at a time (default: {cores}, one per core)"
     )
-    parser.add_argument("--kept-only", action="store_true", help="train nothing; leave cells empty that are not in DIR")
+    parser.add_argument(
+        "--kept-only", action="store_true", help="train nothing; entries that are not in DIR stay empty"
+    )
 
 
 def run(args: argparse.Namespace) -> None:

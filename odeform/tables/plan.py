@@ -1,48 +1,46 @@
-"""The paper's tables on the scenes at hand: which model is trained on what, how long, and scored on which frames.
+"""The paper's tables on the available scenes: which model is trained on what, how long, and scored on which frames.
 
-Budgets are steps, so that a busy machine, or another one, makes the same models.
+Budgets are steps, so that the speed of a machine does not change the models.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 
-from odeform.tables.runs import Cell
+from odeform.tables.runs import Run
 
 __all__ = ["AHEAD", "DROP", "FRAMES", "IMPACT", "INTERVALS", "MINUTES", "UNTIL", "plan"]
 
 DROP = "mass-elastic"
 FRAMES = {DROP: (0, 151), "kick": (0, 121)}
-"""Of each scene, all of them."""
+"""All frames of each scene."""
 IMPACT = (30, 89)
 """Frames of the drop from just before the first contact to after the second; every 3rd, 5th and 8th ends beyond."""
 SEEDS = (0, 1, 2)
-"""Of ours; the best rival, `pod-rbf`, draws nothing."""
+"""Seeds of `odeform`. The best baseline, `pod-rbf`, is deterministic."""
 UNTIL, AHEAD = (40, 70), 10
-"""Frames that are known, to the end of the first contact and into the second, and those to be told, of the drop."""
+"""Extrapolation of the drop: trained frames, to the end of the first contact or into the second; frames predicted."""
 INTERVALS = (3, 5, 8)
 SOLVED = ("pod-rbf", "nearest")
-RIVALS = (*SOLVED, "direct", "node", "rnn")
+BASELINES = (*SOLVED, "direct", "node", "rnn")
 MINUTES = 4
 STEPS = {"direct": 2000, "node": 900, "rnn": 1400, "occupancy-flow": 590, "odeform-per-point": 460}
-OURS = {FRAMES[DROP][1]: 330, FRAMES["kick"][1]: 280, UNTIL[0]: 900, UNTIL[1]: 690}
-"""Steps, by the number of frames for ours, that took about `MINUTES` of one core of an AMD EPYC 7003, trials and
-random features included. Networks of points take as long for a step whatever the frames."""
-THINNED = {3: 240, 5: 180, 8: 120}
-"""The same where all of the drop, but every 3rd, 5th or 8th frame, is known: a step then takes more sequences."""
+ODEFORM_STEPS = {FRAMES[DROP][1]: 330, FRAMES["kick"][1]: 280, UNTIL[0]: 900, UNTIL[1]: 690}
+"""Steps of `odeform` by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials and random
+features included. The time of a step of the per-point baselines (`STEPS`) does not depend on the frames."""
+SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}
+"""Steps of `odeform` on every 3rd, 5th or 8th frame of the drop: a step then takes more sequences."""
 
 
-def plan(share: float = 1.0) -> dict[str, list[Cell]]:
-    """The cells of each table, with this share of their steps."""
+def plan(share: float = 1.0) -> dict[str, list[Run]]:
+    """The runs of each table, with `share` of their steps."""
     tables = {
-        "II": [cell for scene in FRAMES for cell in _unseen(scene)],
+        "II": [run for scene in FRAMES for run in _unseen(scene)],
         "III": list(_extrapolation()),
         "IV": list(_interpolation()),
     }
     return {
-        table: [
-            cell if cell.steps is None else replace(cell, steps=max(round(share * cell.steps), 1)) for cell in cells
-        ]
-        for table, cells in tables.items()
+        table: [run if run.steps is None else replace(run, steps=max(round(share * run.steps), 1)) for run in runs]
+        for table, runs in tables.items()
     }
 
 
@@ -51,40 +49,41 @@ def _steps(model: str, frames: int, every: int = 1) -> int | None:
         return None
     if model != "odeform":
         return STEPS[model]
-    return OURS[frames] if every == 1 else THINNED[every]
+    return ODEFORM_STEPS[frames] if every == 1 else SUBSAMPLED_STEPS[every]
 
 
-def _whole(model: str, scene: str, seed: int = 0) -> Cell:
-    """Taught by all frames of all sequences."""
+def _whole(model: str, scene: str, seed: int = 0) -> Run:
+    """Trained on all frames of all sequences."""
     scored = (FRAMES[scene], IMPACT) if scene == DROP else (FRAMES[scene],)
-    return Cell(model, scene, scored, _steps(model, FRAMES[scene][1]), seed)
+    return Run(model, scene, scored, _steps(model, FRAMES[scene][1]), seed)
 
 
-def _unseen(scene: str) -> Iterable[Cell]:
+def _unseen(scene: str) -> Iterable[Run]:
     """Table II: unseen parameters."""
     yield from (_whole("odeform", scene, seed) for seed in SEEDS)
-    yield from (_whole(model, scene) for model in (*RIVALS, "odeform-per-point"))
+    yield from (_whole(model, scene) for model in (*BASELINES, "odeform-per-point"))
 
 
-def _extrapolation() -> Iterable[Cell]:
-    """Table III: the frames after those of the training."""
+def _extrapolation() -> Iterable[Run]:
+    """Table III: frames after the trained ones."""
     for until in UNTIL:
-        for model in ("odeform", *RIVALS):
-            yield Cell(model, DROP, ((until, until + AHEAD),), _steps(model, until), until=until)
+        for model in ("odeform", *BASELINES):
+            yield Run(model, DROP, ((until, until + AHEAD),), _steps(model, until), until=until)
 
 
-def _interpolation() -> Iterable[Cell]:
-    """Table IV: all frames of the impact, from all and from every k-th; interleaved, or of all sequences the same.
+def _interpolation() -> Iterable[Run]:
+    """Table IV: all frames of the impact, by models trained on every frame and on every k-th.
 
-    Only the observer's own clock can give frames at test time, as `occupancy-flow` needs them.
+    The k-th frames are staggered between sequences, or the same for all. `occupancy-flow` needs the second: it is given
+    those frames at test time.
     """
 
-    def thinned(model: str, stagger: bool) -> Iterable[Cell]:
+    def subsampled(model: str, stagger: bool) -> Iterable[Run]:
         for every in INTERVALS:
-            yield Cell(model, DROP, (IMPACT,), _steps(model, FRAMES[DROP][1], every), every=every, stagger=stagger)
+            yield Run(model, DROP, (IMPACT,), _steps(model, FRAMES[DROP][1], every), every=every, stagger=stagger)
 
-    for model in ("odeform", *RIVALS):
+    for model in ("odeform", *BASELINES):
         yield _whole(model, DROP)
-        yield from thinned(model, stagger=True)
+        yield from subsampled(model, stagger=True)
     for model in ("odeform", "pod-rbf", "occupancy-flow"):
-        yield from thinned(model, stagger=False)
+        yield from subsampled(model, stagger=False)

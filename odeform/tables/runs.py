@@ -1,6 +1,6 @@
-"""One cell of a table: a model trained as asked, and its scores. Both are kept, so that what was done is not redone.
+"""Training runs behind the tables. Checkpoints and scores are kept in a folder, and finished runs are not repeated.
 
-Where the scores suffice, the checkpoint need not be there any more.
+A checkpoint may be deleted once its scores are complete.
 """
 
 import json
@@ -21,20 +21,20 @@ from odeform.progress import Progress
 from odeform.training.request import TrainRequest
 from odeform.training.train import train
 
-__all__ = ["Cell", "Result", "run_cells"]
+__all__ = ["Result", "Run", "complete_runs"]
 
 KEPT = ("rmse_pooled_mm", "mae_pooled_mm", "mse_pooled_mm2", "rmse_mm", "deformation_relative", "sequences")
 
 Result = dict[str, Any]
-"""`command`, `sha256` of the checkpoint, `parameters`, `scores` by the frames that they are of."""
+"""`command`, `sha256` of the checkpoint, number of `parameters`, training `seconds`, and `scores` by "FIRST:LAST"."""
 
 
 @dataclass(frozen=True)
-class Cell:
-    """A model trained on frames 0 to `until` (default: all) of a data set, every k-th of them; scored on `scored`.
+class Run:
+    """A model trained on every k-th of the frames 0 to `until` (default: all) of a data set, and scored on `scored`.
 
-    `scored` are half-open windows of frames of the scene's rate; `scene` is a bundled data set or a path. `steps` is
-    None for models that are solved for.
+    `scored` are half-open windows of frames at the scene's rate; `scene` is a bundled data set or a path. `steps` is
+    None for models without iterative training.
     """
 
     model: str
@@ -48,6 +48,7 @@ class Cell:
 
     @property
     def name(self) -> str:
+        """Name of its files, unique within a folder."""
         parts = [Path(self.scene).name, self.model]
         parts += [f"w{self.until}"] if self.until else []
         parts += [f"e{self.every}"] if self.every > 1 else []
@@ -56,55 +57,57 @@ class Cell:
 
     @property
     def command(self) -> str:
+        """The command that repeats the training."""
         return f"odeform train {self.scene}{self.request.command.removeprefix('odeform train DIR --out FILE')}"
 
     @property
     def request(self) -> TrainRequest:
+        """What to ask of the trainer."""
         window = (0, self.until) if self.until else None
         return TrainRequest(
             self.model, self.seed, steps=self.steps, window=window, every=self.every, stagger=self.stagger
         )
 
 
-def run_cells(cells: Sequence[Cell], folder: Path, jobs: int, kept_only: bool = False) -> dict[Cell, Result]:
-    """Train and score what `folder` does not hold yet, `jobs` at a time; with `kept_only` leave it out."""
+def complete_runs(runs: Sequence[Run], folder: Path, jobs: int, kept_only: bool = False) -> dict[Run, Result]:
+    """Train and score the runs that `folder` does not hold yet, `jobs` at a time; with `kept_only`, leave them out."""
     folder.mkdir(parents=True, exist_ok=True)
-    cells = list(dict.fromkeys(cells))  # tables share some
+    runs = list(dict.fromkeys(runs))  # tables share some of them
     if kept_only:
-        cells = [c for c in cells if _scored(c, folder) or _is_of(folder / f"{c.name}.safetensors", c.request)]
-    results: dict[Cell, Result] = {}
-    progress = Progress("tables", len(cells))
-    for index, result in as_completed(partial(_run, folder=folder), cells, jobs):
-        results[cells[index]] = result
-        progress.advance(note=cells[index].name)
+        runs = [r for r in runs if _scored(r, folder) or _is_of(folder / f"{r.name}.safetensors", r.request)]
+    results: dict[Run, Result] = {}
+    progress = Progress("tables", len(runs))
+    for index, result in as_completed(partial(_complete, folder=folder), runs, jobs):
+        results[runs[index]] = result
+        progress.advance(note=runs[index].name)
     progress.close()
-    return {cell: results[cell] for cell in cells}
+    return {run: results[run] for run in runs}
 
 
-def _run(cell: Cell, folder: Path) -> Result:
-    """Of one cell, from what is kept as far as that is of this request."""
-    if found := _scored(cell, folder):
+def _complete(run: Run, folder: Path) -> Result:
+    """The result of one run. What `folder` holds is used if it comes from the same request."""
+    if found := _scored(run, folder):
         return found
-    file, kept = folder / f"{cell.name}.safetensors", folder / f"{cell.name}.json"
-    request = cell.request
-    fine = open_dataset(cell.scene)
+    file, kept = folder / f"{run.name}.safetensors", folder / f"{run.name}.json"
+    request = run.request
+    fine = open_dataset(run.scene)
     window = fine.schema.window
-    # no table asks for what is between the frames of the scene's rate
+    # no table scores frames between those of the scene's rate
     dataset = replace(fine, read=lambda entry: fine.read(entry).frames(window.stop, window.rate))
     if not _is_of(file, request):
-        with (folder / f"{cell.name}.log").open("w") as log:
+        with (folder / f"{run.name}.log").open("w") as log:
             report = partial(print, file=log, flush=True)
-            train(dataset, file, **asdict(request), parts=cell.scored, report=report)
+            train(dataset, file, **asdict(request), parts=run.scored, report=report)
     model = load(file)
     known = _read(kept)
     scores = known.get("scores", {}) if known.get("sha256") == model.checkpoint.sha256 else {}
-    for span in cell.scored:
+    for span in run.scored:
         key = f"{span[0]}:{span[1]}"
         if key not in scores:
             found = (model.checkpoint.scores or {}).get(key) or evaluate(model, dataset, "test", span)
             scores[key] = {name: found[name] for name in KEPT}
     result: Result = {
-        "command": cell.command,
+        "command": run.command,
         "sha256": model.checkpoint.sha256,
         "parameters": (model.checkpoint.scores or {}).get("parameters"),
         "seconds": model.checkpoint.provenance["training_seconds"],
@@ -114,21 +117,21 @@ def _run(cell: Cell, folder: Path) -> Result:
     return result
 
 
-def _scored(cell: Cell, folder: Path) -> Result | None:
-    """What is known of it, if that is all."""
-    known = _read(folder / f"{cell.name}.json")
-    asked = {f"{first}:{last}" for first, last in cell.scored}
-    return known if known.get("command") == cell.command and asked <= known["scores"].keys() else None
+def _scored(run: Run, folder: Path) -> Result | None:
+    """The kept result, or None where scores are missing."""
+    known = _read(folder / f"{run.name}.json")
+    needed = {f"{first}:{last}" for first, last in run.scored}
+    return known if known.get("command") == run.command and needed <= known["scores"].keys() else None
 
 
 def _is_of(file: Path, request: TrainRequest) -> bool:
-    """Whether that training has been completed into the file."""
+    """Whether `file` is the completed checkpoint of this request."""
     if not file.exists():
         return False
     try:
         checkpoint = load(file).checkpoint
     except InputError as error:
-        print(f"note: {error}; trained anew", file=sys.stderr)
+        print(f"note: {error}; training again", file=sys.stderr)
         return False
     return bool(checkpoint.scores) and checkpoint.provenance["command"][-1] == request.command
 

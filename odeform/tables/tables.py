@@ -1,4 +1,4 @@
-"""All tables of the paper, from what is kept of earlier runs and what is still to be run."""
+"""All tables of the paper, from kept and new runs."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
-from odeform.tables.runs import KEPT, run_cells
+from odeform.tables.runs import KEPT, complete_runs
 
 __all__ = ["tables"]
 
@@ -24,15 +24,16 @@ Found = dict[str, Any]
 
 
 def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = False) -> None:
-    """Write the page `out`; `folder` keeps checkpoints and scores, so that what was interrupted goes on.
+    """Write the Markdown page `out`.
 
-    `share` of the planned steps. `kept_only`: train nothing, leave open what is not there.
+    `folder` keeps checkpoints and scores, so that an interrupted call is continued; `jobs` runs are trained at a time.
+    `share` scales the planned training steps. With `kept_only` nothing is trained and missing entries stay empty.
     """
     planned = plan(share)
-    results = run_cells([cell for cells in planned.values() for cell in cells], folder, jobs, kept_only)
+    results = complete_runs([run for runs in planned.values() for run in runs], folder, jobs, kept_only)
     found = {
         "share": share,
-        "cells": {table: {c: results[c] for c in cells if c in results} for table, cells in planned.items()},
+        "runs": {table: {run: results[run] for run in runs if run in results} for table, runs in planned.items()},
         "shipped": _kept(folder / "shipped.json", [_sha256(scene) for scene in FRAMES], _shipped),
         "simple": _kept(folder / "simple.json", [UNTIL, AHEAD, INTERVALS, IMPACT], _simple),
         "identified": _kept(folder / "identified.json", [_sha256(scene) for scene in FRAMES], _identified),
@@ -41,7 +42,7 @@ def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = F
 
 
 def _kept(file: Path, key: list[Any], make: Callable[[], Found]) -> Found:
-    """What `make` found for that key, now or earlier."""
+    """The result of `make` for this key, from `file` if it was kept there."""
     key = json.loads(json.dumps(key))
     known = json.loads(file.read_text()) if file.exists() else {}
     if known.get("key") != key:
@@ -55,7 +56,7 @@ def _sha256(scene: str) -> str:
 
 
 def _shipped() -> Found:
-    """Scores of the bundled models, which were trained longer."""
+    """Scores of the bundled checkpoints, which were trained longer."""
     spans = [(scene, window) for scene, window in FRAMES.items()] + [(DROP, IMPACT)]
     scores = {(s, w): evaluate(load(s), open_dataset(s), "test", w) for s, w in spans}
     return {f"{s} {w[0]}:{w[1]}": {name: one[name] for name in KEPT} for (s, w), one in scores.items()}
