@@ -10,6 +10,7 @@ MODELS: dict[str, str] = {
     "direct": "odeform.models.baselines.direct:Direct",
     "occupancy-flow": "odeform.models.baselines.occupancy_flow:OccupancyFlow",
     "pod-rbf": "odeform.models.baselines.pod_rbf:PodRbf",
+    "gp": "odeform.models.baselines.gp:GaussianProcess",
     "nearest": "odeform.models.baselines.nearest:Nearest",
     "released": "odeform.models.authors.predictor:AuthorsModel",
 }

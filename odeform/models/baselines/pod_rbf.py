@@ -15,14 +15,13 @@ from odeform.dataset.training_data import TrainingData
 from odeform.errors import InputError
 from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.baselines.frame_trajectory import FrameTrajectory
+from odeform.models.baselines.trajectory_pod import fit_trajectory_pod
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
 
 __all__ = ["PodRbf"]
 
-ENERGY = 0.999999
 KERNELS = ("linear", "thin_plate_spline", "cubic", "quintic")
 SMOOTHINGS = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
 
@@ -46,38 +45,28 @@ class PodRbf(FittedModel):
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
         """Modes of the training motions; the kernel and smoothing with the smallest RMS displacement on validation."""
-        train, val = data.reduced["train"], data.reduced["val"]
-        weight = np.ones(train.shape[-1])
-        weight[3:POSE] = data.space.gyration_radius * np.sqrt(2.0 / 3.0)  # radians to metres
-        flat = (train * weight).reshape(len(train), -1)
-        mean = flat.mean(axis=0)
-        u, s, vt = np.linalg.svd(flat - mean, full_matrices=False)
-        count = int(np.searchsorted(np.cumsum(s**2) / (s**2).sum(), ENERGY)) + 1
-        coefficients, modes = u[:, :count] * s[:count], vt[:count]
-        target = (val * weight).reshape(len(val), -1)
+        pod = fit_trajectory_pod(data)
 
         def error(kernel: str, smoothing: float) -> float:
             try:
-                model = RBFInterpolator(data.theta["train"], coefficients, kernel=kernel, smoothing=smoothing)
+                model = RBFInterpolator(data.theta["train"], pod.coefficients, kernel=kernel, smoothing=smoothing)
             except (ValueError, np.linalg.LinAlgError):
                 return float("inf")  # too few sequences for the polynomial that goes with this kernel
-            return float(np.sqrt(((mean + model(data.theta["val"]) @ modes - target) ** 2).sum(axis=1).mean()))
+            return pod.error(model(data.theta["val"]), data.reduced["val"])
 
         candidates = list(itertools.product(KERNELS, SMOOTHINGS))
         errors = [error(kernel, smoothing) for kernel, smoothing in candidates]
         if not np.isfinite(min(errors)):
-            raise InputError(f"pod-rbf: {len(train)} training sequences are too few for any kernel")
+            raise InputError(f"pod-rbf: {len(data.theta['train'])} training sequences are too few for any kernel")
         kernel, smoothing = candidates[int(np.argmin(errors))]
-        unweight = np.tile(1.0 / weight, train.shape[1])
         arrays = {
             "times": data.times,
             "theta": data.theta["train"],
-            "pod.mean": (mean * unweight).astype(np.float64),
-            "pod.modes": (modes * unweight).astype(np.float32),
-            "pod.coefficients": coefficients.astype(np.float64),
+            "pod.coefficients": pod.coefficients.astype(np.float64),
+            **pod.arrays(),
         }
         trials = [{"kernel": k, "smoothing": g, "val": e} for (k, g), e in zip(candidates, errors, strict=True)]
-        return arrays, {"kernel": kernel, "smoothing": smoothing, "modes": count, "trials": trials}
+        return arrays, {"kernel": kernel, "smoothing": smoothing, "modes": len(pod.modes), "trials": trials}
 
     def _trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float

@@ -1,0 +1,51 @@
+"""POD of whole trajectories: what classical reduced-order models interpolate over the parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.dataset.training_data import TrainingData
+from odeform.motion.reduced_space import POSE
+from odeform.types import Arrays, Floats
+
+__all__ = ["TrajectoryPod", "fit_trajectory_pod"]
+
+ENERGY = 0.999999
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryPod:
+    """Trajectories (T, 6 + K), flat, as `mean` + coefficients @ `modes`; all in m, rotations scaled by `weight`."""
+
+    weight: Float[np.ndarray, " y"]
+    """(6 + K,) metres of displacement per unit of each coordinate."""
+    mean: Float[np.ndarray, " entries"]
+    modes: Float[np.ndarray, "modes entries"]
+    coefficients: Float[np.ndarray, "sequences modes"]
+    """Of the training motions; the modes are orthonormal."""
+
+    def error(self, coefficients: Floats, reduced: Floats) -> float:
+        """RMS distance in m between (S, modes) `coefficients` and trajectories (S, T, 6 + K), over the sequences."""
+        target = (reduced * self.weight).reshape(len(reduced), -1)
+        return float(np.sqrt(((self.mean + coefficients @ self.modes - target) ** 2).sum(axis=1).mean()))
+
+    def arrays(self) -> Arrays:
+        """Mean and modes in the units of the coordinates, for a checkpoint."""
+        unweight = np.tile(1.0 / self.weight, len(self.mean) // len(self.weight))
+        return {
+            "pod.mean": (self.mean * unweight).astype(np.float64),
+            "pod.modes": (self.modes * unweight).astype(np.float32),
+        }
+
+
+def fit_trajectory_pod(data: TrainingData) -> TrajectoryPod:
+    """As many modes of the training motions as hold `ENERGY` of their variance."""
+    train = data.reduced["train"]
+    weight = np.ones(train.shape[-1])
+    weight[3:POSE] = data.space.gyration_radius * np.sqrt(2.0 / 3.0)  # radians to metres
+    flat = (train * weight).reshape(len(train), -1)
+    mean = flat.mean(axis=0)
+    u, s, vt = np.linalg.svd(flat - mean, full_matrices=False)
+    count = int(np.searchsorted(np.cumsum(s**2) / (s**2).sum(), ENERGY)) + 1
+    return TrajectoryPod(weight, mean, vt[:count], u[:, :count] * s[:count])

@@ -1,0 +1,45 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.dataset.index import Dataset
+from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.baselines.gp import GaussianProcess, matern
+
+
+@pytest.fixture(scope="module")
+def data(dataset: Dataset) -> TrainingData:
+    return prepare(dataset, modes=8)
+
+
+def test_kernel_values() -> None:
+    """k(r) = (1 + s + s^2 / 3) exp(-s), s = sqrt(5) r (Rasmussen and Williams 2006, eq. 4.17)."""
+    points = np.array([[0.0, 0.0], [0.6, 0.8]])
+    s = np.sqrt(5.0)
+    assert matern(points, points) == pytest.approx(np.array([[1.0, k := (1 + s + s**2 / 3) * np.exp(-s)], [k, 1.0]]))
+
+
+def test_kernel_matrices_are_positive_definite() -> None:
+    points = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3))
+    assert np.linalg.eigvalsh(matern(points, points)).min() > 0.0
+
+
+def test_chosen_setting_is_the_best_on_val_of_all_starts(data: TrainingData) -> None:
+    _, settings = GaussianProcess.fit(data)
+    assert settings["trials"][0] != settings["trials"][1]
+    best = min(settings["trials"], key=lambda trial: trial["val"])
+    assert (settings["length_scales"], settings["ridge"]) == (best["length_scales"], best["ridge"])
+    assert len(settings["length_scales"]) == data.theta["train"].shape[1]
+
+
+def test_a_parameter_without_effect_gets_a_long_length_scale(data: TrainingData) -> None:
+    """Motions that depend on the first parameter alone: the others hardly count."""
+    rng = np.random.default_rng(0)
+    theta = {split: rng.uniform(-1.0, 1.0, (count, 2)) for split, count in (("train", 40), ("val", 20))}
+    shape = data.reduced["train"].shape[1:]
+    wave = np.linspace(0.0, 1.0, np.prod(shape)).reshape(shape)
+    reduced = {split: np.sin(2.0 * t[:, :1, None]) * wave for split, t in theta.items()}
+    _, settings = GaussianProcess.fit(replace(data, theta=theta, reduced=reduced))
+    first, second = settings["length_scales"]
+    assert second > 5.0 * first
