@@ -1,4 +1,4 @@
-"""A browser's side of viser's protocol on this machine, as far as benchmarks and tests need it."""
+"""A client of viser's protocol on this machine, as far as benchmarks and tests need one."""
 
 import struct
 import time
@@ -16,11 +16,23 @@ from websockets.sync.client import connect
 __all__ = ["Control", "LoopbackClient"]
 
 PART = 1 << 19  # bytes of a file in one message
+DEADLINE = 60.0  # s, for a busy machine
+CAMERA = {
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (0.0, -3.0, 1.0),
+    "fov": 0.8,
+    "near": 0.01,
+    "far": 1000.0,
+    "image_height": 600,
+    "image_width": 800,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
 
 
 @dataclass
 class Control:
-    """Something in a panel: its `kind` is that of viser's message, such as `Slider` or `ButtonGroup`."""
+    """A control in a panel. `kind` is that of viser's message, such as `Slider` or `ButtonGroup`."""
 
     uuid: str
     kind: str
@@ -33,14 +45,15 @@ class Control:
 
     @property
     def text(self) -> str:
-        """Markdown or HTML, empty while it is hidden."""
+        """Markdown or HTML; empty while hidden."""
         return self.props.get("_markdown", self.props.get("content", "")) if self.visible else ""
 
 
 class LoopbackClient:
-    """Connects to a viewer; knows its controls by label and collects updates of scene nodes."""
+    """Connects to a viewer. It keeps the controls by label, and passes on updates of scene nodes."""
 
     def __init__(self, port: int) -> None:
+        """Connect to a port of this machine, and wait for the page. `TimeoutError` if it does not come."""
         self._socket = connect(
             f"ws://127.0.0.1:{port}",
             subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
@@ -50,29 +63,18 @@ class LoopbackClient:
         self._controls: dict[str, Control] = {}
         self._commands: dict[str, str] = {}
         self.received = 0
-        """Bytes so far."""
+        """Bytes received so far."""
         self.notifications: list[str] = []
-        """Notifications, the newest last."""
+        """Messages of notifications, the newest last."""
         self.nodes: set[str] = set()
         """Names of the scene's nodes."""
         self.downloads: dict[str, bytearray] = {}
-        """Files that came, by name."""
-        self._arriving: dict[str, str] = {}
-        # the server calls back only for clients whose camera it knows
-        camera = {
-            "type": "ViewerCameraMessage",
-            "wxyz": (1.0, 0.0, 0.0, 0.0),
-            "position": (0.0, -3.0, 1.0),
-            "fov": 0.8,
-            "near": 0.01,
-            "far": 1000.0,
-            "image_height": 600,
-            "image_width": 800,
-            "look_at": (0.0, 0.0, 0.0),
-            "up_direction": (0.0, 0.0, 1.0),
-        }
-        self._socket.send(msgspec.msgpack.encode(camera))
-        self.collect(1.0)
+        """Downloaded files, by name."""
+        self._transfers: dict[str, str] = {}
+        self._send("ViewerCameraMessage", **CAMERA)  # the server ignores clients without a camera
+        if not self.until(lambda: bool(self._controls)):  # the first batch holds them all
+            self._socket.close()
+            raise TimeoutError(f"port {port} sent no page within {DEADLINE:g} s")
 
     def __enter__(self) -> "LoopbackClient":
         return self
@@ -85,20 +87,22 @@ class LoopbackClient:
 
     @property
     def controls(self) -> dict[str, Control]:
-        """Those that are there now, by label; of several with one label the newest."""
+        """The current controls by label; the newest, if several share a label."""
         return {c.props["label"]: c for c in self._controls.values() if "label" in c.props and c.kind != "Folder"}
 
     @property
     def commands(self) -> list[str]:
+        """Labels of the commands that have hot keys."""
         return list(self._commands)
 
     def set(self, label: str, value: Any) -> None:
-        """Move the control of that label; a button group takes the name of the button."""
+        """Set the value of a control; that of a button group is the label of a button."""
         control = self.controls[label]
         self._send("GuiUpdateMessage", uuid=control.uuid, updates={"value": value})
         control.value = value
 
     def click(self, label: str) -> None:
+        """Click a button."""
         self.set(label, True)
 
     def press(self, command: str) -> None:
@@ -106,6 +110,7 @@ class LoopbackClient:
         self._send("CommandTriggerMessage", uuid=self._commands[command])
 
     def upload(self, label: str, name: str, content: bytes) -> None:
+        """Upload a file with the upload button of that label."""
         parts = [content[at : at + PART] for at in range(0, len(content), PART)]
         ids = {"source_component_uuid": self.controls[label].uuid, "transfer_uuid": uuid.uuid4().hex}
         about = {"filename": name, "mime_type": "", "part_count": len(parts), "size_bytes": len(content)}
@@ -130,17 +135,17 @@ class LoopbackClient:
         self.received += len(raw)
         messages = _decode(raw)
         for message in messages:
-            self._note(message)
+            self._handle(message)
         return messages
 
-    def until(self, holds: Callable[[], bool], seconds: float = 10.0) -> bool:
-        """Listen until something holds, or for that long; whether it does."""
+    def until(self, holds: Callable[[], bool], seconds: float = DEADLINE) -> bool:
+        """Receive until a condition holds, or for at most `seconds`; returns whether it holds."""
         end = time.monotonic() + seconds
         while not holds() and time.monotonic() < end:
             self.receive(0.1)
         return holds()
 
-    def _note(self, message: dict[str, Any]) -> None:
+    def _handle(self, message: dict[str, Any]) -> None:
         kind, props = message["type"], message.get("props", {})
         if kind == "RegisterCommandMessage":
             self._commands[props["label"]] = message["uuid"]
@@ -153,10 +158,10 @@ class LoopbackClient:
         elif kind == "RemoveSceneNodeMessage":
             self.nodes.discard(message["name"])
         elif kind == "FileTransferStartDownload":
-            self._arriving[message["transfer_uuid"]] = message["filename"]
+            self._transfers[message["transfer_uuid"]] = message["filename"]
             self.downloads[message["filename"]] = bytearray()
-        elif kind == "FileTransferPart" and message["transfer_uuid"] in self._arriving:
-            self.downloads[self._arriving[message["transfer_uuid"]]] += message["content"]
+        elif kind == "FileTransferPart" and message["transfer_uuid"] in self._transfers:
+            self.downloads[self._transfers[message["transfer_uuid"]]] += message["content"]
         elif kind.startswith("Gui") and props:
             name = kind.removeprefix("Gui").removesuffix("Message")
             self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), props)
@@ -170,32 +175,33 @@ class LoopbackClient:
             control.props.update({name: value for name, value in updates.items() if name in control.props})
 
     def text(self) -> str:
-        """Everything that stands in the page, as Markdown and HTML."""
+        """All visible Markdown and HTML of the page."""
         return "\n".join(filter(None, (control.text for control in self._controls.values())))
 
-    def wait_vertices(self, node: str, timeout: float = 5.0) -> np.ndarray | None:
-        """(N, 3) of the next update of that node's vertices."""
-        end = time.monotonic() + timeout
-        while (left := end - time.monotonic()) > 0.0:
-            for message in self.receive(left) or []:
-                if message.get("name") == node and "vertices" in message.get("updates", {}):
-                    return message["updates"]["vertices"].reshape(-1, 3)
-        return None
+    def wait_vertices(self, node: str, timeout: float = DEADLINE) -> np.ndarray | None:
+        """Vertices (N, 3) of the next update of a mesh node, in m; None after `timeout` seconds."""
+        vertices = self._wait_update(node, "vertices", timeout)
+        return None if vertices is None else vertices.reshape(-1, 3)
 
-    def wait_splats(self, node: str, timeout: float = 5.0) -> np.ndarray | None:
-        """(N, 3) centres of the next update of that node's splats, in its own units."""
+    def wait_splats(self, node: str, timeout: float = DEADLINE) -> np.ndarray | None:
+        """Centres (N, 3) of the next update of a node of splats, in its units; None after `timeout` seconds."""
+        buffer = self._wait_update(node, "buffer", timeout)
+        if buffer is None:
+            return None
+        words = buffer.view(np.uint32).reshape(-1, 8)  # 32 bytes for each splat, its centre first
+        return np.ascontiguousarray(words[:, :3]).view(np.float32)
+
+    def _wait_update(self, node: str, prop: str, timeout: float) -> np.ndarray | None:
         end = time.monotonic() + timeout
         while (left := end - time.monotonic()) > 0.0:
             for message in self.receive(left) or []:
-                if message.get("name") == node and "buffer" in message.get("updates", {}):
-                    # 32 bytes a splat, the centre first (viser's layout)
-                    words = message["updates"]["buffer"].view(np.uint32).reshape(-1, 8)
-                    return np.ascontiguousarray(words[:, :3]).view(np.float32)
+                if message.get("name") == node and prop in message.get("updates", {}):
+                    return message["updates"][prop]
         return None
 
 
 def _decode(raw: bytes) -> list[dict[str, Any]]:
-    """Frame: two uint64 (plain and compressed size), zstd-compressed msgpack, then 8-aligned binary arrays."""
+    """The messages of a frame: two uint64 (plain and compressed size), zstd-compressed msgpack, 8-aligned arrays."""
     plain, packed = struct.unpack_from("<QQ", raw, 0)
     body = msgspec.msgpack.decode(zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], max_output_size=plain))
     offset, starts = 16 + packed, []
