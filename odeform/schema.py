@@ -1,4 +1,4 @@
-"""What a scene varies and shows: parameters, time window, and the parts of its motion."""
+"""What a scene varies: its parameters, with units and ranges, and its window of time."""
 
 import itertools
 import math
@@ -17,20 +17,20 @@ __all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "sof
 Parameters = Mapping[str, float]
 
 BEYOND = 0.15
-"""How far models see beyond a trained range, in halves of that range: the deformations of the bundled models stay
-within a fifth above the largest trained. At a quarter, one in a hundred is several times as large."""
+"""How far inputs may exceed a trained range, in half ranges. The deformations of the bundled models then stay within a
+fifth above the largest in training; at 0.25, one in a hundred is several times as large."""
 LATER = 0.05
-"""How far models see beyond the trained window and its reach, in windows: a ball at rest stays as it is. At twice that,
-some motions of the bundled models are deformed several times as much as ever before; at ten times that, all are."""
+"""How far a model's clock may exceed the trained window and its reach, in windows. A ball at rest then stays so; at
+twice that, some motions of the bundled models deform several times as much as ever before, at ten times that, all."""
 REACH = 0.5
-"""Windows beyond the trained one over which models that go on do so before their clock stops."""
+"""Windows beyond the trained one over which models that extrapolate keep their clock running."""
 
 
 def soft_clip(values: Floats, limit: float, margin: float) -> Floats:
-    """Magnitudes up to `limit` to the last bit as they are; beyond, smoothly, ever less, and never by over `margin`.
+    """Clip magnitudes smoothly: bit-exact up to `limit`, and never above `limit + margin`; any shape.
 
-    What models are asked for passes through here, so that they are continuous functions of a bounded set: whatever is
-    asked, the motion stays bounded.
+    Inputs of models pass through this function. Models are therefore continuous functions of a bounded set, and their
+    motions stay bounded for any input.
     """
     size = np.abs(values)
     return np.where(size <= limit, values, np.sign(values) * (limit + margin * np.tanh((size - limit) / margin)))
@@ -40,9 +40,25 @@ def soft_clip(values: Floats, limit: float, margin: float) -> Floats:
 class Parameter:
     """One physical quantity that a scene varies.
 
-    `scale` is "log" where ratios matter rather than differences (mass, stiffness), else "linear".
-    `role` is "azimuth" for an angle about the vertical axis under which the scene is symmetric: models
-    rotate coordinates by it and never learn it.
+    Attributes:
+        name: For example "mass".
+        unit: Of all its values, for example "kg".
+        low: Lower end of the trained range.
+        high: Upper end of the trained range.
+        default: Value used where none is given.
+        scale: "log" where ratios matter rather than differences (mass, stiffness), otherwise "linear".
+        role: "azimuth" for an angle about the vertical axis under which the scene is symmetric. Models rotate
+            coordinates by it and do not learn it. Otherwise "physical".
+        description: One line for people.
+        shape: Of its value; () for a number.
+
+    Examples:
+        >>> import odeform
+        >>> mass = odeform.load("kick").schema.parameters[0]
+        >>> mass.name, mass.unit, mass.low, mass.high
+        ('mass', 'kg', 0.5, 1.0)
+        >>> mass.normalise(1.0), mass.inside(2.0)
+        (1.0, False)
     """
 
     name: str
@@ -56,7 +72,7 @@ class Parameter:
     shape: tuple[int, ...] = ()
 
     def normalise(self, value: float) -> float:
-        """The trained range maps to [-1, 1]; values beyond it map beyond."""
+        """Map a value in `unit` so that the trained range becomes [-1, 1]; values outside map outside."""
         if self.scale == "log":
             low, high, value = math.log(self.low), math.log(self.high), math.log(value)
         else:
@@ -64,16 +80,22 @@ class Parameter:
         return 2.0 * (value - low) / (high - low) - 1.0
 
     def denormalise(self, unit: float) -> float:
+        """The inverse of `normalise`."""
         if self.scale == "log":
             return self.low * (self.high / self.low) ** ((unit + 1.0) / 2.0)
         return self.low + (self.high - self.low) * (unit + 1.0) / 2.0
 
     def inside(self, value: float) -> bool:
+        """Whether a value lies in the trained range, up to rounding."""
         slack = 1e-6 * (self.high - self.low)
         return self.low - slack <= value <= self.high + slack
 
     def check(self, value: Any) -> float:
-        """The value as a float. Values outside the trained range pass; what no motion can have does not."""
+        """The value as a float, in `unit`. Values outside the trained range are accepted.
+
+        Raises:
+            InputError: Not a finite number, or not positive where the scale is "log".
+        """
         try:
             number = float(value)
         except (TypeError, ValueError):
@@ -98,13 +120,13 @@ def _three(name: str, value: Any) -> list[Any]:
 
 @dataclass(frozen=True)
 class Window:
-    """The trained span of time in seconds, and the rate of its frames in Hz."""
+    """The trained span of time in seconds, and its frame rate in Hz."""
 
     start: float
     stop: float
     rate: float
     reach: float = 0.0
-    """Windows beyond the trained one over which a model continues its motions, clocks running on."""
+    """Windows beyond the trained one over which a model extrapolates with its clock running."""
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -113,14 +135,34 @@ class Window:
         return self.start + np.arange(count + 1) / self.rate
 
     def soft_clamped(self, times: Floats) -> Floats:
-        """(T,) times as models see them: clocks run ever slower after the trained span and its reach, and soon stop."""
+        """(T,) times in seconds as models use them: past the trained span and its reach, the clock slows and stops."""
         span = self.stop - self.start
         return soft_clip(times, self.stop + self.reach * span, LATER * span)
 
 
 @dataclass(frozen=True)
 class Schema:
-    """Everything a viewer, a trainer or a table needs to know of a scene."""
+    """The parameters of a scene and its window of time. A predictor has one, and so has a data set.
+
+    Attributes:
+        scene: Its name, for example "kick".
+        parameters: In the order of a model's inputs.
+        window: The trained span of time in seconds, `start` to `stop`, and its frame `rate` in Hz.
+        parts: Of the motion: the rigid part and the local deformation.
+        needs_observations: True for models that interpolate between given frames.
+        notes: Remarks for people.
+        impact: Half-open span of time in seconds that is also scored separately: free flight and rest dilute scores.
+
+    Examples:
+        >>> import odeform
+        >>> schema = odeform.load("kick").schema
+        >>> [parameter.name for parameter in schema.parameters]
+        ['mass', 'bending', 'force', 'azimuth', 'elevation']
+        >>> schema.window.stop, schema.window.rate
+        (1.0, 120.0)
+        >>> schema.complete({"mass": "0.6"})["mass"]
+        0.6
+    """
 
     scene: str
     parameters: tuple[Parameter, ...]
@@ -129,21 +171,23 @@ class Schema:
     needs_observations: bool = False
     notes: tuple[str, ...] = ()
     impact: tuple[float, float] | None = None
-    """Half-open span of time in seconds that is scored apart: free flight and rest dilute every score."""
 
     @property
     def learned(self) -> tuple[Parameter, ...]:
-        """The parameters that a model has to learn: all but a symmetry's angle."""
+        """The P parameters that a model learns: all except the azimuth of a symmetric scene."""
         return tuple(p for p in self.parameters if p.role != "azimuth")
 
     def azimuth(self, parameters: Parameters) -> float:
-        """The scene's angle about the vertical axis in radians; 0 for a scene without one."""
+        """The azimuth in radians; 0 for a scene without one."""
         return next((parameters[p.name] for p in self.parameters if p.role == "azimuth"), 0.0)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, float]:
-        """All parameters, checked, in schema order, with defaults where none was given.
+        """All parameters, checked, in the order of the schema, with defaults for those not given.
 
-        Three parameters NAME_x, NAME_y and NAME_z may be given as one vector: NAME, of three numbers or "X,Y,Z".
+        Three parameters NAME_x, NAME_y and NAME_z may be given as one vector NAME: three numbers, or "X,Y,Z".
+
+        Raises:
+            InputError: An unknown name, or a value that is not acceptable (`Parameter.check`).
         """
         known = [p.name for p in self.parameters]
         given: dict[str, Any] = {}
@@ -157,23 +201,23 @@ class Schema:
         return {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
 
     def known(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Those of `parameters` that this scene varies."""
+        """The entries of `parameters` that belong to this scene."""
         return {p.name: parameters[p.name] for p in self.parameters if p.name in parameters}
 
     def outside(self, parameters: Parameters) -> tuple[str, ...]:
-        """Names of the parameters beyond their trained range."""
+        """Names of the parameters outside their trained range."""
         return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
 
     def vector(self, parameters: Parameters) -> NDArray[np.float64]:
-        """(P,) the learned parameters, each with its trained range mapped to [-1, 1]."""
+        """(P,) learned parameters, each normalised so that its trained range is [-1, 1]."""
         return np.array([p.normalise(parameters[p.name]) for p in self.learned])
 
     def inputs(self, parameters: Parameters) -> Floats:
-        """(P,) as `vector`, as models see them: what lies beyond a trained range fades, at most to 1.15."""
+        """(P,) the normalised parameters as inputs of a model: soft-clipped to magnitudes below 1.15."""
         return soft_clip(self.vector(parameters), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:
-        """Those of the trained box, `reach` times as large about its middle; symmetries stay at their default."""
+        """Corners of the box of trained ranges, scaled by `reach` about its centre; an azimuth keeps its default."""
         ends = [
             (p.default,) if p.role == "azimuth" else (p.denormalise(-reach), p.denormalise(reach))
             for p in self.parameters
@@ -181,10 +225,12 @@ class Schema:
         return [{p.name: v for p, v in zip(self.parameters, row, strict=True)} for row in itertools.product(*ends)]
 
     def to_json(self) -> dict[str, Any]:
+        """Plain values, which `from_json` reads."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Schema":
+        """The schema of `to_json`; `InputError` for a missing or wrong field."""
         try:
             return cls(
                 scene=str(data["scene"]),

@@ -56,14 +56,38 @@ SH0 = 0.28209479177387814  # zeroth real spherical harmonic, 1 / (2 sqrt(pi))
 
 @dataclass(frozen=True, eq=False)
 class PointCloud:
-    """`points` (N, 3) metres."""
+    """A shape given by points alone.
+
+    Attributes:
+        points: (N, 3) positions in metres.
+
+    Examples:
+        >>> import numpy as np
+        >>> import odeform
+        >>> cloud = odeform.PointCloud(np.zeros((5, 3), np.float32))
+        >>> odeform.load("kick").solve(cloud).vertices(0.1).shape
+        (5, 3)
+    """
 
     points: Points
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """`points` (N, 3) metres, `faces` (F, 3) indices, counter-clockwise from outside."""
+    """A triangle mesh.
+
+    Attributes:
+        points: (N, 3) vertices in metres.
+        faces: (F, 3) indices of vertices, counter-clockwise when seen from outside.
+
+    Examples:
+        >>> import numpy as np
+        >>> import odeform
+        >>> corners = 0.1 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
+        >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)
+        >>> odeform.load("kick").solve(odeform.Mesh(corners, faces)).vertices(0.1).shape
+        (4, 3)
+    """
 
     points: Points
     faces: Faces
@@ -71,11 +95,25 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class GaussianSplats:
-    """`points` (N, 3) centres in m, `covariances` (N, 3, 3) m^2, `opacities` (N,) in [0, 1].
+    """3D Gaussian splats (Kerbl et al. 2023).
 
-    `harmonics` (N, H, 3) are the coefficients of red, green and blue for H = 1, 4, 9 or 16 spherical harmonics, the
-    constant first (`odeform.geometry.harmonics` has their order and signs). `notes` say what a file had beyond that,
-    or had broken.
+    Attributes:
+        points: (N, 3) centres in metres.
+        covariances: (N, 3, 3) in square metres.
+        harmonics: (N, H, 3) coefficients of red, green and blue for H = 1, 4, 9 or 16 spherical harmonics, the constant
+            first; `odeform.geometry.harmonics` documents their order and signs.
+        opacities: (N,) in [0, 1].
+        notes: What was dropped when a file was read: unsupported properties, or splats that are not finite.
+
+    Examples:
+        >>> import numpy as np
+        >>> import odeform
+        >>> covariances = np.tile(1e-4 * np.eye(3), (2, 1, 1))
+        >>> splats = odeform.GaussianSplats(np.zeros((2, 3)), covariances, np.zeros((2, 1, 3)), np.ones(2))
+        >>> splats.colors[0]
+        array([0.5, 0.5, 0.5])
+        >>> odeform.load("kick").solve(splats).covariances(0.1).shape
+        (2, 3, 3)
     """
 
     points: Points
@@ -86,7 +124,7 @@ class GaussianSplats:
 
     @cached_property
     def colors(self) -> Points:
-        """(N, 3) in [0, 1]: the constant part, as if seen from all sides at once."""
+        """(N, 3) red, green and blue in [0, 1]: the constant part, averaged over all directions."""
         return np.clip(0.5 + SH0 * self.harmonics[:, 0], 0.0, 1.0)
 
 
@@ -95,10 +133,23 @@ Geometry = Mesh | PointCloud | GaussianSplats
 
 @dataclass(frozen=True, eq=False)
 class MotionSequence:
-    """One observed or simulated motion.
+    """One recorded or simulated motion.
 
-    `times` (T,) s; `vertices` (T, N, 3) m, frame 0 is the rest state; `faces` (F, 3); `weights` (N,) share of the
-    mass at each vertex, summing to 1; `parameters` in the units of the schema.
+    Attributes:
+        times: (T,) seconds, evenly spaced from 0.
+        vertices: (T, N, 3) positions in metres; frame 0 is the body at rest.
+        faces: (F, 3) indices of vertices.
+        weights: (N,) share of the mass at each vertex; they sum to 1.
+        parameters: By name, in the units of the data set's schema.
+        name: That of the sequence in its data set.
+
+    Examples:
+        >>> import odeform
+        >>> sequence = next(odeform.open_dataset("kick").sequences("train"))
+        >>> sequence.vertices.shape, sequence.times[-1].item()
+        ((121, 402, 3), 1.0)
+        >>> sequence.until(0.5, every=2).vertices.shape
+        (31, 402, 3)
     """
 
     times: Times
@@ -110,15 +161,16 @@ class MotionSequence:
 
     @property
     def rest(self) -> Mesh:
+        """The body at rest: frame 0, N vertices in metres."""
         return Mesh(self.vertices[0], self.faces)
 
     def frames(self, stop: float, rate: float) -> "MotionSequence":
-        """Those of a rate in Hz, which the sequence may be a multiple of, up to `stop` seconds."""
+        """The frames at `rate` Hz up to `stop` seconds. The sequence's own rate is a multiple of `rate`."""
         step = float(self.times[1] - self.times[0])
         return self.until(stop, max(round(1.0 / (rate * step)), 1))
 
     def until(self, stop: float, every: int = 1) -> "MotionSequence":
-        """Every k-th frame up to `stop` seconds. A sequence that ended before, at rest, stays as it was."""
+        """Every n-th frame up to `stop` seconds. A sequence that ends earlier, at rest, keeps its last frame."""
         step = float(self.times[1] - self.times[0])
         times = np.arange(round(stop / step) + 1)[::every] * step
         kept = np.minimum(np.arange(len(times)) * every, len(self.times) - 1)

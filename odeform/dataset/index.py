@@ -1,4 +1,4 @@
-"""What a data set is: an index of sequences, and something that reads them one at a time."""
+"""A data set: an index of sequences, and a reader of one sequence at a time."""
 
 import json
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Entry:
-    """One sequence of the index. `status` is "ok", or why the simulator gave none."""
+    """One sequence of the index. `status` is "ok", or the reason why its simulation failed."""
 
     name: str
     split: str
@@ -30,14 +30,32 @@ class Entry:
 
 @runtime_checkable
 class Reader(Protocol):
-    """Reads one sequence of a data set; checks its SHA-256."""
+    """Reads one sequence of a data set and checks its SHA-256."""
 
     def __call__(self, entry: Entry) -> MotionSequence: ...
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """An opened data set at `root`; holds the index, reads sequences when asked."""
+    """An opened data set. It holds the index and reads sequences one at a time.
+
+    Attributes:
+        root: The folder or file.
+        schema: Parameters and window of time of its scene.
+        entries: One for each sequence, failed ones included.
+        read: Reads the sequence of an entry.
+        fixed: Physical quantities that are the same for all sequences, with units in their names.
+        provenance: Where the data come from.
+
+    Examples:
+        >>> import odeform
+        >>> dataset = odeform.open_dataset("kick")
+        >>> len(dataset.select("test"))
+        140
+        >>> sequence = dataset.read(dataset.select("train")[0])
+        >>> sequence.vertices.shape
+        (121, 402, 3)
+    """
 
     root: Path
     schema: Schema
@@ -47,17 +65,22 @@ class Dataset:
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def select(self, split: str) -> list[Entry]:
-        """Sound entries of "train", "val", "test" or "all"."""
+        """Entries of the split "train", "val", "test" or "all" whose simulation succeeded.
+
+        Raises:
+            InputError: An unknown split.
+        """
         if split not in ("train", "val", "test", "all"):
             raise InputError(f"split: expected train, val, test or all, got {split!r}")
         return [e for e in self.entries if e.status == "ok" and split in ("all", e.split)]
 
     def sequences(self, split: str) -> Iterator[MotionSequence]:
+        """The sequences of a split, read one at a time; see `select`."""
         return (self.read(entry) for entry in self.select(split))
 
 
 def assign_splits(count: int, seed: int) -> list[str]:
-    """70 % train, 10 % val, 20 % test, drawn at random."""
+    """70 % train, 10 % val, 20 % test, in random order."""
     train, val = round(0.7 * count), round(0.1 * count)
     labels = np.array(["train"] * train + ["val"] * val + ["test"] * (count - train - val))
     return [str(label) for label in np.random.default_rng(seed).permutation(labels)]

@@ -1,4 +1,4 @@
-"""Opening a data set, wherever it is: a folder, a packed file, or the bundled copy of a scene."""
+"""Opening a data set: a folder, a packed file, or the bundled copy of a scene."""
 
 from pathlib import Path
 
@@ -11,12 +11,26 @@ __all__ = ["bundled_datasets", "open_dataset"]
 
 
 def bundled_datasets() -> dict[str, Path]:
-    """The packed data sets beside the package, by scene. A wheel has none."""
+    """The bundled data sets by scene. They come with a clone, not with a wheel."""
     return {path.stem: path for path in sorted(bundled("datasets").glob(f"*{SUFFIX}"))}
 
 
 def open_dataset(name: str | Path) -> Dataset:
-    """The data set of that path, or else the bundled copy of that scene."""
+    """Open a data set.
+
+    Args:
+        name: A folder that `odeform simulate` or `odeform import` wrote, an `.odp` file of `odeform pack`, or the name
+            of a scene with a bundled data set (a clone has `kick` and `mass-elastic`; a wheel has none).
+
+    Raises:
+        InputError: No data set is there, or it is damaged.
+
+    Examples:
+        >>> import odeform
+        >>> dataset = odeform.open_dataset("mass-elastic")
+        >>> {split: len(dataset.select(split)) for split in ("train", "val", "test")}
+        {'train': 350, 'val': 50, 'test': 100}
+    """
     path = Path(name)
     if not path.is_file() and not (path / INDEX).exists():
         path = bundled_datasets().get(str(name), path)
