@@ -16,7 +16,7 @@ from odeform.cli import main
 from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.models.base import Predictor
-from odeform.models.odeform.inference import LatentTrajectory
+from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load
 from odeform.motion.reduced_motion import ReducedMotion

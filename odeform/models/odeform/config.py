@@ -23,11 +23,11 @@ class ModelConfig:
     local_width: int = 128
     decoder_widths: tuple[int, ...] = (512,)
     clock: float = 0.1
-    """Seconds after which the clock of the decoders, which runs from -1 to 1 and ever slower, is halfway."""
+    """Seconds after which the clock of the decoders, which slows down from -1 towards 1, is halfway."""
     components: int = 16
-    """Principal components of what a decoder sees, of which its random features are made."""
+    """Principal components of a decoder's inputs, on which its random features are built."""
     random_features: int = 0
-    """Of each decoder; they are added when the rest is trained."""
+    """Number per decoder; they are added when the rest is trained."""
 
     @property
     def state(self) -> int:
@@ -37,24 +37,30 @@ class ModelConfig:
     def branches(self) -> tuple[str, ...]:
         return ("rigid", "local") if self.rigid else ("local",)
 
+    @property
+    def states(self) -> list[slice]:
+        """The part of the latent state that belongs to each branch."""
+        split = self.rigid_latent
+        return [slice(0, split), slice(split, None)] if self.rigid else [slice(0, None)]
+
     def latent(self, branch: str) -> int:
         return self.rigid_latent if branch == "rigid" else self.local_latent
 
     def sizes(self, branch: str) -> dict[str, list[int]]:
-        """Widths of the layers of each part of a branch, inputs first. Decoders are told the clock besides."""
+        """Layer widths of each part of a branch, inputs first. Decoders are conditioned on a clock as well."""
         rigid = branch == "rigid"
         latent, outputs = self.latent(branch), POSE if rigid else self.modes
-        seen = (self.rigid_latent if rigid else self.state) + self.parameters
+        inputs = (self.rigid_latent if rigid else self.state) + self.parameters
         width = self.rigid_width if rigid else self.local_width
-        told = 1 + self.parameters
+        conditions = 1 + self.parameters
         return {
             "encoder.points": [3, self.point_width, self.point_width],
             "encoder.head": [self.point_width + self.parameters, self.encoder_width, self.encoder_width, latent],
-            "field": [seen, width, width, latent],
-            "decoder.hidden": [latent + told, *self.decoder_widths],
+            "field": [inputs, width, width, latent],
+            "decoder.hidden": [latent + conditions, *self.decoder_widths],
             "decoder.random": [
-                latent + self.decoder_widths[-1] + told,
-                self.components + told,
+                latent + self.decoder_widths[-1] + conditions,
+                self.components + conditions,
                 self.random_features,
             ],
             "decoder.readout": [latent + self.decoder_widths[-1] + self.random_features, outputs],

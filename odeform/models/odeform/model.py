@@ -9,31 +9,26 @@ from odeform.checkpoint import Checkpoint
 from odeform.models.continuation import ContinuedTrajectory, Dynamics
 from odeform.models.frontier import FrontierPoint
 from odeform.models.odeform.config import ModelConfig
-from odeform.models.odeform.inference import (
-    Decoder,
-    Field,
-    LatentTrajectory,
-    check_weights,
-    make_decoder,
-    make_encoder,
-    make_field,
-    pool_shape,
-)
+from odeform.models.odeform.inference import Decoder, Field, make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.odeform.sensitivity import Sensitivities, make_sensitivities
+from odeform.models.odeform.weights import check_weights
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.recent import Recent
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
 
-__all__ = ["ODeform"]
+__all__ = ["PREFIX", "ODeform"]
 
 PREFIX = "net."
+"""Of the network's arrays in a checkpoint."""
 
 
 class ODeform(ReducedModel):
-    """Latent neural ODEs for pose and deformation (the paper's model, one state per object)."""
+    """Latent neural ODEs for pose and deformation (the paper's model, one latent state per object)."""
 
     model = "odeform"
 
@@ -43,22 +38,21 @@ class ODeform(ReducedModel):
         self.config = ModelConfig(**{**network, "decoder_widths": tuple(network["decoder_widths"])})
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
-        self.qualities = {name: SolverSettings(**setting) for name, setting in checkpoint.config["qualities"].items()}
+        self.qualities = {name: SolverSettings(**values) for name, values in checkpoint.config["qualities"].items()}
         self.frontier = tuple(FrontierPoint.from_json(row) for row in checkpoint.config.get("frontier", ()))
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         coordinates = POSE + self.config.modes
         self.dynamics = Dynamics.from_arrays(checkpoint.arrays, coordinates, self.config.parameters)
-        self._pooled: tuple[EvaluatedBasis | None, list[Floats]] = (None, [])
+        self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
     def _pool(self, evaluated: EvaluatedBasis) -> list[Floats]:
-        known, pooled = self._pooled
-        if known is not evaluated:
+        def pooled() -> tuple[EvaluatedBasis, list[Floats]]:
             points = evaluated.rest.astype(float) / self.space.gyration_radius
-            pooled = pool_shape(self.weights, self.config, points, evaluated.shares)
-            self._pooled = (evaluated, pooled)
-        return pooled
+            return evaluated, pool_shape(self.weights, self.config, points, evaluated.shares)
+
+        return self._pooled.get(id(evaluated), pooled)[1]
 
     def _trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -71,20 +65,21 @@ class ODeform(ReducedModel):
         return ContinuedTrajectory(solved, self.dynamics, theta, window)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
-        """The initial value problem of parameters in [-1, 1]: field, state at time 0, and the decoder of states."""
+        """The initial value problem for theta (P,) in [-1, 1]: the field dz/dt = f(t, z), the state at time 0, and the
+        decoder of states."""
         return self._fields[dtype](theta), self._encode(self._pool(evaluated), theta, dtype), self._decoder(theta)
 
     def integrate(
         self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float
     ) -> LatentTrajectory:
-        """The solved latent motion for parameters in [-1, 1]."""
+        """The latent motion for theta (P,) in [-1, 1], solved to `until` seconds."""
         field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
         fallback = SolverSettings("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
         return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius)
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Float[np.ndarray, "jet times y"]:
         """(1 + P, T, 6 + K): the motion y of the trained body under theta (P,) in [-1, 1] at (T,) seconds, and its
-        derivatives by each parameter. Not of what is continued beyond the window."""
+        derivatives by each parameter. It does not include what continues the motion beyond the window."""
         body = self.evaluate_basis(self.rest, 0.0)
         return self._sensitivities(self._pool(body), theta, quality, self.schema.window.soft_clamped(times))
 

@@ -1,8 +1,8 @@
 """How a predicted motion changes with its parameters: exact derivatives, carried forward through the ODE.
 
-For two to four parameters and 64 numbers of state the variational equations dS/dt = (df/dz) S + df/dtheta (Hairer,
-Norsett & Wanner, Solving ODEs I, I.14) are the cheap direction: they are solved with the state, by the same solver and
-under the same step control, and a product with 1 + P columns costs hardly more than one with a single column.
+For two to four parameters and a state of 64 numbers, forward sensitivities are the cheap direction: the variational
+equations dS/dt = (df/dz) S + df/dtheta (Hairer, Norsett & Wanner, Solving ODEs I, I.14) are solved with the state, by
+the same solver and step control, and a product with 1 + P columns costs hardly more than one with a single column.
 
 A jet (1 + P, ..., n) holds values first and then their derivatives by each of P parameters.
 """
@@ -13,15 +13,16 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import expit
 
+from odeform.models.layers import Layers, read_layers
 from odeform.models.odeform.config import ModelConfig
-from odeform.models.odeform.inference import Field, field_layers, layers_of
+from odeform.models.odeform.weights import branch_decoders, encoder_statistics, field_layers
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.method import Field
 from odeform.types import Arrays, Floats, Times
 
 __all__ = ["Sensitivities", "make_sensitivities"]
 
-Layers = list[tuple[Floats, Floats]]
 Sensitivities = Callable[[list[Floats], Floats, SolverSettings, Times], Float[np.ndarray, "jet times y"]]
 
 
@@ -46,20 +47,20 @@ def _tanh(x: Floats) -> Floats:
 
 
 def _mlp(layers: Layers, x: Floats, smooth: bool = True) -> Floats:
-    """Layers with SiLU between them, or, unless `smooth`, with nothing."""
+    """Layers with SiLU between them; with nothing between them unless `smooth`."""
     for layer in layers[:-1]:
         x = _affine(layer, x)
         x = _silu(x) if smooth else x
     return _affine(layers[-1], x)
 
 
-def _of_parameters(theta: Floats) -> Floats:
+def _parameter_jet(theta: Floats) -> Floats:
     """(P,) -> its jet (1 + P, P)."""
     return np.concatenate([theta[None], np.eye(len(theta))])
 
 
 def _constant(values: Floats, like: Floats) -> Floats:
-    """The jet of what does not depend on the parameters."""
+    """The jet of values that do not depend on the parameters."""
     out = np.zeros((len(like), *values.shape))
     out[0] = values
     return out
@@ -73,10 +74,10 @@ def _make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[
     (first, middle, last), (second_bias, last_bias) = matrices, (other.astype(dtype) for other in others)
 
     def fold(theta: Floats) -> Field:
-        told = _affine((layers.told, bias), theta).astype(dtype)
+        conditions = _affine((layers.conditioning, bias), theta).astype(dtype)
 
         def field(_: float, flat: Floats) -> Floats:
-            x = _tanh(flat.reshape(len(theta), -1) @ first + told) @ middle
+            x = _tanh(flat.reshape(len(theta), -1) @ first + conditions) @ middle
             x[0] += second_bias
             out = _tanh(x) @ last
             out[0] += last_bias
@@ -89,12 +90,8 @@ def _make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[
 
 def _make_encoder(weights: Arrays, config: ModelConfig) -> Callable[[list[Floats], Floats], Floats]:
     """(pooled shape features, jet of theta) -> jet of the state at time 0."""
-
-    def statistic(branch: str, name: str) -> Floats:
-        return weights[f"{branch}_encoder.pooled_{name}"].astype(float)
-
-    scales = [(statistic(branch, "mean"), statistic(branch, "gain")) for branch in config.branches]
-    heads = [layers_of(weights, f"{branch}_encoder.head", np.float64) for branch in config.branches]
+    scales = encoder_statistics(weights, config)
+    heads = [read_layers(weights, f"{branch}_encoder.head", np.float64) for branch in config.branches]
 
     def encode(pooled: list[Floats], theta: Floats) -> Floats:
         parts = [
@@ -108,23 +105,19 @@ def _make_encoder(weights: Arrays, config: ModelConfig) -> Callable[[list[Floats
 
 def _make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats, Times, Floats], Floats]:
     """(jet of theta, (T,) seconds, jet of states (1 + P, T, state)) -> jet (1 + P, T, 6 + K), not yet relative."""
-    parts = []
-    for branch in config.branches:
-        place = slice(0, config.rigid_latent) if branch == "rigid" else slice(config.state - config.local_latent, None)
-        nets = [layers_of(weights, f"{branch}_decoder.{part}", np.float64) for part in ("hidden", "random")]
-        parts.append((place, nets, weights[f"{branch}_decoder.readout.weight"].astype(float).T))
+    branches = branch_decoders(weights, config)
     gains = weights["gains"].astype(float)
 
     def decode(theta: Floats, times: Times, states: Floats) -> Floats:
         clock = _constant((2.0 * times / (times + config.clock) - 1.0)[:, None], theta)
-        told = np.concatenate([clock, np.repeat(theta[:, None], len(times), axis=1)], axis=2)
+        conditions = np.concatenate([clock, np.repeat(theta[:, None], len(times), axis=1)], axis=2)
         out = [] if config.rigid else [np.zeros((len(theta), len(times), POSE))]
-        for place, nets, readout in parts:
-            features = states[..., place]
-            for index, net in enumerate(net for net in nets if net):
-                seen = _silu(_mlp(net, np.concatenate([features, told], axis=2), smooth=index == 0))
-                features = np.concatenate([features, seen], axis=2)
-            out.append(features @ readout)
+        for branch in branches:
+            features = states[..., branch.state]
+            for index, network in enumerate(branch.networks):
+                inputs = np.concatenate([features, conditions], axis=2)
+                features = np.concatenate([features, _silu(_mlp(network, inputs, smooth=index == 0))], axis=2)
+            out.append(features @ branch.readout.T)
         return np.concatenate(out, axis=2) * gains
 
     return decode
@@ -133,13 +126,13 @@ def _make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats, Tim
 def make_sensitivities(weights: Arrays, config: ModelConfig) -> Sensitivities:
     """(pooled shape, theta (P,) in [-1, 1], quality, (T,) seconds) -> jet (1 + P, T, 6 + K) of reduced coordinates.
 
-    Not a number from where the integration failed.
+    NaN from where the integration failed.
     """
     encode, decode = _make_encoder(weights, config), _make_decoder(weights, config)
     fields = {name: _make_field(weights, config, getattr(np, name)) for name in ("float32", "float64")}
 
     def solve(pooled: list[Floats], theta: Floats, quality: SolverSettings, times: Times) -> Floats:
-        jet = _of_parameters(theta)
+        jet = _parameter_jet(theta)
         start = encode(pooled, jet).astype(quality.dtype)
         with np.errstate(all="ignore"):
             solution = integrate(fields[quality.dtype](jet), start.ravel(), quality, until=float(times.max()))
