@@ -10,9 +10,9 @@ from odeform.motion.base import SolveStats
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import small_motion
 from odeform.solver.integrate import SolverSettings, integrate
-from odeform.solver.solution import Solution, Status
 from odeform.solver.method import Field
 from odeform.solver.registry import get_method
+from odeform.solver.solution import Solution, Status
 from odeform.types import Floats
 
 __all__ = ["LatentTrajectory"]
