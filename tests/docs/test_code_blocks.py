@@ -5,11 +5,10 @@ import importlib.util
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
-import trimesh
 from blocks import ROOT, Block, blocks_of, pages
 from commands import MAINS, command_lines, parser_of
+from files import make_files
 
 PROGRAMS = {*MAINS, "git", "lint-imports", "mkdocs", "pip", "pre-commit", "pyright", "pytest", "python", "ruff"}
 LANGUAGES = {"bash", "bibtex", "csv", "diff", "json", "python", "text", "toml", "yaml"}
@@ -36,12 +35,11 @@ def run_python(page: Path, slow: bool) -> None:
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A temporary working folder with the files that pages take for granted."""
+def folder(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A temporary working folder; tests that run something find the files there that the page takes for granted."""
     monkeypatch.chdir(tmp_path)
-    scan = trimesh.creation.icosphere(subdivisions=3).apply_scale(np.array([30.0, 20.0, 40.0]))
-    scan.export(tmp_path / "scan.ply")
-    return tmp_path
+    if "_run" in request.node.name:
+        make_files(tmp_path)
 
 
 @pytest.mark.parametrize("page", python_pages(slow=False), ids=lambda p: p.stem)
