@@ -11,6 +11,7 @@ from blocks import ROOT, blocks_of, pages, prose
 from commands import parser_of
 
 from odeform.cli.entry import COMMANDS, Command
+from odeform.models.names import TRAINABLE
 
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 
@@ -77,6 +78,12 @@ def test_the_page_of_commands_has_every_command_and_option():
     expected["odeform-viz"] = options(parser_of("odeform-viz", []))
     for name, its in expected.items():
         assert documented(section(page, name)) == its - {"--help", "--version"}, name
+
+
+def test_the_page_of_baselines_has_every_model():
+    rows = re.findall(r"^\| (`[^|]+`) \|", (ROOT / "docs" / "baselines.md").read_text(), re.MULTILINE)
+    named = {name for row in rows for name in re.findall(r"`([\w-]+)`", row)}
+    assert {"odeform", *named} == set(TRAINABLE)
 
 
 def test_a_block_that_is_never_closed_is_an_error(tmp_path: Path):
