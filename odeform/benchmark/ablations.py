@@ -1,4 +1,4 @@
-"""What else than the solver trades accuracy for speed: the time each saves on a frame, and the error it adds."""
+"""Ways other than the solver to trade accuracy for speed: the time each saves per frame, and the error it adds."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -49,8 +49,8 @@ def with_modes(motion: ReducedMotion, modes: int) -> ReducedMotion:
     return replace(motion, evaluated=evaluated, trajectory=_Shortened(motion.trajectory, modes))
 
 
-def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
-    """(T, M, 3), (M, 3), (N, 3) -> (T, N, 3): points move as the nearest three, by inverse distance."""
+def _interpolated(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
+    """(T, M, 3), (M, 3), (N, 3) m -> (T, N, 3) m: points follow the nearest three, weighted by inverse distance."""
     distance, index = KDTree(coarse_rest).query(rest, k=3)
     share = 1.0 / np.maximum(distance, 1e-9)
     share /= share.sum(axis=1, keepdims=True)
@@ -58,7 +58,7 @@ def _followed(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
 
 
 def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
-    """Rows: the knob, ms for a frame as it is and with the knob, and the RMS error that it adds, in mm."""
+    """One row per ablation: its name as `knob`, ms per frame, ms saved per frame, and added RMS error in mm."""
     shape = round_cloud(POINTS, predictor)
     motion = as_reduced(predictor.solve(shape))
     window = predictor.schema.window
@@ -76,13 +76,13 @@ def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
     for kept in dict.fromkeys(max(modes // share, 1) for share in (2, 4, 8)):
         fewer = with_modes(motion, kept)
         rows.append(row(f"{kept} of {modes} modes", fewer.vertices, fewer.vertices(times)))
-    # without the local branch a frame is a pose, which whoever draws it applies
+    # without deformation a frame is a pose, which the renderer applies
     rigid = with_modes(motion, 0)
-    rows.append(row("no local branch: a pose for a frame", rigid.pose, rigid.vertices(times)))
+    rows.append(row("no deformation: one pose per frame", rigid.pose, rigid.vertices(times)))
     few = round_cloud(POINTS // DECIMATION, predictor)
     decimated = as_reduced(predictor.solve(few))
-    followed = _followed(decimated.vertices(times), few.points, shape.points)
-    rows.append(row(f"a {DECIMATION}th of the points, the others follow", decimated.vertices, followed))
+    interpolated = _interpolated(decimated.vertices(times), few.points, shape.points)
+    rows.append(row(f"1/{DECIMATION} of the points, the others interpolated", decimated.vertices, interpolated))
 
     def halved(time: float | Floats) -> Floats:
         return motion.vertices(time).astype(np.float16)

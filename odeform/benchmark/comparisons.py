@@ -1,4 +1,4 @@
-"""Others at the same task in the same run: learned, classical, another solver, and the simulator itself."""
+"""Other methods at the same task in the same run: learned, classical, another solver, and the simulator itself."""
 
 import itertools
 from typing import Any
@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from odeform.benchmark.equal_error import simulator
-from odeform.benchmark.precision import Place
-from odeform.benchmark.probes import ball, nearest_sequences, round_cloud
+from odeform.benchmark.precision import OperatingPoint
+from odeform.benchmark.probes import nearest_sequences, round_cloud, round_mesh
 from odeform.benchmark.timing import milliseconds, typical
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.index import Dataset
@@ -22,38 +22,39 @@ from odeform.motion.reduced_space import motion_rmse
 from odeform.solver.integrate import integrate
 from odeform.types import Floats, Geometry
 
-__all__ = ["comparisons", "torchdiffeq_peer"]
+__all__ = ["comparisons", "torchdiffeq_comparison"]
 
 FRAMES = 20
 PER_POINT = {2_000: 5, 20_000: 2, 100_000: 1}
-"""Points of the motions, and how often the per-point model is timed on them: it takes most of a minute at the last."""
-CHUNK = 2_000  # points that the per-point model works on at once: its activations then stay in the cache
+"""Number of points, and how often the per-point model is timed on them: the last takes most of a minute."""
+CHUNK = 2_000  # points per call of the per-point model, so that its activations stay in the cache
 POINTS = 5_000
 SEQUENCES = 20  # of the test split, for the errors of other checkpoints
 
 
-def comparisons(predictor: Predictor, dataset: Dataset | None, places: list[Place]) -> dict[str, Any]:
-    """Rows by name: points, frames, ms, speedup of the predictor over it, error in mm (None where there is none).
+def comparisons(
+    predictor: Predictor, dataset: Dataset | None, operating_points: list[OperatingPoint]
+) -> dict[str, Any]:
+    """Rows by name: points, frames, ms, speedup of `predictor` over this method, error in mm (None: not measured).
 
-    A row with `skipped` says why there is no measurement.
+    A row with `skipped` gives the reason for no measurement.
     """
     rows = {f"per-point latent ODE, {points:,} points": _per_point(predictor, points) for points in PER_POINT}
     rows |= _checkpoints(predictor, dataset)
     if isinstance(predictor, ODeform):
-        rows["torchdiffeq, same field"] = torchdiffeq_peer(predictor, places[0])
+        rows["torchdiffeq, same field"] = torchdiffeq_comparison(predictor, operating_points[0])
         rows["mujoco, equal error"] = simulator(predictor, dataset)
     return rows
 
 
 def _motion_ms(predictor: Predictor, shape: Geometry, times: Floats) -> float:
-    """Parameters to all frames; the basis of the shape is cached, timed by itself. Models of points take seconds."""
+    """Milliseconds from parameters to all frames, with the basis of the shape cached. Per-point models take seconds."""
     repeats, warm = (15, 3) if isinstance(predictor, ReducedModel) else (2, 1)
     return typical(lambda _: predictor.solve(shape, until=float(times[-1])).vertices(times), repeats, warm)
 
 
 def _times(predictor: Predictor) -> Floats:
-    """As many frames in a row, at the rate of the data: from the first contact on, which is where a scene begins or
-    its impact does."""
+    """Consecutive frames at the rate of the data, from the first contact: the start of the impact or of the window."""
     schema = predictor.schema
     first = schema.impact[0] if schema.impact else schema.window.start
     return first + np.arange(FRAMES) / schema.window.rate
@@ -77,9 +78,9 @@ def _per_point(predictor: Predictor, points: int) -> dict[str, Any]:
 
 
 def _per_point_ms(points: int, repeats: int) -> float:
-    """The paper's layout, one latent of 128 numbers a point (encoder 64-128-128, field 6 x 256, decoder 128-64).
+    """The paper's layout: a latent of 128 numbers per point (encoder 64-128-128, field 6 x 256, decoder 128-64).
 
-    RK4 with a step a frame, torch, a chunk of points at a time.
+    RK4 in torch with one step per frame, on chunks of points.
     """
     import torch
     from torch import nn
@@ -108,7 +109,7 @@ def _per_point_ms(points: int, repeats: int) -> float:
                 decode(z)
 
     with torch.inference_mode():
-        # the smallest warms up for all
+        # the smallest warms up torch for all
         return typical(run, repeats, warm=1 if points == min(PER_POINT) else 0)
 
 
@@ -121,7 +122,7 @@ def _error_mm(predictor: Predictor, dataset: Dataset | None, count: int) -> floa
 
 def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any]:
     """Every other bundled model of the scene, and this one's own error on the same sequences."""
-    shape, times = ball(POINTS, predictor), _times(predictor)
+    shape, times = round_mesh(POINTS, predictor), _times(predictor)
     ours = _motion_ms(predictor, shape, times)
 
     def row(other: Predictor, ms: float) -> dict[str, Any]:
@@ -138,30 +139,30 @@ def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any
                 rows[model] = {"skipped": str(error)}
                 continue
             if other.schema.needs_observations:
-                rows[model] = {"skipped": "moves between given frames"}
+                rows[model] = {"skipped": "interpolates between given frames"}
                 continue
             if isinstance(other, OdeformPerPoint):
-                rows[model] = {"skipped": "takes minutes; above is its time, by `odeform evaluate` its error"}
+                rows[model] = {"skipped": "takes minutes: its time is above, its error in `odeform evaluate`"}
                 continue
-            taught, physics = (c.provenance.get("fixed") for c in (other.checkpoint, predictor.checkpoint))
-            if taught != physics:
-                rows[model] = {"skipped": "trained on other physics"}
+            trained, physics = (c.provenance.get("fixed") for c in (other.checkpoint, predictor.checkpoint))
+            if trained != physics:
+                rows[model] = {"skipped": "trained on different physics"}
                 continue
             rows[model] = row(other, _motion_ms(other, shape, times))
     return rows
 
 
-def torchdiffeq_peer(model: ODeform, place: Place) -> dict[str, Any]:
-    """The same field, method and step or tolerance, states at the frames of the window."""
+def torchdiffeq_comparison(model: ODeform, point: OperatingPoint) -> dict[str, Any]:
+    """torchdiffeq on the same field, with the same method and step or tolerance, at the frames of the window."""
     try:
         import torch
         import torchdiffeq
     except ModuleNotFoundError as error:
         return {"skipped": f"{error.name} is not installed: pip install 'odeform[dev]'"}
     quality, times = model.qualities["balanced"], model.schema.window.times
-    theta, evaluated = model.schema.vector(place.parameters), model.evaluate_basis(model.rest, 0.0)
+    theta, evaluated = model.schema.vector(point.parameters), model.evaluate_basis(model.rest, 0.0)
     field, start, decode = model.problem(theta, evaluated, np.float32)
-    # its `rk4` is the 3/8 rule, of the same order and cost; without a step it would step on the queries (its #137)
+    # its `rk4` is the 3/8 rule, of the same order and cost; without a step size it steps on the queries (its issue 137)
     options = {} if quality.step is None else {"options": {"step_size": quality.step}}
     tolerance = quality.tolerance or 0.0
     evaluations = 0
@@ -197,6 +198,6 @@ def torchdiffeq_peer(model: ODeform, place: Place) -> dict[str, Any]:
         "ours_ms": ours,
         "speedup": theirs / ours,
         "evaluations": taken,
-        "error_mm": 1e3 * motion_rmse(reduced[1:], place.exact[1:], model.space.gyration_radius),
+        "error_mm": 1e3 * motion_rmse(reduced[1:], point.exact[1:], model.space.gyration_radius),
         "note": f"{quality.method}, error is the solver's",
     }

@@ -1,4 +1,4 @@
-"""The simulator itself at the model's error: the comparison that learned simulators avoid (McGreivy & Hakim 2024)."""
+"""The simulator at the model's error: the comparison that learned simulators often omit (McGreivy & Hakim 2024)."""
 
 import time
 from typing import Any
@@ -26,9 +26,10 @@ STEPS = (1.0, 2.0, 4.0)
 
 
 def carried_over(coarse: MotionSequence, truth: MotionSequence, anchor: Floats, azimuth: float) -> Frames:
-    """(T, N, 3) the motion of a coarser mesh at the vertices of a finer one at rest.
+    """Transfer the motion of a coarse mesh to the rest vertices of a finer one; (T, N, 3) m.
 
-    The rigid motion is that of the coarse mesh, its deformation the smoothest field through its vertices.
+    `anchor` is (3,) m. The rigid part is that of the coarse mesh, the deformation is the smoothest field through its
+    vertices.
     """
     pose, local = decompose(coarse, anchor, azimuth)
     rest = to_canonical(truth.vertices[0], anchor, azimuth)
@@ -40,12 +41,12 @@ def carried_over(coarse: MotionSequence, truth: MotionSequence, anchor: Floats, 
 
 
 def _on_frames(recorded: MotionSequence, window: Window) -> MotionSequence:
-    """Test sequences have more frames than those trained on."""
+    """The frames of the window: test sequences have more."""
     return recorded.until(window.stop, round(1.0 / (window.rate * (recorded.times[1] - recorded.times[0]))))
 
 
 def _model_ms(model: ODeform, truth: MotionSequence) -> float:
-    """Parameters to all frames at the vertices of the truth."""
+    """Milliseconds from parameters to all frames at the vertices of the truth."""
     times = model.schema.window.times
     return typical(lambda _: model.solve(truth.rest, truth.parameters).vertices(times), 15)
 
@@ -81,18 +82,18 @@ def _attempt(
 
 
 def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
-    """MuJoCo at the cheapest setting whose error against the scene's declared truth is at most the model's.
+    """The simulator at the cheapest setting whose error against the truth is at most the model's.
 
-    The first setting is that of the truth: its error is what packing and another processor leave. `pays_off_after` are
-    the queries after which simulating the data set and training have cost less than simulating each query so.
+    The first setting is that of the truth: its error comes from packing and from other processors. `pays_off_after` is
+    the number of queries after which simulating the data set and training cost less than simulating every query.
     """
     if dataset is None:
-        return {"skipped": f"no data set of scene {model.schema.scene} at hand: --data"}
+        return {"skipped": f"no data set of scene {model.schema.scene}: give one with --data"}
     scene, window = find_scene(model.schema.scene), model.schema.window
     if scene is None:
         return {"skipped": f"scene {model.schema.scene} cannot be simulated"}
     if scene.fixed != dataset.fixed:
-        return {"skipped": "the data set is of other physics than this version simulates"}
+        return {"skipped": "the data set has other physics than this version simulates"}
     near = nearest_sequences(dataset, model.schema.complete(None), SIMULATED)
     truths = [_on_frames(recorded, window) for recorded in near.sequences("test")]
     model_error = evaluate(model, near, "test")["rmse_pooled_mm"]
@@ -101,9 +102,9 @@ def simulator(model: ODeform, dataset: Dataset | None) -> dict[str, Any]:
     enough = [row for row in tried if row.get("error_mm", np.inf) <= model_error]
     equal, truth = min(enough, key=lambda row: row["ms"], default=tried[0]), tried[0]
     if "failed" in truth:
-        return {"skipped": f"the scene's own setting fails here: {truth['failed']}"}
+        return {"skipped": f"the simulation fails at the scene's own setting: {truth['failed']}"}
     ours = float(np.mean([_model_ms(model, t) for t in truths]))
-    # in ms: the data set, and the training on it
+    # ms for the data set and the training on it
     spent = len(dataset.entries) * truth["ms"] + 1e3 * model.checkpoint.provenance["training_seconds"]
     return {
         "points": truths[0].vertices.shape[1],

@@ -1,4 +1,4 @@
-"""What measurements are made on: round shapes of any size, places in the box of parameters, sequences near them."""
+"""Inputs of measurements: round shapes with any number of points, parameter sets, and sequences near them."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,11 +11,11 @@ from odeform.models.base import Predictor
 from odeform.schema import Parameters
 from odeform.types import GaussianSplats, Mesh, PointCloud, Points
 
-__all__ = ["ball", "nearest_sequences", "random_parameters", "round_cloud", "round_splats"]
+__all__ = ["nearest_sequences", "random_parameters", "round_cloud", "round_mesh", "round_splats"]
 
 
 def _round(points: int, predictor: Predictor) -> tuple[Points, Points]:
-    """That many points spread over a sphere where the predictor expects its body, and their unit normals."""
+    """`points` points on a sphere where the body of the predictor rests, in m, and their unit normals; (N, 3) each."""
     rest = np.asarray(predictor.rest.points, dtype=float)
     centre, radius = 0.5 * (rest.min(axis=0) + rest.max(axis=0)), 0.5 * np.ptp(rest, axis=0).max()
     index = np.arange(points) + 0.5
@@ -24,19 +24,19 @@ def _round(points: int, predictor: Predictor) -> tuple[Points, Points]:
     return (centre + radius * unit).astype(np.float32), unit
 
 
-def ball(points: int, predictor: Predictor) -> Mesh:
-    """A round mesh of exactly that many points where the predictor expects its body."""
+def round_mesh(points: int, predictor: Predictor) -> Mesh:
+    """A round mesh of exactly `points` points, in m, where the body of the predictor rests."""
     where, unit = _round(points, predictor)
     return Mesh(where, np.asarray(trimesh.convex.convex_hull(unit).faces))
 
 
 def round_cloud(points: int, predictor: Predictor) -> PointCloud:
-    """The points of `ball` alone."""
+    """The points of `round_mesh` alone."""
     return PointCloud(_round(points, predictor)[0])
 
 
 def round_splats(points: int, predictor: Predictor) -> GaussianSplats:
-    """Round splats of a size that covers the ball, at the points of `ball`."""
+    """Round splats at the points of `round_mesh`, large enough to cover the surface."""
     where, _ = _round(points, predictor)
     area = 4.0 * np.pi * (0.5 * np.ptp(where, axis=0).max()) ** 2 / points
     covariances = np.broadcast_to(area * np.eye(3), (points, 3, 3))
@@ -44,7 +44,7 @@ def round_splats(points: int, predictor: Predictor) -> GaussianSplats:
 
 
 def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[Parameters]:
-    """Drawn over the trained box, one heading for all: the basis depends on the heading and is timed by itself."""
+    """Random parameter sets of the trained box, with one heading: the basis depends on it and is timed separately."""
     rng = np.random.default_rng(seed)
     fixed = {p.name: p.default for p in predictor.schema.parameters if p.role == "azimuth"}
     learned = predictor.schema.learned
@@ -52,8 +52,8 @@ def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[P
 
 
 def nearest_sequences(dataset: Dataset, parameters: Any, count: int) -> Dataset:
-    """The `count` test sequences with parameters nearest to these, each by its trained range."""
+    """The `count` test sequences nearest to these parameters, in units of the trained ranges."""
     schema = dataset.schema
-    wanted = schema.vector(parameters)
-    near = sorted(dataset.select("test"), key=lambda e: float(((schema.vector(e.parameters) - wanted) ** 2).sum()))
+    target = schema.vector(parameters)
+    near = sorted(dataset.select("test"), key=lambda e: float(((schema.vector(e.parameters) - target) ** 2).sum()))
     return replace(dataset, entries=tuple(near[:count]))

@@ -1,4 +1,4 @@
-"""What this machine can do at most, and what share of it decoding reaches."""
+"""Roofline: the peak arithmetic and memory rates of this machine, and the share of them that decoding reaches."""
 
 import os
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import evaluate_basis
 from odeform.motion.reduced_motion import as_reduced
 
-__all__ = ["least_ms", "limits", "scaling"]
+__all__ = ["least_ms", "roofline", "scaling"]
 
-SIDE = 2048  # of the matrices that are multiplied
-BYTES = 256 << 20  # that are copied
+SIDE = 2048  # rows and columns of the multiplied matrices
+BYTES = 256 << 20  # copied at a time
 THREADS = os.cpu_count() or 1
 POINTS = 100_000
 FRAMES = 20
 
 
 def gemm_gflops() -> float:
-    """Best of five products of square matrices, single precision."""
+    """Best of five products of square matrices in single precision, in GFLOP/s."""
     rng = np.random.default_rng(0)
     a, b = rng.normal(size=(2, SIDE, SIDE)).astype(np.float32)
     out = np.empty_like(a)
@@ -32,7 +32,7 @@ def gemm_gflops() -> float:
 
 
 def memory_gb_s() -> float:
-    """Best of five copies, read and written bytes counted, on all threads."""
+    """Best of five copies on all threads, in GB/s, counting read and written bytes."""
     source, target = np.ones((2, BYTES // 4), dtype=np.float32)
     parts = [slice(i * len(source) // THREADS, (i + 1) * len(source) // THREADS) for i in range(THREADS)]
     with ThreadPoolExecutor(THREADS) as pool:
@@ -43,10 +43,10 @@ def memory_gb_s() -> float:
 
 
 def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -> float:
-    """What decoding takes where either arithmetic or memory is all that counts, whichever binds.
+    """Lower bound on the ms of decoding, by arithmetic or by memory, whichever is larger.
 
-    A frame reads the modes, the points at rest and those it adds them to, and writes the result; frames that are
-    decoded together read all that once.
+    A frame reads the modes, the rest points and the points that they are added to, and writes the result; frames that
+    are decoded together read the inputs once.
     """
     read = 4.0 * points * (3 * modes + 4 + 3)
     written = 4.0 * points * 3 * frames
@@ -54,10 +54,10 @@ def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -
     return max((read + written) / gb_s, operations / gflops) / 1e6
 
 
-def limits(predictor: ReducedModel) -> dict[str, Any]:
-    """Rates of this machine, and the share of them at which points are decoded, a frame or `FRAMES` at once.
+def roofline(predictor: ReducedModel) -> dict[str, Any]:
+    """Rates of this machine, and the share of them that decoding reaches, for one frame or `FRAMES` at once.
 
-    From coordinates to points: a motion keeps the coordinates of the moments that it was asked for last.
+    Decoding is timed from reduced coordinates to points: a motion caches the coordinates of the last times.
     """
     gflops, gb_s = gemm_gflops(), memory_gb_s()
     motion = as_reduced(predictor.solve(round_cloud(POINTS, predictor)))
@@ -78,7 +78,7 @@ def limits(predictor: ReducedModel) -> dict[str, Any]:
 
 
 def scaling(predictor: ReducedModel, sizes: Sequence[int]) -> list[dict[str, Any]]:
-    """Solve, basis, and decode of one frame from its coordinates, over the number of points."""
+    """Times in ms over the number of points: solving, evaluating the basis, decoding one frame from its coordinates."""
     window = predictor.schema.window
     moment = 0.5 * (window.start + window.stop)
     rows = []

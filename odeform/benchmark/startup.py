@@ -1,4 +1,4 @@
-"""How long a new process takes before there is anything to see."""
+"""Start-up time of a new process."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ REPEATS = 3
 def startup(checkpoint: str) -> dict[str, float]:
     """Seconds from the start of a process to the end of `import odeform`, and of `odeform predict` with one frame.
 
-    The best of a few, so that files are in the page cache, as where one works.
+    The best of a few, so that files are in the page cache.
     """
     with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
         predict = [checkpoint, "--times", "0:0.001:0.001", "--out", str(Path(folder) / "frame.npz")]

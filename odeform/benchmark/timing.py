@@ -12,7 +12,7 @@ __all__ = ["as_viewed", "milliseconds", "quantiles", "typical"]
 
 
 def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> Floats:
-    """(repeats,) ms that `work(index)` takes, after `warm` runs that do not count."""
+    """(repeats,) ms that `work(index)` takes, after `warm` warm-up runs."""
     for index in range(warm):
         work(index)
     out = np.empty(repeats)
@@ -24,6 +24,7 @@ def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> 
 
 
 def quantiles(samples: Floats) -> dict[str, float]:
+    """Median and 95th percentile."""
     return {"p50": float(np.percentile(samples, 50)), "p95": float(np.percentile(samples, 95))}
 
 
@@ -33,6 +34,6 @@ def typical(work: Callable[[int], object], repeats: int, warm: int = 3) -> float
 
 
 def as_viewed() -> threadpool_limits:
-    """Products on one thread each, as in the viewer: two that wait for each other stand still while any other program
-    has a core, and measure that."""
+    """Limit matrix products to one thread, as in the viewer. Threads that wait for each other would otherwise measure
+    the load of other programs."""
     return threadpool_limits(1, "blas")

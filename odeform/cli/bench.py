@@ -16,7 +16,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    from odeform.benchmark.bench import bench, report
+    from odeform.benchmark.bench import bench
+    from odeform.benchmark.report import report
 
     result = bench(args.checkpoint, args.data)
     write_json(result, args.json)

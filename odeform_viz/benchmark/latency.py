@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from odeform.benchmark.probes import ball, round_splats
+from odeform.benchmark.probes import round_mesh, round_splats
 from odeform.models.base import Predictor
 from odeform.types import Floats
 from odeform_viz.app import App
@@ -22,13 +22,13 @@ SPLATS = 100_000
 
 
 def drag(models: list[Predictor], truth: Column | None, messages: int, points: int) -> dict[str, float]:
-    """Latency of dragging the first slider, with all models on a ball of `points`, and the truth if given.
+    """Latency of dragging the first slider, with all models on a round_mesh of `points`, and the truth if given.
 
     The answers are the vertices of the last column, which are sent last. Every message asks for another value, so an
     answer tells which message it serves.
     """
     model = models[-1]
-    shape = ball(points, model)
+    shape = round_mesh(points, model)
     slider = model.schema.parameters[0]
     values, moment = np.linspace(slider.low, slider.high, messages), 0.3 if model.schema.impact else 0.02
     columns = [Column(m.model, m, shape) for m in models]

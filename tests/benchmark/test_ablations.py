@@ -7,7 +7,7 @@ from odeform.models.base import Predictor
 TIMES = np.array([0.0, 0.03, 0.4])
 
 
-def test_all_modes_are_the_motion_and_none_its_rigid_part(predictors: dict[str, Predictor]) -> None:
+def test_all_modes_give_the_motion_and_none_its_rigid_part(predictors: dict[str, Predictor]) -> None:
     motion = predictors["odeform"].solve()
     modes = len(motion.evaluated.values)
     assert np.array_equal(with_modes(motion, modes).vertices(TIMES), motion.vertices(TIMES))
@@ -17,7 +17,7 @@ def test_all_modes_are_the_motion_and_none_its_rigid_part(predictors: dict[str, 
 
 
 @pytest.mark.parametrize("kept", [0, 1, 3])
-def test_what_is_left_out_is_what_is_missing(predictors: dict[str, Predictor], kept: int) -> None:
+def test_removed_modes_are_what_is_missing(predictors: dict[str, Predictor], kept: int) -> None:
     motion = predictors["odeform"].solve()
     y = motion.trajectory.reduced(TIMES)
     values = motion.evaluated.values[kept:].reshape(-1, len(motion.evaluated.points), 3)

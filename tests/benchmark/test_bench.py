@@ -13,7 +13,7 @@ full_ladder, full_load = precision.ladder, comparisons.load
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
-    """The whole of it, on next to nothing."""
+    """The whole benchmark on tiny problems."""
     for module, name, value in (
         (precision, "REPEATS", 1),
         (precision, "SEQUENCES", 1),
@@ -47,12 +47,12 @@ def test_bench(
     arguments = ["bench", str(trained["odeform"]), "--data", str(dataset.root), "--json", str(out)]
     assert main(arguments) == 0
     text, result = capsys.readouterr().out, json.loads(out.read_text())
-    wanted = {"evaluations", "ms_p50", "ms_p95", "solver_error_mm", "model_error_mm", "solver", "dtype", "at"}
+    columns = {"evaluations", "ms_p50", "ms_p95", "solver_error_mm", "model_error_mm", "solver", "dtype", "at"}
     for row in result["work_precision"] + list(result["qualities"].values()):
-        assert wanted < set(row)
+        assert columns < set(row)
         assert ("step" in row) != ("tolerance" in row)
     assert {(row["at"], row["dtype"]) for row in result["work_precision"]} == {
-        (place, dtype) for place in ("default", "corner") for dtype in ("float32", "float64")
+        (point, dtype) for point in ("default", "corner") for dtype in ("float32", "float64")
     }
     assert all(result["startup"][key] > 0.0 for key in ("import_s", "predict_s"))
     assert list(result["qualities"]) == ["draft", "balanced", "reference"]
@@ -72,12 +72,12 @@ def test_bench(
     assert result["peers"]["this model"]["error_mm"] > 0.0
     assert {"gemm_gflops", "memory_gb_s", "decode_share_of_limit"} < set(result["limits"])
     assert "mujoco, equal error: skipped, no time" in text
-    for word in ("bosh3", "frontier", "pod-rbf", "no local branch", "decode_share_of_limit"):
+    for word in ("bosh3", "frontier", "pod-rbf", "no deformation", "decode_share_of_limit"):
         assert word in text
 
 
 @pytest.mark.usefixtures("small")
-def test_rivals_that_are_not_timed_are_named(
+def test_models_that_are_not_timed_are_named(
     monkeypatch: pytest.MonkeyPatch, predictors: dict[str, Predictor], point_models: dict[str, Path]
 ) -> None:
     paths = {f"kick/{model}": point_models[model] for model in ("occupancy-flow", "odeform-per-point")}

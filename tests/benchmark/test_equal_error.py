@@ -15,7 +15,7 @@ def model(predictors: dict[str, Predictor]) -> ODeform:
     return cast(ODeform, predictors["odeform"])
 
 
-def test_a_motion_carried_to_its_own_mesh_is_itself(dataset: Dataset, model: ODeform) -> None:
+def test_a_motion_transferred_to_its_own_mesh_is_unchanged(dataset: Dataset, model: ODeform) -> None:
     sequence = next(dataset.sequences("val")).until(0.3)
     azimuth = model.schema.azimuth(sequence.parameters)
     carried = equal_error.carried_over(sequence, sequence, model.space.anchor, azimuth)
@@ -24,7 +24,9 @@ def test_a_motion_carried_to_its_own_mesh_is_itself(dataset: Dataset, model: ODe
 
 
 @pytest.mark.usefixtures("coarse")
-def test_a_coarser_simulation_is_off_by_more(dataset: Dataset, model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_coarser_simulation_has_a_larger_error(
+    dataset: Dataset, model: ODeform, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The fixture's scene has 4 segments and steps of 2 ms; its data set is the truth of that setting."""
     scene = get_scene("kick")
     monkeypatch.setattr(equal_error, "SIMULATED", 1)
@@ -40,5 +42,5 @@ def test_a_coarser_simulation_is_off_by_more(dataset: Dataset, model: ODeform, m
     assert row["pays_off_after"] * (row["ms"] - row["ours_ms"]) >= spent
 
 
-def test_what_is_missing_is_said(model: ODeform) -> None:
+def test_a_missing_data_set_is_the_reason_for_skipping(model: ODeform) -> None:
     assert "--data" in equal_error.simulator(model, None)["skipped"]
