@@ -13,7 +13,6 @@ from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
-from odeform_viz.recording.provenance import versions
 from odeform_viz.recording.replay import TOLERANCE, replay
 
 __all__ = ["main", "make_columns"]
@@ -64,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         "parameters. CKPT is a path or the name of a bundled checkpoint, SCENE or SCENE/MODEL.",
         epilog="Exit codes: 0 success; 1 internal error, or a replay that differs; 2 invalid input.",
     )
-    parser.add_argument("--version", action="version", version=f"odeform-viz {versions()['odeform']}")
+    parser.add_argument("--version", action="version", version=f"odeform-viz {odeform.__version__}")
     show = parser.add_argument_group("what to show")
     show.add_argument("--checkpoint", default="kick", metavar="CKPT", help="the model (default: kick)")
     show.add_argument("--compare", nargs="+", default=[], metavar="CKPT", help="more models of the scene, side by side")

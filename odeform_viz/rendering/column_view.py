@@ -62,9 +62,14 @@ class ColumnView:
         self._lane.remove()
 
     def show(
-        self, frame: ColumnFrame, lane: float, opacity: float | None, truth: ColumnFrame | None, scale_mm: float | None
+        self,
+        frame: ColumnFrame,
+        lane: float,
+        opacity: float | None,
+        truth: ColumnFrame | None,
+        error_scale: float | None,
     ) -> None:
-        """Show one moment at `lane`, metres along y. Errors are colored on a scale up to `scale_mm` mm, if given."""
+        """Show one moment at `lane`, metres along y. Errors are colored on a scale up to `error_scale` mm, if given."""
         self._lane.visible = True
         self._lane.position = (0.0, lane, 0.0)
         # invisible rotations are dropped, so that a body that falls without rotating sends a position only
@@ -73,8 +78,8 @@ class ColumnView:
         self._body.position = frame.pose[:3, 3]
         self._shape.fade(opacity)
         points = self._rest if frame.points is None else frame.points
-        if scale_mm is not None and frame.error is not None and truth is not None:
-            self._shape.paint(points, self._interpolate(truth, 1e3 * frame.error.distances), scale_mm)
+        if error_scale is not None and frame.error is not None and truth is not None:
+            self._shape.paint(points, self._interpolate(truth, 1e3 * frame.error.distances), error_scale)
             self._undeformed = False
         elif frame.points is not None or not self._undeformed:
             self._shape.move(points, frame.covariances)

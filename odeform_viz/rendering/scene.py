@@ -24,10 +24,10 @@ class SceneView:
         self._views: dict[int, tuple[Column, ColumnView]] = {}
         self._stage = Stage(server, extent, columns)
 
-    def publish(self, frame: Frame, options: DisplayOptions, scale_mm: float | None) -> None:
+    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
         """Send one frame; clients never see it half. Paths and arrows follow it.
 
-        Errors against the truth are colored on a scale up to `scale_mm` mm, if given.
+        Errors against the truth are colored on a scale up to `error_scale` mm, if given.
         """
         with self._server.atomic():
             self._update_views(frame)
@@ -38,7 +38,7 @@ class SceneView:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
                 # from left to right as seen from the initial camera
                 lane = 0.0 if options.overlay else SPACING * self._extent * (0.5 * (len(row) - 1) - index)
-                view.show(shown, lane, OVERLAID if options.overlay and index else None, frame.truth, scale_mm)
+                view.show(shown, lane, OVERLAID if options.overlay and index else None, frame.truth, error_scale)
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, lane)
                 view.title(title_of(shown) if several and not options.overlay else None, shown)

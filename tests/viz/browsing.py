@@ -1,10 +1,7 @@
 """A page in headless Chromium with software WebGL, driven as its users drive it."""
 
 import io
-import os
 import re
-import shutil
-import socket
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -16,20 +13,10 @@ from playwright.sync_api import Locator, Page, sync_playwright
 
 from odeform_viz.app import App
 from odeform_viz.columns import Column
+from odeform_viz.screenshots import CHROMIUM, FLAGS
 
 __all__ = ["Tab", "needs_chromium", "open_tab", "until"]
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
 VIEW = {"width": 800, "height": 480}
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium on the PATH (Debian: chromium)")
@@ -98,10 +85,7 @@ def until(holds: Callable[[], bool], seconds: float = 10.0) -> bool:
 
 def open_tab(*columns: Column) -> Iterator[Tab]:
     """A tab with these columns, for a fixture to yield from."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    app = App(columns, port=port)
+    app = App(columns, port=0)
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)

@@ -1,0 +1,250 @@
+"""The pictures of the documentation, taken from the page itself: `python -m odeform_viz.screenshots`.
+
+Needs playwright (of the development dependencies) and Chromium on the PATH, or in the environment variable CHROMIUM.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from odeform.cli import run_guarded
+from odeform.dataset.store import open_dataset
+from odeform.errors import InputError
+from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.cli import make_columns
+from odeform_viz.columns import Column, truth_column
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+__all__ = ["CHROMIUM", "FLAGS", "View", "take"]
+
+CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+DEADLINE = 300.0  # s, for a busy machine and a browser that renders in software
+SIZE, FILM_SIZE, FILM_WIDTH = (1440, 900), (1280, 720), 880  # px
+MOST_BYTES = 120_000  # of a picture
+FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
+FILM = (
+    # parameters, and the times to show with them
+    ({"force (N)": 110.0}, np.linspace(0.0, 0.9, 24)),
+    ({"force (N)": 150.0, "elevation (rad)": 0.75}, np.linspace(0.0, 0.9, 24)),
+)
+
+
+@dataclass(frozen=True)
+class View:
+    """A page in a browser, the app that serves it, and a client that sets its controls."""
+
+    app: App
+    page: Page
+    client: LoopbackClient
+
+    def tab(self, name: str) -> None:
+        """Turn to a tab."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def set(self, label: str, value: object) -> None:
+        """Set a control."""
+        self.client.set(label, value)
+
+    def show(self, moment: float) -> None:
+        """Pause at `moment` in s, and wait for its frame."""
+        self.client.set("time (s)", moment)
+        self.wait(lambda: (f := self.app.presenter.frame) is not None and f.request.time == moment and not f.pending)
+
+    def wait(self, holds: Callable[[], bool]) -> None:
+        """Wait for a condition. `TimeoutError` if it does not come to hold."""
+        if not self.client.until(holds, DEADLINE):
+            raise TimeoutError(f"the page did not get there within {DEADLINE:g} s")
+
+    def picture(self) -> Image.Image:
+        """The page once two pictures in a row agree."""
+        end, last = time.monotonic() + DEADLINE, self._shot()
+        while time.monotonic() < end:
+            self.client.collect(0.3)
+            current = self._shot()
+            if np.abs(np.asarray(current, dtype=int) - np.asarray(last, dtype=int)).max() < 8:
+                return current
+            last = current
+        raise TimeoutError(f"the page kept changing for {DEADLINE:g} s")
+
+    def _shot(self) -> Image.Image:
+        return Image.open(io.BytesIO(self.page.screenshot(timeout=1e3 * DEADLINE))).convert("RGB")
+
+
+def _kick() -> list[Column]:
+    return make_columns("kick", (), None)
+
+
+def _volleyball() -> list[Column]:
+    return make_columns("kick", (), "volleyball")
+
+
+def _drop() -> list[Column]:
+    return make_columns("mass-elastic", (), None)
+
+
+def _rivals() -> list[Column]:
+    sequence = open_dataset("mass-elastic").select("test")[0].name
+    return [*make_columns("mass-elastic", ["mass-elastic/pod-rbf"], None), truth_column(f"mass-elastic/{sequence}")]
+
+
+def _explore(view: View) -> None:
+    view.show(0.012)
+
+
+def _compare(view: View) -> None:
+    view.tab("Compare")
+    view.show(0.3)
+
+
+def _record(view: View) -> None:
+    view.tab("Record")
+    view.show(0.1)
+
+
+def _help(view: View) -> None:
+    view.tab("Help")
+    view.show(0.1)
+
+
+def _stability(view: View) -> None:
+    view.show(0.1)
+    view.tab("Stability")
+    view.client.click("Map stability")
+    view.wait(lambda: not view.client.controls["Map stability"].visible)
+
+
+def _splats(view: View) -> None:
+    view.show(0.012)
+
+
+def _simulate(view: View) -> None:
+    view.tab("Compare")
+    view.show(0.3)
+    view.client.click("Simulate this")
+    view.wait(lambda: any(column.truth for column in view.app.columns.all))
+    view.wait(lambda: (frame := view.app.presenter.frame) is not None and frame.truth is not None)
+
+
+PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] = {
+    "explore": (_kick, _explore),
+    "compare": (_rivals, _compare),
+    "record": (_kick, _record),
+    "help": (_kick, _help),
+    "stability": (_kick, _stability),
+    "splats": (_volleyball, _splats),
+    "simulate": (_drop, _simulate),
+}
+"""Name, columns, and what is done before the picture is taken."""
+
+
+@contextmanager
+def _open(browser: Browser, columns: Sequence[Column], size: tuple[int, int]) -> Iterator[View]:
+    app = App(columns, port=0)
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    try:
+        page.goto(app.url)
+        page.wait_for_selector("canvas", timeout=1e3 * DEADLINE)
+        page.get_by_text("mass (kg)").first.wait_for(timeout=1e3 * DEADLINE)
+        # a notification says that the browser renders in software
+        page.add_style_tag(content=".mantine-Notifications-root { display: none }")
+        with LoopbackClient(app.server.get_port()) as client:
+            yield View(app, page, client)
+    finally:
+        page.close()
+        app.close()
+
+
+def take(browser: Browser, name: str, out: Path) -> None:
+    """Take one of `PICTURES` into the folder `out`, as `NAME.webp`."""
+    columns, prepare = PICTURES[name]
+    with _open(browser, columns(), SIZE) as view:
+        prepare(view)
+        picture = view.picture()
+    (out / f"{name}.webp").write_bytes(_packed(picture))
+
+
+def _packed(picture: Image.Image) -> bytes:
+    """WebP of the highest quality that is small enough."""
+    for quality in range(90, 0, -10):
+        packed = io.BytesIO()
+        picture.save(packed, "webp", quality=quality, method=6)
+        if packed.tell() <= MOST_BYTES:
+            return packed.getvalue()
+    raise ValueError(f"the picture takes more than {MOST_BYTES} bytes at any quality")
+
+
+def _take_film(browser: Browser, out: Path) -> None:
+    frames = []
+    with _open(browser, _volleyball(), FILM_SIZE) as view:
+        view.show(0.0)
+        view.picture()
+        for parameters, times in FILM:
+            for label, value in parameters.items():
+                view.set(label, value)
+            for moment in times:
+                view.show(round(float(moment), 3))
+                height = FILM_WIDTH * FILM_SIZE[1] // FILM_SIZE[0]
+                frames.append(view.picture().resize((FILM_WIDTH, height), Image.Resampling.LANCZOS))
+    options = {"duration": round(1000 / FILM_RATE), "loop": 0, "quality": FILM_QUALITY, "method": 6}
+    frames[0].save(out, save_all=True, append_images=frames[1:], **options)
+
+
+def main() -> int:
+    """Run the command; returns its exit code."""
+    parser = argparse.ArgumentParser(
+        prog="python -m odeform_viz.screenshots", description="Take the pictures of the documentation from the page."
+    )
+    parser.add_argument("--only", nargs="+", choices=(*PICTURES, "animation"), help="take only these")
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures"), help="folder (default: docs/pictures)")
+    parser.add_argument(
+        "--animation", type=Path, default=Path("assets/animation.webp"), help="file (default: assets/animation.webp)"
+    )
+    args = parser.parse_args()
+
+    def work() -> None:
+        if CHROMIUM is None:
+            raise InputError("expected Chromium on the PATH, or its path in CHROMIUM")
+        from playwright.sync_api import sync_playwright
+
+        args.out.mkdir(parents=True, exist_ok=True)
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            for name in args.only or (*PICTURES, "animation"):
+                print(name, flush=True)
+                if name == "animation":
+                    _take_film(browser, args.animation)
+                else:
+                    take(browser, name, args.out)
+            browser.close()
+
+    return run_guarded(work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
