@@ -1,4 +1,4 @@
-"""Whether an answer is still wanted: long work asks now and then, and gives up when nobody waits for it any more."""
+"""Cooperative cancellation: long computations check regularly whether their result is still needed."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -8,23 +8,23 @@ __all__ = ["Cancelled", "cancel_unless", "check_cancelled"]
 
 
 class Cancelled(Exception):
-    """The answer would come too late; nothing has changed."""
+    """Raised in a computation whose result is no longer needed."""
 
 
-_wanted: ContextVar[Callable[[], bool]] = ContextVar("wanted", default=lambda: True)
+_needed: ContextVar[Callable[[], bool]] = ContextVar("needed", default=lambda: True)
 
 
 @contextmanager
-def cancel_unless(wanted: Callable[[], bool]) -> Iterator[None]:
-    """Long work within, on this thread, raises `Cancelled` soon after `wanted()` has become false."""
-    token = _wanted.set(wanted)
+def cancel_unless(needed: Callable[[], bool]) -> Iterator[None]:
+    """Within the context, on this thread, computations raise `Cancelled` soon after `needed()` returns false."""
+    token = _needed.set(needed)
     try:
         yield
     finally:
-        _wanted.reset(token)
+        _needed.reset(token)
 
 
 def check_cancelled() -> None:
-    """To be called by long work, several times a second."""
-    if not _wanted.get()():
+    """Raise `Cancelled` if the result is no longer needed. Long computations call this several times a second."""
+    if not _needed.get()():
         raise Cancelled

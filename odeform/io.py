@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, and those that travel with the package."""
+"""Atomic writing of files, and the location of bundled ones."""
 
 import json
 import os
@@ -13,7 +13,7 @@ __all__ = ["atomic_open", "atomic_write", "bundled", "safetensors_metadata"]
 
 @contextmanager
 def atomic_open(path: Path) -> Iterator[IO[bytes]]:
-    """To write a file so that at any moment either the old or the new one is there, whole."""
+    """Open a file for writing that replaces `path` only when the context ends without an error. Creates folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
@@ -27,18 +27,18 @@ def atomic_open(path: Path) -> Iterator[IO[bytes]]:
 
 
 def atomic_write(path: Path, data: bytes) -> None:
-    """`atomic_open`, all at once."""
+    """Write `data` with `atomic_open`."""
     with atomic_open(path) as file:
         file.write(data)
 
 
 def safetensors_metadata(data: bytes) -> dict[str, str]:
-    """The metadata of a safetensors file that has been loaded and is sound; its library reads them from paths only."""
+    """The metadata of a valid safetensors file in memory; the library reads them from paths only."""
     return json.loads(data[8 : 8 + int.from_bytes(data[:8], "little")]).get("__metadata__", {})
 
 
 def bundled(kind: str) -> Path:
-    """The folder of that kind among the assets, in a clone or in an installed wheel. It may be missing."""
+    """The folder `assets/<kind>` of a clone or an installed wheel. It may not exist."""
     here = Path(__file__).resolve().parent
     installed = here / "assets" / kind
     return installed if installed.is_dir() else here.parent / "assets" / kind

@@ -15,6 +15,7 @@ from odeform.types import Floats
 __all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
 
 Parameters = Mapping[str, float]
+"""Name -> value in the unit of its parameter."""
 
 BEYOND = 0.15
 """How far inputs may exceed a trained range, in half ranges. The deformations of the bundled models then stay within a
@@ -67,9 +68,13 @@ class Parameter:
     high: float
     default: float
     scale: str = "linear"
+    """"log" where ratios matter rather than differences (mass, stiffness), else "linear"."""
     role: str = "physical"
+    """"azimuth" for an angle about the vertical axis under which the scene is symmetric: models rotate coordinates by
+    it and do not learn it."""
     description: str = ""
     shape: tuple[int, ...] = ()
+    """Always () for a number; vectors are three parameters NAME_x, NAME_y and NAME_z."""
 
     def normalise(self, value: float) -> float:
         """Map a value in `unit` so that the trained range becomes [-1, 1]; values outside map outside."""
@@ -108,13 +113,13 @@ class Parameter:
 
 
 def _three(name: str, value: Any) -> list[Any]:
-    """The components of a vector, given as a sequence or as text with commas."""
+    """The components of a vector, given as a sequence or as comma-separated text."""
     try:
         parts = value.split(",") if isinstance(value, str) else list(value)
     except TypeError:
         parts = []
     if len(parts) != 3:
-        raise InputError(f"{name}: expected three numbers, X,Y,Z, got {value!r}")
+        raise InputError(f"{name}: expected three numbers X,Y,Z, got {value!r}")
     return parts
 
 
@@ -148,7 +153,6 @@ class Schema:
         scene: Its name, for example "kick".
         parameters: In the order of a model's inputs.
         window: The trained span of time in seconds, `start` to `stop`, and its frame `rate` in Hz.
-        parts: Of the motion: the rigid part and the local deformation.
         needs_observations: True for models that interpolate between given frames.
         notes: Remarks for people.
         impact: Half-open span of time in seconds that is also scored separately: free flight and rest dilute scores.
@@ -167,7 +171,6 @@ class Schema:
     scene: str
     parameters: tuple[Parameter, ...]
     window: Window
-    parts: tuple[str, ...] = ("rigid", "local")
     needs_observations: bool = False
     notes: tuple[str, ...] = ()
     impact: tuple[float, float] | None = None
@@ -230,16 +233,15 @@ class Schema:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Schema":
-        """The schema of `to_json`; `InputError` for a missing or wrong field."""
+        """The inverse of `to_json`; ignores unknown keys, as older files have. Raises `InputError` for missing ones."""
         try:
             return cls(
                 scene=str(data["scene"]),
                 parameters=tuple(Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]),
                 window=Window(**data["window"]),
-                parts=tuple(data["parts"]),
                 needs_observations=bool(data.get("needs_observations", False)),
                 notes=tuple(data.get("notes", ())),
                 impact=tuple(data["impact"]) if data.get("impact") else None,
             )
         except (KeyError, TypeError) as error:
-            raise InputError(f"schema: expected the fields of an ODeform scene, missing or wrong: {error}") from None
+            raise InputError(f"schema: missing or invalid field of an ODeform scene: {error}") from None

@@ -37,7 +37,7 @@ Ints = NDArray[np.integer]
 Bools = NDArray[np.bool_]
 Arrays = dict[str, NDArray[Any]]
 
-# Shapes; sizes of one name agree within a call. Checked at run time in tests only.
+# Shapes; dimensions of one name agree within a call. Checked at run time in tests only.
 Points = Float[np.ndarray, "points 3"]
 Perpoint = Float[np.ndarray, "points"]
 Faces = Int[np.ndarray, "faces 3"]

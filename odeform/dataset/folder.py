@@ -1,8 +1,8 @@
-"""Sequences in a folder, as the simulator writes them: an index `dataset.json`, one `.npz` a sequence.
+"""Data sets in a folder, as the simulator writes them: an index `dataset.json`, one `.npz` per sequence.
 
-The index holds the schema, what is fixed, and for each sequence its SHA-256, split, parameters and status; arrays are
-`times (T,)`, `vertices (T, N, 3)` float32, `faces (F, 3)`, `weights (N,)`. Every file is written under a temporary
-name and renamed, so an interrupted run leaves valid files.
+The index contains the schema, fixed quantities, and for each sequence its SHA-256, split, parameters and status. The
+arrays are `times (T,)` s, `vertices (T, N, 3)` m float32, `faces (F, 3)` and `weights (N,)`. Files are written under a
+temporary name and renamed, so an interrupted run leaves valid files.
 """
 
 import hashlib
@@ -22,6 +22,8 @@ INDEX = "dataset.json"
 
 
 def folder_reader(root: Path) -> Reader:
+    """Loads sequences from the folder `root`."""
+
     def read(entry: Entry) -> MotionSequence:
         path = root / f"{entry.name}.npz"
         try:
@@ -44,7 +46,7 @@ def folder_reader(root: Path) -> Reader:
 
 
 def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
-    """Store one sequence; returns its SHA-256."""
+    """Write one sequence to `<root>/<name>.npz` and return its SHA-256."""
     buffer = io.BytesIO()
     np.savez(
         buffer,
@@ -59,10 +61,12 @@ def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
 
 
 def write_index(dataset: Dataset) -> None:
+    """Write `dataset.json` to the folder of the data set."""
     atomic_write(dataset.root / INDEX, index_to_json(dataset))
 
 
 def open_folder(root: Path) -> Dataset:
+    """Open the data set in the folder `root`. Raises `InputError` if there is none."""
     try:
         data = (root / INDEX).read_bytes()
     except OSError as error:

@@ -62,6 +62,7 @@ class Dataset:
     entries: tuple[Entry, ...]
     read: Reader = field(compare=False)
     fixed: dict[str, float] = field(default_factory=dict)
+    """Quantities that are the same in all sequences, for instance a radius in m."""
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def select(self, split: str) -> list[Entry]:
@@ -87,6 +88,7 @@ def assign_splits(count: int, seed: int) -> list[str]:
 
 
 def index_to_json(dataset: Dataset, **more: Any) -> bytes:
+    """The index as JSON, with `more` keys."""
     index = {
         "format": FORMAT,
         "schema": dataset.schema.to_json(),
@@ -99,7 +101,7 @@ def index_to_json(dataset: Dataset, **more: Any) -> bytes:
 
 
 def index_from_json(data: bytes, where: Path, root: Path, reader: Any) -> Dataset:
-    """`reader(index)` makes the reader from the whole index. `InputError` names `where` the index came from."""
+    """The inverse of `index_to_json`; `reader(index)` makes the reader. Raises `InputError`, which names `where`."""
     try:
         index = json.loads(data)
     except ValueError:
@@ -111,4 +113,4 @@ def index_from_json(data: bytes, where: Path, root: Path, reader: Any) -> Datase
         schema = Schema.from_json(index["schema"])
         return Dataset(root, schema, entries, reader(index), index["fixed"], index["provenance"])
     except (KeyError, TypeError) as error:
-        raise InputError(f"{where}: missing or wrong field {error}") from None
+        raise InputError(f"{where}: missing or invalid field {error}") from None

@@ -100,7 +100,7 @@ def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsam
     for split in SPLITS:
         pairs = zip(motions[split].poses, coefficients[split], strict=True)
         trajectories = [np.concatenate([pose, c[:, :kept]], axis=1) for pose, c in pairs]
-        reduced[split] = np.stack([subsampling.filled(y, count, index) for index, y in enumerate(trajectories)])
+        reduced[split] = np.stack([subsampling.interpolated(y, count, index) for index, y in enumerate(trajectories)])
     left_out = {split: max(total[split] - by_mode[split][:kept].sum(), 0.0) for split in SPLITS}
     return TrainingData(
         schema=_trained_schema(dataset.schema, body.times, subsampling),
@@ -110,7 +110,7 @@ def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsam
         weights=body.weights,
         theta={split: motions[split].theta for split in SPLITS},
         reduced=reduced,
-        observed={split: subsampling.known(count, len(reduced[split])) for split in SPLITS},
+        observed={split: subsampling.observed(count, len(reduced[split])) for split in SPLITS},
         truncation_mm={split: float(1e3 * np.sqrt(left_out[split])) for split in SPLITS},
         identity=_identity(dataset, subsampling, count, kept),
     )

@@ -51,7 +51,7 @@ def spline_through(subsampling: FrameSubsampling) -> Guess:
 
     def join(truth: MotionSequence, index: int) -> Frames:
         count = len(truth.times)
-        return subsampling.filled(truth.vertices[subsampling.kept(count, index)], count, index)
+        return subsampling.interpolated(truth.vertices[subsampling.kept(count, index)], count, index)
 
     return join
 

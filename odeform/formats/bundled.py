@@ -1,4 +1,4 @@
-"""Shapes by path or by name, those that travel with the package; and the part of each that is to move."""
+"""Shapes by path or by bundled name, with the region of each that moves."""
 
 from pathlib import Path
 
@@ -11,17 +11,20 @@ __all__ = ["bundled_shapes", "read_shape", "region_beside"]
 
 
 def bundled_shapes() -> dict[str, Path]:
-    """The splats that travel with the package, by name."""
+    """Name -> file of the bundled splats."""
     return {path.stem: path for path in sorted(bundled("splats").glob("*.spz"))}
 
 
 def region_beside(path: Path) -> Path:
-    """Where the region is kept that holds what moves of a shape: NAME.region.json beside NAME.ply."""
+    """The file of the region that moves of a shape: NAME.region.json beside NAME.ply."""
     return path.with_suffix(".region.json")
 
 
 def read_shape(name: str | Path) -> tuple[Geometry, Region | None]:
-    """The shape of a file, or the bundled one of that name, and the region kept beside it, in its units and axes."""
+    """Read a file or a bundled shape, and its region if there is one, both in the units and axes of the file.
+
+    Raises `InputError` as `read_geometry` does.
+    """
     path = Path(name)
     if not path.is_file():
         path = bundled_shapes().get(str(name), path)

@@ -1,4 +1,7 @@
-"""PLY files of plain numbers: every element a table. Meshes, whose faces are lists, are trimesh's business.
+"""PLY files as tables of numbers, one per element. Meshes, whose faces are lists, are read by trimesh instead.
+
+This is not plyfile, which is no faster and needs the whole file to tell whether it contains splats: the header alone
+decides that here, also where it has comments that are not ASCII.
 
 Greg Turk, "The PLY Polygon File Format" (1994).
 """
@@ -17,10 +20,10 @@ from odeform.types import Floats
 __all__ = ["Table", "columns", "ply_properties", "read_ply_tables"]
 
 Table = NDArray[Any]
-"""(rows,), structured: a named column for each property."""
+"""(rows,) structured array with one named column per property."""
 
-LONGEST = 1 << 20  # bytes of a header
-BLOCK = 8192  # rows read at a time: a wide table then passes the memory once, not once a column
+MAX_HEADER = 1 << 20  # bytes
+BLOCK = 8192  # rows at a time: a wide table is then read from memory once, not once per column
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
@@ -30,13 +33,16 @@ TYPES = {
 
 
 def ply_properties(path: Path) -> set[str]:
-    """Names of all properties, of whatever element; none if this is no PLY file."""
+    """Names of the properties of all elements; empty if this is not a PLY file."""
     lines, _ = _header(path)
     return {line[-1] for line in lines if line[0] == "property"}
 
 
 def read_ply_tables(path: Path) -> dict[str, Table]:
-    """Element -> its table, up to the first one with lists; binary ones are mapped, not loaded."""
+    """Element -> table, up to the first element with lists; binary ones are memory-mapped.
+
+    Raises `InputError` for an unknown format and for missing rows, `ValueError` or `KeyError` for other damage.
+    """
     lines, start = _header(path)
     order = next((ORDERS[line[1]] for line in lines if line[0] == "format" and line[1] in ORDERS), None)
     if order is None:
@@ -51,13 +57,13 @@ def read_ply_tables(path: Path) -> dict[str, Table]:
                 table = _mapped(path, start, count, layout)
                 start += count * layout.itemsize
             if len(table) < count:
-                raise InputError(f"geometry {path}: expected {count} rows of {name}, got {len(table)}: cut short?")
+                raise InputError(f"geometry {path}: expected {count} rows of {name}, got {len(table)}: truncated?")
             tables[name] = table
     return tables
 
 
 def _layouts(lines: list[list[str]], order: str) -> Iterator[tuple[str, int, np.dtype[Any]]]:
-    """Name, rows and columns of each element up to the first one with lists."""
+    """Name, number of rows and dtype of each element up to the first one with lists."""
     starts = [index for index, line in enumerate(lines) if line[0] == "element"]
     for start, stop in itertools.pairwise([*starts, len(lines)]):
         properties = [line for line in lines[start:stop] if line[0] == "property"]
@@ -68,7 +74,7 @@ def _layouts(lines: list[list[str]], order: str) -> Iterator[tuple[str, int, np.
 
 
 def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
-    """(rows, len(names)) float32. Raises `InputError` where the file lacks one."""
+    """(rows, len(names)) float32. Raises `InputError` if a column is missing."""
     missing = [name for name in names if name not in (table.dtype.names or ())]
     if missing:
         raise InputError(f"geometry {path}: splats without {', '.join(missing)}")
@@ -81,7 +87,7 @@ def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
 
 
 def _mapped(path: Path, start: int, count: int, layout: np.dtype[Any]) -> Table:
-    """As many of the rows as the file has."""
+    """Up to `count` rows, as many as the file has."""
     present = min(count, max(path.stat().st_size - start, 0) // max(layout.itemsize, 1))
     if present <= 0:
         return np.zeros(0, layout)
@@ -89,9 +95,9 @@ def _mapped(path: Path, start: int, count: int, layout: np.dtype[Any]) -> Table:
 
 
 def _header(path: Path) -> tuple[list[list[str]], int]:
-    """The words of each line, and where the data start."""
+    """The words of each header line, and the offset of the data in bytes."""
     with path.open("rb") as file:
-        head = file.read(LONGEST)
+        head = file.read(MAX_HEADER)
     text, end, rest = head.partition(b"end_header")
     if not head.startswith(b"ply") or not end:
         return [], 0

@@ -1,9 +1,9 @@
 """Integration by one-step methods with fixed or controlled steps, dense in time.
 
-The solver knows nothing of models: it takes a callable, and gives a `Solution` with a status instead of raising.
-Steps follow from the start, the method and its step or tolerance alone. They never depend on the times asked for,
-nor on where the integration is to end: the last step may reach beyond. A solution can therefore be continued, and
-what it says of a time is the same however one came to ask.
+The solver knows nothing about models: it takes a callable, and returns a `Solution` with a status instead of raising.
+Steps depend on the initial state, the method, and its step or tolerance only. They do not depend on query times or on
+the end of the integration, which the last step may exceed. A solution can therefore be continued, and its state at a
+time does not depend on earlier queries.
 """
 
 import math
@@ -20,22 +20,23 @@ __all__ = ["SolverSettings", "integrate"]
 MAX_STEPS = 20_000
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
 NOW, BEFORE = 0.7, 0.4
-"""Exponents of this step's error and the last one's, times the order (Gustafsson 1991, ACM TOMS 17(4)). A third of the
-steps into a landing were rejected where the last one did not count."""
+"""Exponents of the errors of this step and the last one, times the order (Gustafsson 1991, ACM TOMS 17(4)). Without the
+last one, a third of the steps into a landing were rejected."""
 
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """A way to integrate: a method with a fixed `step` in seconds, or with a `tolerance`, in a precision.
-
-    The tolerance bounds the estimated error of a step: the root mean square over the entries of the state, whatever
-    their size. Were it relative, the larger entries would be let go, and with them what is decoded from them.
-    """
+    """A Runge-Kutta method with either a fixed step or a tolerance. Raises `InputError` for an invalid combination."""
 
     method: str
+    """A name in `odeform.solver.tableau.METHODS`."""
     step: float | None = None
+    """Fixed step in seconds."""
     tolerance: float | None = None
+    """Bound on the estimated error of a step, as the root mean square over the entries of the state. It is absolute:
+    relative to the state, errors of large entries would be decoded into large errors of the motion."""
     dtype: str = "float32"
+    """"float32" or "float64"."""
 
     def __post_init__(self) -> None:
         method = get_method(self.method)
@@ -49,12 +50,12 @@ class SolverSettings:
             raise InputError(f"quality: expected float32 or float64, got {self.dtype}")
 
     def to_json(self) -> dict[str, Any]:
-        """What differs from the defaults: `SolverSettings(**q.to_json()) == q`."""
+        """The values that differ from the defaults: `SolverSettings(**q.to_json()) == q`."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) != f.default}
 
 
 def _finite(value: Any) -> bool:
-    # the sum is finite only if every entry is (or they overflow together): one pass
+    # one pass: the sum is finite only if every entry is (or their sum overflows)
     return math.isfinite(value.sum().item())
 
 
@@ -78,8 +79,8 @@ def integrate(
 ) -> Solution:
     """Integrate dz/dt = field(t, z) at least to `until` seconds.
 
-    The precision is that of `start`, the state at time `begin`; given a Solution as `begin`, that one is continued in
-    place. States are numpy arrays (n,).
+    `start` (n,) is the state at time `begin` in seconds; its dtype is the precision. A `Solution` given as `begin` is
+    continued in place. Failures end the solution early with a status other than OK; nothing is raised.
     """
     if isinstance(begin, Solution):
         solution = begin
@@ -138,7 +139,7 @@ def _controlled(
         ratio = max(_rms(stepper.error(step)) / tolerance, 1e-10)
         if not ratio <= 1.0:
             if not math.isfinite(ratio):
-                ratio = 1e6  # too far: try again closer
+                ratio = 1e6  # overflow: retry with a much smaller step
             solution.next_step = step * max(SHRINK, SAFETY * ratio ** (-1.0 / method.order))
             solution.rejected += 1
             longest = 1.0

@@ -1,4 +1,4 @@
-"""What an integration gives: a state at any time, and how it came about."""
+"""The result of an integration: the state at any time, a status and statistics."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -12,7 +12,7 @@ __all__ = ["Solution", "Status"]
 
 
 class Status(Enum):
-    """How an integration ended. Everything but OK ends it early; the part up to there stands."""
+    """How an integration ended. Anything but OK ended it early; the solution up to there is valid."""
 
     OK = "ok"
     MAX_STEPS = "step limit reached"
@@ -22,11 +22,11 @@ class Status(Enum):
 
 @dataclass
 class Solution:
-    """A trajectory known at the nodes of its steps and between them.
+    """A trajectory, evaluated at the nodes of its steps and interpolated between them.
 
-    States are numpy arrays (n,). `slopes[i]` is the field at node i; `middles[i]` the state half-way through step i for
-    methods with a quartic interpolant. Grows at its end only (see `integrate`), so what it says of a time never
-    changes.
+    `times[i]` in seconds, `states[i]` (n,) and `slopes[i]` (n,), the field, belong to node i; `middles[i]` (n,) is the
+    state halfway through step i, for methods with a quartic interpolant. It grows at its end only (see `integrate`), so
+    its state at a time never changes.
     """
 
     times: list[float]
@@ -38,18 +38,20 @@ class Solution:
     status: Status = Status.OK
     next_step: float = 0.0
     last_ratio: float = 1.0
-    """The estimated error of the last step over the tolerance, where steps are controlled."""
+    """Estimated error of the last step divided by the tolerance, where steps are controlled."""
 
     @property
     def steps(self) -> int:
+        """Number of accepted steps."""
         return len(self.times) - 1
 
     @property
     def end(self) -> float:
+        """Time of the last node in seconds."""
         return self.times[-1]
 
     def at(self, time: float) -> Any:
-        """The state at `time`, clamped to the integrated span. Cubic Hermite, quartic where middles are known."""
+        """(n,) state at `time` in seconds, clamped to the integrated span. Cubic Hermite, or quartic with middles."""
         if self.steps == 0:
             return self.states[0]
         index = int(np.searchsorted(self.times, time, side="right")) - 1
@@ -63,7 +65,7 @@ class Solution:
         return _between(weights, y0, y1, f0, f1, middle)
 
     def sample(self, times: Floats) -> Any:
-        """(T, ...) states at `times`: to the last bit what `at` gives, many in one go."""
+        """(T, n) states at `times` (T,) s, bit-identical to `at`."""
         if self.steps == 0 or len(times) == 1:
             return np.stack([self.at(float(time)) for time in times])
         nodes = np.asarray(self.times)
@@ -80,7 +82,7 @@ class Solution:
 
 
 def _weights(s: Any, step: Any) -> list[Any]:
-    """Of both states and both slopes in the cubic at the share `s` of a step; `step` / 8; the quartic bubble."""
+    """Cubic weights of both states and slopes at the fraction `s` of a step, `step` / 8, and the quartic bubble."""
     rest = 1.0 - s
     return [
         (1.0 + 2.0 * s) * rest * rest,
@@ -97,6 +99,6 @@ def _between(weights: list[Any], y0: Any, y1: Any, f0: Any, f1: Any, middle: Any
     cubic = w0 * y0 + w1 * y1 + v0 * f0 - v1 * f1
     if middle is None:
         return cubic
-    # the bubble lifts the cubic to the known state at half the step
+    # the bubble moves the cubic to the known state at half the step
     cubic_middle = 0.5 * (y0 + y1) + eighth * (f0 - f1)
     return cubic + bubble * (middle - cubic_middle)

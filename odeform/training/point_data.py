@@ -55,7 +55,7 @@ def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None
     theta, moved, observed = {}, {}, {}
     for split in ("train", "val"):
         theta[split], moved[split] = _displacements(dataset, split, subsampling, count, anchor, len(rest))
-        observed[split] = subsampling.known(count, len(theta[split]))
+        observed[split] = subsampling.observed(count, len(theta[split]))
     times = np.arange(count) / dataset.schema.window.rate
     largest = max(float(np.linalg.norm(motion, axis=-1).max()) for motion in moved["train"])
     shifts = np.mean([np.einsum("n,tni->ti", first.weights, motion) for motion in moved["train"]], axis=0)
@@ -82,7 +82,7 @@ def _displacements(
             raise InputError(f"{sequence.name}: expected {points} vertices as in the others, got another mesh")
         turned = to_canonical(sequence.vertices, anchor, dataset.schema.azimuth(sequence.parameters))
         kept = (turned - turned[0])[subsampling.kept(count, index)]
-        moved.append(subsampling.filled(kept, count, index).astype(np.float32))
+        moved.append(subsampling.interpolated(kept, count, index).astype(np.float32))
         theta.append(dataset.schema.vector(sequence.parameters))
     if not theta:
         raise InputError(f"{dataset.root}: no sequence in split {split}")

@@ -18,8 +18,7 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
     """A fresh network, whitened by the training data alone."""
     torch.manual_seed(seed)
     train = data.reduced["train"]
-    rigid = "rigid" in data.schema.parts
-    config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE, rigid=rigid)
+    config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE)
     net = ODeformNet(config)
     spread = np.sqrt((train**2).mean(axis=(0, 1)))
     gains = np.concatenate(

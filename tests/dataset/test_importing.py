@@ -55,7 +55,7 @@ def test_natural_order() -> None:
 def test_mass_elastic_of_the_authors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_drops(tmp_path / "src")
     assert main(["import", str(tmp_path / "src"), "--out", str(tmp_path / "out")]) == 0
-    assert "8 train, 1 val, 1 test; mass, bending vary; failed: none" in capsys.readouterr().out
+    assert "8 train, 1 val, 1 test; parameters: mass, bending; failed: none" in capsys.readouterr().out
     dataset = open_dataset(tmp_path / "out")
     assert dataset.schema.scene == "released-mass-elastic"
     assert dataset.schema.window.rate == 20.0

@@ -33,7 +33,7 @@ def test_the_same_frames_of_all_or_interleaved() -> None:
 
 def test_each_sequence_shows_its_frames() -> None:
     subsampling = FrameSubsampling(every=5, stagger=True)
-    frames, shows = observed_frames(subsampling.known(21, 5))
+    frames, shows = observed_frames(subsampling.observed(21, 5))
     for sequence in range(5):
         assert frames[sequence][shows[sequence]].tolist() == subsampling.kept(21, sequence).tolist()
     assert shows[:, 0].all()
@@ -49,7 +49,7 @@ def test_a_window_ends_with_a_known_frame(dataset: Dataset) -> None:
 def test_a_parabola_is_filled_in_exactly() -> None:
     subsampling, frames = FrameSubsampling(every=4), np.arange(33.0)
     fall = frames[:, None] ** 2 * [1.0, -0.5]
-    assert np.allclose(subsampling.filled(fall[subsampling.kept(33, 0)], 33, 0), fall, atol=1e-9)
+    assert np.allclose(subsampling.interpolated(fall[subsampling.kept(33, 0)], 33, 0), fall, atol=1e-9)
 
 
 def test_too_few_frames(dataset: Dataset) -> None:
