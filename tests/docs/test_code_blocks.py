@@ -34,20 +34,21 @@ def run_python(page: Path, slow: bool) -> None:
             exec(compile("\n" * block.line + block.code, str(page), "exec"), namespace)
 
 
-@pytest.fixture(autouse=True)
-def folder(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A temporary working folder; tests that run something find the files there that the page takes for granted."""
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A temporary working folder with the files that pages take for granted."""
+    make_files(tmp_path)
     monkeypatch.chdir(tmp_path)
-    if "_run" in request.node.name:
-        make_files(tmp_path)
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("page", python_pages(slow=False), ids=lambda p: p.stem)
 def test_python_blocks_run(page: Path):
     run_python(page, slow=False)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("page", python_pages(slow=True), ids=lambda p: p.stem)
 def test_long_python_blocks_run(page: Path):
     run_python(page, slow=True)
@@ -66,6 +67,7 @@ def test_commands_exist_with_these_options(block: Block):
             assert (ROOT / arguments[0]).is_file(), f"{block.where}: no file {arguments[0]}"
 
 
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("block", of("bash", "run"), ids=lambda b: b.where)
 def test_quick_commands_run(block: Block, capsys: pytest.CaptureFixture[str]):
     for program, *arguments in command_lines(block.code):
@@ -73,6 +75,7 @@ def test_quick_commands_run(block: Block, capsys: pytest.CaptureFixture[str]):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize("block", of("bash", "slow"), ids=lambda b: b.where)
 def test_long_commands_run(block: Block, capsys: pytest.CaptureFixture[str]):
     for program, *arguments in command_lines(block.code):

@@ -80,6 +80,20 @@ def test_the_page_of_commands_has_every_command_and_option():
         assert documented(section(page, name)) == its - {"--help", "--version"}, name
 
 
+@pytest.mark.parametrize("page", pages(), ids=lambda p: p.stem)
+def test_commands_in_sentences_exist_with_these_options(page: Path):
+    known = {f"odeform {name}": options_of(command) for name, command in COMMANDS.items()}
+    known |= {"odeform": {"--version"}, "odeform-viz": options(parser_of("odeform-viz", []))}
+    for code in re.findall(r"`(odeform(?:-viz)?(?: [^`]+)?)`", page.read_text()):
+        words = code.split()
+        command = " ".join(words[:2]) if words[0] == "odeform" and not words[-1].startswith("--version") else words[0]
+        if code in ("odeform", "odeform_viz"):  # also the names of a model and of a package
+            continue
+        assert command in known, f"{page.name}: {code}"
+        given = {word for word in words if word.startswith("--")}
+        assert given <= known[command], f"{page.name}: {code}"
+
+
 def test_the_page_of_baselines_has_every_model():
     rows = re.findall(r"^\| (`[^|]+`) \|", (ROOT / "docs" / "baselines.md").read_text(), re.MULTILINE)
     named = {name for row in rows for name in re.findall(r"`([\w-]+)`", row)}
