@@ -47,6 +47,7 @@ FLAGS = [
 DEADLINE = 300.0  # s, for a busy machine and a browser that renders in software
 SIZE, FILM_SIZE, FILM_WIDTH = (1440, 900), (1280, 720), 880  # px
 MOST_BYTES = 120_000  # of a picture
+MOMENT = 0.012  # s; the kicked ball is deformed then
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
 FILM = (
     # parameters, and the times to show with them
@@ -81,6 +82,14 @@ class View:
         if not self.client.until(holds, DEADLINE):
             raise TimeoutError(f"the page did not get there within {DEADLINE:g} s")
 
+    def largest_error_time(self) -> float:
+        """The time, in s, of the largest error of the first column against the truth."""
+        frame = self.app.presenter.frame
+        assert frame is not None
+        curves = self.app.session.curves(frame.columns[0], frame.request)
+        assert curves.error is not None
+        return round(float(curves.times[np.nanargmax(curves.error)]), 4)
+
     def picture(self) -> Image.Image:
         """The page once two pictures in a row agree."""
         end, last = time.monotonic() + DEADLINE, self._shot()
@@ -114,7 +123,7 @@ def _rivals() -> list[Column]:
 
 
 def _explore(view: View) -> None:
-    view.show(0.012)
+    view.show(MOMENT)
 
 
 def _compare(view: View) -> None:
@@ -124,23 +133,19 @@ def _compare(view: View) -> None:
 
 def _record(view: View) -> None:
     view.tab("Record")
-    view.show(0.1)
+    view.show(MOMENT)
 
 
 def _help(view: View) -> None:
     view.tab("Help")
-    view.show(0.1)
+    view.show(MOMENT)
 
 
 def _stability(view: View) -> None:
-    view.show(0.1)
+    view.show(MOMENT)
     view.tab("Stability")
     view.client.click("Map stability")
     view.wait(lambda: not view.client.controls["Map stability"].visible)
-
-
-def _splats(view: View) -> None:
-    view.show(0.012)
 
 
 def _simulate(view: View) -> None:
@@ -149,6 +154,7 @@ def _simulate(view: View) -> None:
     view.client.click("Simulate this")
     view.wait(lambda: any(column.truth for column in view.app.columns.all))
     view.wait(lambda: (frame := view.app.presenter.frame) is not None and frame.truth is not None)
+    view.show(view.largest_error_time())
 
 
 PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] = {
@@ -157,7 +163,7 @@ PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] =
     "record": (_kick, _record),
     "help": (_kick, _help),
     "stability": (_kick, _stability),
-    "splats": (_volleyball, _splats),
+    "splats": (_volleyball, _explore),
     "simulate": (_drop, _simulate),
 }
 """Name, columns, and what is done before the picture is taken."""

@@ -1,4 +1,4 @@
-"""The authors' networks in the page, beside imported truth."""
+"""The authors' networks in the page, beside an imported truth."""
 
 import json
 from collections.abc import Callable

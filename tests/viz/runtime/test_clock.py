@@ -1,4 +1,4 @@
-"""The clock that plays a motion."""
+"""The playback clock."""
 
 import pytest
 
@@ -6,6 +6,8 @@ from odeform_viz.runtime.clock import Clock
 
 
 class Wall:
+    """A clock that only the test moves."""
+
     def __init__(self) -> None:
         self.now = 100.0
 
@@ -48,7 +50,7 @@ def test_loops_within_the_window(wall: Wall) -> None:
     assert clock.time() == pytest.approx(0.75)
 
 
-def test_without_loop_halts_at_the_end_and_starts_over(wall: Wall) -> None:
+def test_without_loop_stops_at_the_end_and_then_starts_over(wall: Wall) -> None:
     clock = Clock(0.0, 1.0, wall)
     clock.loop = False
     clock.play()
@@ -59,7 +61,7 @@ def test_without_loop_halts_at_the_end_and_starts_over(wall: Wall) -> None:
     assert clock.time() == 0.0
 
 
-def test_seek_beyond_the_window_is_kept(wall: Wall) -> None:
+def test_seeking_beyond_the_window_is_allowed(wall: Wall) -> None:
     clock = Clock(0.0, 1.0, wall)
     clock.seek(1.4)
     assert clock.time() == 1.4
