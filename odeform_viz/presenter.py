@@ -77,6 +77,12 @@ class Presenter:
         self._described: Frame | None = None
         self._described_at = 0.0
 
+    @property
+    def settled(self) -> bool:
+        """Whether the frame on screen is complete: all columns computed, and everything described."""
+        frame = self.frame
+        return frame is not None and not frame.pending and self._settled and self._described is frame
+
     def serve(self) -> float | None:
         """One round. Returns the seconds until the next, or None if nothing will change without a new request."""
         try:

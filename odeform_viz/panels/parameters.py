@@ -91,6 +91,7 @@ class ParameterPanel(Panel):
     def __init__(self, page: Page) -> None:
         self._schema, self._wake = page.schema, page.wake
         self._samples, self._presets = _training_samples(page.model), presets(page.schema)
+        self._current = NO_PRESET  # the preset of the sliders, as the dropdown last had it
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
         self._gui = page.server.gui
@@ -149,12 +150,17 @@ class ParameterPanel(Panel):
         return {name: slider.value for name, slider in self._sliders.items()}
 
     async def _choose(self, event: viser.GuiEvent) -> None:
-        # a coroutine runs at once where the message arrives, before `_refresh` shows what the sliders still say
-        if event.client_id is not None and self._preset.value in self._presets:
-            self.set(self._presets[self._preset.value])
+        # a coroutine runs at once where the message arrives, before a drag that follows it
+        if event.client_id is None:
+            return
+        if self._preset.value in self._presets:
+            self._current = self._preset.value
+            self.set(self._presets[self._current])
+        else:
+            self._preset.value = self._current
 
     async def _reset(self, event: viser.GuiEvent) -> None:
-        # likewise, before a drag that follows it
+        # likewise
         name, defaults = event.target.value, self._presets["defaults"]
         self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
 
@@ -162,8 +168,9 @@ class ParameterPanel(Panel):
         """Let the preset and the strips say what the sliders do."""
         values = self._values()
         preset = next((name for name, preset in self._presets.items() if preset == values), NO_PRESET)
-        if self._preset.value != preset:
-            self._preset.value = preset
+        if self._current != preset:
+            # only then: the user may just have chosen one, which `_choose` has yet to read
+            self._current = self._preset.value = preset
         for name, strip in self._strips.items():
             parameter = next(p for p in self._schema.parameters if p.name == name)
             set_content(strip, samples_svg(parameter, self._samples.get(name), values[name]))

@@ -1,4 +1,4 @@
-"""A viewer that is served, and a client of it: what tests of panels need. Recordings made without either."""
+"""A served viewer with a client, for tests of panels; and recordings made without either."""
 
 import socket
 from collections.abc import Callable, Iterator, Sequence
@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from stubs import StubPredictor
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
@@ -35,7 +36,7 @@ def drop() -> Predictor:
 
 @pytest.fixture
 def serve(port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[Serve]:
-    """Opens a viewer with these columns, paused at `moment`, and a client; afterwards nothing may have gone wrong."""
+    """Opens a viewer with these columns, paused at `moment`, and a client. The viewer must not print a traceback."""
     with ExitStack() as stack:
 
         def start(*columns: Column, moment: float = 0.03) -> tuple[App, LoopbackClient]:
@@ -44,11 +45,18 @@ def serve(port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[Serve]:
             client = stack.enter_context(LoopbackClient(port))
             client.set("time (s)", moment)
             assert client.until(lambda: app.clock.time() == moment and not app.clock.playing)
-            client.collect(0.3)
+            assert client.until(lambda: app.presenter.settled)
             return app, client
 
         yield start
     assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.fixture
+def stubbed(serve: Serve) -> tuple[App, LoopbackClient]:
+    """A model that is a formula, paused at 0.2 s."""
+    stub = StubPredictor()
+    return serve(Column("stub", stub, stub.rest), moment=0.2)
 
 
 @pytest.fixture

@@ -1,7 +1,13 @@
-"""Sliders: presets, reset, and what lies beyond the training."""
+"""Sliders: presets, reset, and values outside the trained range."""
+
+import asyncio
+import sys
+import threading
 
 import numpy as np
 import pytest
+import viser
+from stubs import SCHEMA
 
 from odeform.models.base import Predictor
 from odeform_viz.app import App
@@ -9,28 +15,66 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.parameters import NO_PRESET, ParameterPanel, presets, samples_svg, slider_range, slider_step
 from odeform_viz.runtime import notices
 
-Kicked = tuple[App, LoopbackClient]
+View = tuple[App, LoopbackClient]
+PRESET = "high mass, low spring"
 
 
-def test_a_preset_moves_the_sliders_and_can_be_chosen_again(kicked: Kicked, kick: Predictor) -> None:
-    app, client = kicked
+def test_a_preset_moves_the_sliders_and_can_be_chosen_again(stubbed: View) -> None:
+    app, client = stubbed
     mass = client.controls["mass (kg)"]
-    name = "high mass, low bending"
     for _ in range(2):
-        client.set("preset", name)
-        assert client.until(lambda: app.panel(ParameterPanel).parameters() == presets(kick.schema)[name])
+        client.set("preset", PRESET)
+        assert client.until(lambda: app.panel(ParameterPanel).parameters() == presets(SCHEMA)[PRESET])
         assert client.until(lambda: mass.value == 1.0)
         client.set("mass (kg)", 0.7)
         assert client.until(lambda: client.controls["preset"].value == NO_PRESET)
 
 
-def test_reset_of_one_and_of_all(kicked: Kicked, kick: Predictor) -> None:
-    app, client = kicked
-    default = {p.name: p.default for p in kick.schema.parameters}
+def test_a_preset_chosen_while_a_frame_is_described_is_not_lost(stubbed: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The worker has read the sliders, then the choice arrives, then the worker shows what it has read."""
+    app, client = stubbed
+    panel, read, chosen = app.panel(ParameterPanel), threading.Event(), threading.Event()
+    client.set("mass (kg)", 0.6)
+    assert client.until(lambda: app.presenter.settled and panel._preset.value == NO_PRESET)
+    values = panel._values
+
+    def slow_values() -> dict[str, float]:
+        out = values()
+        if sys._getframe(1).f_code.co_name == "_refresh":
+            read.set()
+            assert chosen.wait(60.0)
+        return out
+
+    monkeypatch.setattr(panel, "_values", slow_values)
+    callbacks = panel._preset._impl.update_cb
+    choose = callbacks.pop()
+
+    async def after_the_worker(event: viser.GuiEvent) -> None:
+        chosen.set()
+        while app.presenter._described is not app.presenter.frame:
+            await asyncio.sleep(0.01)
+        await choose(event)  # pyright: ignore
+
+    callbacks.append(after_the_worker)
+    client.set("time (s)", 0.3)
+    assert client.until(read.is_set)
+    client.set("preset", PRESET)
+    assert client.until(lambda: panel.parameters() == presets(SCHEMA)[PRESET])
+
+
+def test_no_preset_cannot_be_chosen(stubbed: View) -> None:
+    _, client = stubbed
+    client.set("preset", NO_PRESET)
+    assert client.until(lambda: client.controls["preset"].value == "defaults")
+
+
+def test_reset_of_one_and_of_all(stubbed: View) -> None:
+    app, client = stubbed
+    default = {p.name: p.default for p in SCHEMA.parameters}
     client.set("mass (kg)", 0.9)
-    client.set("force (N)", 110.0)
+    client.set("spring (N/m)", 4.0)
     client.set("reset", "mass")
-    assert client.until(lambda: app.panel(ParameterPanel).parameters() == {**default, "force": 110.0})
+    assert client.until(lambda: app.panel(ParameterPanel).parameters() == {**default, "spring": 4.0})
     client.set("reset", "nonsense")
     client.set("reset", "all")
     assert client.until(lambda: app.panel(ParameterPanel).parameters() == default)
@@ -38,11 +82,11 @@ def test_reset_of_one_and_of_all(kicked: Kicked, kick: Predictor) -> None:
 
 
 @pytest.mark.parametrize("value", [float("inf"), float("-inf"), 1e9, -1.0])
-def test_what_no_hand_could_reach_is_refused_and_reset_helps(
-    kicked: Kicked, value: float, monkeypatch: pytest.MonkeyPatch
+def test_values_that_no_slider_has_are_refused_until_reset(
+    stubbed: View, value: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(notices, "REPEAT", 0.0)
-    app, client = kicked
+    app, client = stubbed
     client.set("mass (kg)", value)
     assert client.until(lambda: "mass: expected a finite number from" in client.text())
     for button in ("Pin these parameters", "Sweep it in 5 columns", "Save state"):
@@ -54,21 +98,21 @@ def test_what_no_hand_could_reach_is_refused_and_reset_helps(
     assert client.until(lambda: "expected a finite number" not in client.text())
 
 
-def test_beyond_the_trained_range_a_slider_says_so(kicked: Kicked) -> None:
-    _, client = kicked
-    client.set("bending (N m)", 2.2)
-    assert client.until(lambda: "outside the trained range, 0.3 to 2 N m" in client.text())
-    client.set("bending (N m)", 1.9)
-    assert client.until(lambda: "outside the trained range, 0.3" not in client.text())
+def test_outside_the_trained_range_a_slider_says_so(stubbed: View) -> None:
+    _, client = stubbed
+    client.set("spring (N/m)", 5.5)
+    assert client.until(lambda: "outside the trained range, 1 to 5 N/m" in client.text())
+    client.set("spring (N/m)", 4.0)
+    assert client.until(lambda: "outside the trained range, 1" not in client.text())
 
 
-def test_training_samples_are_marked_where_they_lie(kick: Predictor) -> None:
-    mass = kick.schema.parameters[0]
+def test_training_samples_are_marked_where_they_lie() -> None:
+    mass = SCHEMA.parameters[0]
     low, high = slider_range(mass)
     svg = samples_svg(mass, np.array([low, 0.5 * (low + high), high]), mass.default)
-    assert all(f'<rect x="{place}%" width="1"' in svg for place in ("0.00", "50.00", "100.00"))
+    assert all(f'<rect x="{percent}%" width="1"' in svg for percent in ("0.00", "50.00", "100.00"))
     assert samples_svg(mass, None, mass.default).count("<rect") == 1
 
 
-def test_a_slider_reads_without_spare_digits(kick: Predictor) -> None:
+def test_a_slider_has_no_needless_digits(kick: Predictor) -> None:
     assert [slider_step(*slider_range(p)) for p in kick.schema.parameters[:3]] == pytest.approx([0.001, 0.01, 0.1])
