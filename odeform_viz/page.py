@@ -113,6 +113,14 @@ class Page:
         self.clock.seek(time)
         self.wake()
 
+    def on_event_loop(self, action: Callable[[], None]) -> None:
+        """Call `action` soon, on the thread that handles the clients' messages.
+
+        Controls that both the user and the viewer set are set there: another thread could overwrite a value that has
+        arrived before its callback reads it, and the user's change would be lost.
+        """
+        self.server.get_event_loop().call_soon_threadsafe(action)
+
     def on_columns_changed(self, action: Callable[[], None]) -> None:
         """Call `action` after each change of the columns, on the thread that changed them."""
         self._on_columns_changed.append(action)

@@ -89,9 +89,8 @@ class ParameterPanel(Panel):
     """A slider per parameter with its unit, its trained range and the training samples in it."""
 
     def __init__(self, page: Page) -> None:
-        self._schema, self._wake = page.schema, page.wake
+        self._schema, self._wake, self._on_event_loop = page.schema, page.wake, page.on_event_loop
         self._samples, self._presets = _training_samples(page.model), presets(page.schema)
-        self._current = NO_PRESET  # the preset of the sliders, as the dropdown last had it
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
         self._gui = page.server.gui
@@ -151,13 +150,10 @@ class ParameterPanel(Panel):
 
     async def _choose(self, event: viser.GuiEvent) -> None:
         # a coroutine runs at once where the message arrives, before a drag that follows it
-        if event.client_id is None:
-            return
-        if self._preset.value in self._presets:
-            self._current = self._preset.value
-            self.set(self._presets[self._current])
+        if event.client_id is not None and self._preset.value in self._presets:
+            self.set(self._presets[self._preset.value])
         else:
-            self._preset.value = self._current
+            self._refresh_preset()
 
     async def _reset(self, event: viser.GuiEvent) -> None:
         # likewise
@@ -165,12 +161,15 @@ class ParameterPanel(Panel):
         self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
 
     def _refresh(self) -> None:
-        """Let the preset and the strips say what the sliders do."""
+        """Let the preset and the marks below the sliders follow the sliders."""
         values = self._values()
-        preset = next((name for name, preset in self._presets.items() if preset == values), NO_PRESET)
-        if self._current != preset:
-            # only then: the user may just have chosen one, which `_choose` has yet to read
-            self._current = self._preset.value = preset
+        self._on_event_loop(self._refresh_preset)
         for name, strip in self._strips.items():
             parameter = next(p for p in self._schema.parameters if p.name == name)
             set_content(strip, samples_svg(parameter, self._samples.get(name), values[name]))
+
+    def _refresh_preset(self) -> None:
+        values = self._values()
+        preset = next((name for name, preset in self._presets.items() if preset == values), NO_PRESET)
+        if self._preset.value != preset:
+            self._preset.value = preset

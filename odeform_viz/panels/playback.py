@@ -50,7 +50,7 @@ class PlaybackPanel(Panel):
         self._changed()
 
     def describe(self, description: Description) -> None:
-        self._follow(description.frame.request.time)
+        self._page.on_event_loop(self._follow_clock)
 
     def restore(self, state: PageState) -> None:
         self.jump(state.time)
@@ -72,14 +72,14 @@ class PlaybackPanel(Panel):
         self._refresh_button()
 
     async def _dragged(self, event: viser.GuiEvent) -> None:
-        # a coroutine runs at once where the message arrives, before the clock moves the slider on
+        # a coroutine runs at once where the message arrives, before the slider follows the clock again
         if event.client_id is None:
             return  # set by the clock
         time = self._time.value
         if not self._time.min <= time <= self._time.max:
             expected = f"expected seconds from {self._time.min:g} to {self._time.max:g}"
             self._page.notices.show("Time not set", f"time: {expected}, got {time:g}")
-            self._follow(self._clock.time())
+            self._follow_clock()
             return
         self._seeks += 1
         self.jump(time)
@@ -120,7 +120,7 @@ class PlaybackPanel(Panel):
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
 
-    def _follow(self, time: float) -> None:
-        self._time.value = min(max(round(time, 4), self._time.min), self._time.max)
+    def _follow_clock(self) -> None:
+        self._time.value = min(max(round(self._clock.time(), 4), self._time.min), self._time.max)
         if (self._play.label == "Pause") != self._clock.playing:
             self._refresh_button()

@@ -69,7 +69,7 @@ class TruthPanel(Panel):
             self._physics = self._physics_note()
             note = self._physics if self._scene else NO_SIMULATOR
             self._note = gui.add_markdown(note, visible=bool(note))
-        page.on_columns_changed(self._refresh)
+        page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
         self._refresh()
 
     def _build_simulation(self, gui: viser.GuiApi) -> None:
@@ -124,7 +124,7 @@ class TruthPanel(Panel):
                 raise InputError(f"test sequence: expected one of the list, got {label!r}")
         except InputError as error:
             self._page.notices.show("Sequence not opened", str(error))
-        self._refresh()
+        self._page.on_event_loop(self._refresh)
 
     def _origin(self, entry: Entry) -> str:
         return f"{self._schema.scene}/{entry.name}"
