@@ -18,7 +18,7 @@ from odeform_viz.rendering.scene import SceneView
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
 from odeform_viz.runtime.notices import Notices
-from odeform_viz.runtime.server import open_server
+from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.runtime.worker import Worker
 from odeform_viz.session import Session
 from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
@@ -58,7 +58,7 @@ class App:
         try:
             self.recording = RecordingControl(record)
         except InputError:
-            self.server.stop()
+            stop_server(self.server)
             raise
         self._worker = Worker(lambda: self.presenter.serve())
         notices, layout = Notices(self.server), Layout(self.server)
@@ -95,7 +95,7 @@ class App:
         for panel in self.page.panels:
             panel.close()
         self._worker.stop()
-        self.server.stop()
+        stop_server(self.server)
         self._threads.restore_original_limits()
         self.recording.close()
 

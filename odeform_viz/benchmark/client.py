@@ -41,6 +41,7 @@ class Control:
 
     @property
     def visible(self) -> bool:
+        """Whether the page shows it."""
         return self.props.get("visible", True)
 
     @property

@@ -1,11 +1,8 @@
 """Latency without a client: computing a frame, and packing it into messages."""
 
-import contextlib
-import io
 import itertools
 
 import numpy as np
-import viser
 
 from odeform.benchmark.probes import round_splats
 from odeform.benchmark.timing import milliseconds
@@ -13,6 +10,7 @@ from odeform.models.base import Predictor
 from odeform_viz.benchmark.latency import SPLATS, largest_deformation_times
 from odeform_viz.columns import Column, Columns
 from odeform_viz.rendering.scene import SceneView
+from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.session import Session
 from odeform_viz.view import DisplayOptions, ViewRequest
 
@@ -26,8 +24,7 @@ def stages(model: Predictor, messages: int) -> dict[str, float]:
     parameters = model.schema.complete({})
     times = largest_deformation_times(model, messages)
     requests = [ViewRequest(parameters, float(t), "balanced", columns) for t in times]
-    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
-        server = viser.ViserServer(port=0, verbose=False)
+    server = open_server("127.0.0.1", 0, "stages")
     try:
         view = SceneView(server, 0.2, 1)
         view.publish(session.frame(requests[0]), DisplayOptions(), None)
@@ -35,5 +32,5 @@ def stages(model: Predictor, messages: int) -> dict[str, float]:
         frames = itertools.cycle([session.frame(request) for request in requests[:: max(messages // 10, 1)]])
         pack = milliseconds(lambda _: view.publish(next(frames), DisplayOptions(), None), messages)
     finally:
-        server.stop()
+        stop_server(server)
     return {"compute_p50_ms": float(np.median(compute)), "pack_p50_ms": float(np.median(pack))}

@@ -56,9 +56,11 @@ class ColumnView:
         return self.centre(frame) - self._centre
 
     def hide(self) -> None:
+        """Hide the column until it is shown again."""
         self._lane.visible = False
 
     def remove(self) -> None:
+        """Remove all nodes of the column."""
         self._lane.remove()
 
     def show(

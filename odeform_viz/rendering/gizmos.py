@@ -79,6 +79,7 @@ class RegionGizmo:
         controls.on_update(lambda _: self._moved())
 
     def hide(self) -> None:
+        """Remove the region from the scene."""
         if self._visible is not None:
             self._visible[1].remove()
             self._visible = None
@@ -107,6 +108,7 @@ class TransformGizmo:
 
     @property
     def visible(self) -> bool:
+        """Whether arrows and rings are in the scene."""
         return self._controls is not None
 
     def show(self, fit: FittedShape) -> None:
@@ -137,6 +139,7 @@ class TransformGizmo:
         controls.on_update(dragged)
 
     def hide(self) -> None:
+        """Remove arrows, rings and preview from the scene."""
         if self._controls is not None:
             self._controls.remove()
             self._controls = None

@@ -24,6 +24,7 @@ class Clock:
 
     @property
     def playing(self) -> bool:
+        """Whether the time advances."""
         return self._playing
 
     def time(self) -> float:

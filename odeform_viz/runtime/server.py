@@ -11,7 +11,7 @@ import viser
 from odeform.errors import InputError
 from odeform_viz.colors import HANDLE
 
-__all__ = ["open_server"]
+__all__ = ["open_server", "stop_server"]
 
 SWITCH_INTERVAL = 2e-4  # s after which a waiting thread gets the GIL
 
@@ -46,6 +46,12 @@ def open_server(host: str, port: int, title: str) -> viser.ViserServer:
     )
     server.gui.set_panel_label(title)
     return server
+
+
+def stop_server(server: viser.ViserServer) -> None:
+    """Stop a server; clients lose their connection."""
+    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a line
+        server.stop()
 
 
 def _require_free(host: str, port: int) -> None:

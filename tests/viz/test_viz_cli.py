@@ -88,7 +88,7 @@ def test_serves_the_bundled_model_and_completes_its_recording(tmp_path: Path) ->
         process.send_signal(signal.SIGINT)
         printed, errors = process.communicate(timeout=DEADLINE)
         assert process.returncode == 0, errors
-    assert printed.splitlines()[-1] == "stopped"
+    assert printed.strip() == "stopped"
     assert "Traceback" not in errors
     recording = read_recording(record)
     assert recording.frames == len(recording.requests) > 0
