@@ -1,11 +1,11 @@
 """What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
 
 from abc import abstractmethod
-from collections import OrderedDict
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.recent import Recent
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
 from odeform.motion.reduced_space import ReducedSpace
 from odeform.schema import Parameters
@@ -22,7 +22,7 @@ class ReducedModel(Predictor):
 
     def _read(self, checkpoint: Checkpoint) -> None:
         self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
-        self._evaluated: OrderedDict[tuple[int, float], tuple[Geometry, EvaluatedBasis]] = OrderedDict()
+        self._evaluated: Recent[EvaluatedBasis] = Recent(CACHED)
 
     @abstractmethod
     def _trajectory(
@@ -32,14 +32,13 @@ class ReducedModel(Predictor):
 
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
         """The basis on a geometry at an azimuth in radians; the last few are kept."""
-        key = (id(geometry), azimuth)
-        if key not in self._evaluated:
+
+        def evaluated() -> EvaluatedBasis:
             check_finite(geometry)
-            self._evaluated[key] = (geometry, evaluate_basis(geometry, self.space, azimuth))
-            if len(self._evaluated) > CACHED:
-                self._evaluated.popitem(last=False)
-        self._evaluated.move_to_end(key)
-        return self._evaluated[key][1]
+            return evaluate_basis(geometry, self.space, azimuth)
+
+        # a basis holds its geometry, whose id therefore stays its own
+        return self._evaluated.get((id(geometry), azimuth), evaluated)
 
     def _solve(
         self,

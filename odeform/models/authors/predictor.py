@@ -1,71 +1,38 @@
-"""The authors' networks, ready to predict: on the frames that they were trained on, and cubic between these."""
+"""The networks of the paper's authors, ready to predict: on the frames they were trained on, and cubic in between."""
 
 import time
-from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicSpline
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.importers.authors import AUTHORS_MASS_ELASTIC
 from odeform.errors import InputError
-from odeform.geometry.shape import surface_weights
 from odeform.models.authors.file import MODEL
+from odeform.models.authors.motion import FrameMotion
 from odeform.models.authors.network import Networks, normalisation
 from odeform.models.base import Predictor
 from odeform.motion.base import SolveStats
-from odeform.motion.basis import DisplacementBasis
-from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.local_frames import LocalFrames
-from odeform.motion.reduced_motion import ReducedMotion
-from odeform.motion.reduced_space import POSE, ReducedSpace
+from odeform.motion.recent import Recent
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Frames, GaussianSplats, Geometry, MotionSequence, Times
+from odeform.types import Frames, GaussianSplats, Geometry, MotionSequence
 
 __all__ = ["AuthorsModel"]
 
-SCALES = {1: 2.0, 3: 5.0}  # of offsets, by their numbers
-LARGEST = 3.0  # mass or bending that the network sees as 1; it sees 0 as -1
+SCALES = {1: 2.0, 3: 5.0}  # of offsets, by their number of components
+LARGEST = 3.0  # mass or bending that is 1 to the network; 0 is -1
 STAGES = 4  # of a step
-CACHED = 4  # bodies brought to their own frame that are kept
-
-
-@dataclass(frozen=True, eq=False)
-class _Frames:
-    """Motion between frames: a cubic spline through each, the first and the last held beyond.
-
-    `offsets` (T, 3) metres. The deformation is a sum of the frames' own, one mode each.
-    """
-
-    times: Times
-    offsets: Float[np.ndarray, "times 3"]
-    stats: SolveStats
-    last_good: float = float("inf")
-
-    def reduced(self, times: Times) -> Float[np.ndarray, "asked y"]:
-        frames = np.eye(len(self.times))
-        knots = np.concatenate([self.offsets, np.zeros((len(frames), POSE - 3)), frames], axis=1)
-        return CubicSpline(self.times, knots)(np.clip(times, self.times[0], self.times[-1]))
-
-
-class _EvaluatedFrames(EvaluatedBasis):
-    """A body, and how each frame displaces its points: nothing is known between them."""
-
-    @cached_property
-    def local_frames(self) -> LocalFrames:
-        raise InputError("released: a latent for each point tells nothing of gradients; expected a mesh or points")
+CACHED = 4  # bodies in their own frame that are kept
 
 
 class AuthorsModel(Predictor):
-    """A network of the paper's authors: shapes are predicted, not displacements, so that P(0) is only nearly P0.
+    """A network of the paper's authors: it predicts shapes, not displacements, so that P(0) is only close to P0.
 
-    A geometry is taken as it is, in metres and in its own frame: the world adds the offset that is predicted.
+    A geometry is taken as it is, in metres and in its own frame: the world adds the predicted offset.
     """
 
     model = MODEL
@@ -76,22 +43,20 @@ class AuthorsModel(Predictor):
         self._networks = Networks.read(checkpoint.arrays)
         first, count = checkpoint.config["first_frame"], checkpoint.config["frames"]
         times = np.arange(first, first + count) / self.schema.window.rate
-        # the authors' own clock
+        # the authors round times to 10 ms in this scene
         self._times = np.round(times, 2) if self.schema.scene == AUTHORS_MASS_ELASTIC else times
         if (np.diff(self._times) <= 0.0).any():
-            raise ValueError(f"frames at least 10 ms apart, at {self.schema.window.rate:g} a second")
-        self._seated: OrderedDict[tuple[int, tuple[float, ...]], tuple[Geometry, Geometry]] = OrderedDict()
+            raise ValueError(f"frames at least 10 ms apart, at {self.schema.window.rate:g} per second")
+        self._in_body_frame: Recent[tuple[Geometry, Geometry]] = Recent(CACHED)
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
-        """A body that lies in the scene, in its own frame: less the initial offset. Kept for the last few."""
+        """A body at rest in the scene, in its own frame: without the initial offset. The last few are kept."""
         offset = self._offset(self.schema.complete(parameters))
-        key = (id(geometry), tuple(offset))
-        if key not in self._seated:
-            moved = replace(geometry, points=np.asarray(geometry.points, dtype=float) - offset)
-            self._seated[key] = (geometry, moved)
-            if len(self._seated) > CACHED:
-                self._seated.popitem(last=False)
-        return self._seated[key][1]
+
+        def moved() -> tuple[Geometry, Geometry]:
+            return geometry, replace(geometry, points=np.asarray(geometry.points, dtype=float) - offset)
+
+        return self._in_body_frame.get((id(geometry), tuple(offset)), moved)[1]
 
     def _solve(
         self,
@@ -100,7 +65,7 @@ class AuthorsModel(Predictor):
         settings: SolverSettings | None,
         until: float,
         observed: MotionSequence | None,
-    ) -> ReducedMotion:
+    ) -> FrameMotion:
         """The geometry, in its own frame (default: a ball), is its own reference of normalisation.
 
         Always one step per trained frame, for any quality and end: other frames would change the network's answer.
@@ -114,7 +79,7 @@ class AuthorsModel(Predictor):
         offsets, frames = self._frames(geometry, parameters)
         rate, steps = self.schema.window.rate, len(self._times) - 1
         stats = SolveStats(
-            f"RK4 (3/8 rule) on the trained {rate:g} Hz grid, cubic between its frames",
+            f"RK4 (3/8 rule) on the trained {rate:g} Hz grid, cubic between frames",
             steps,
             2 * STAGES * steps,
             0,
@@ -122,38 +87,24 @@ class AuthorsModel(Predictor):
             1e3 * (time.perf_counter() - begin),
             lambda: None,
         )
-        trajectory = _Frames(self._times, offsets, stats)
-        evaluated = _place(geometry, frames)
-        return ReducedMotion(self.schema, parameters, geometry, evaluated.space, evaluated, trajectory)
+        return FrameMotion(self.schema, parameters, geometry, self._times, offsets, frames, stats)
 
     def _offset(self, parameters: Parameters) -> Float[np.ndarray, " 3"]:
-        """(3,) metres at first."""
+        """(3,) metres at the start."""
         given = [value for name, value in parameters.items() if name.startswith("initial_offset")]
         return np.array([0.0] * (3 - len(given)) + given)
 
     def _frames(self, shape: Geometry, parameters: Parameters) -> tuple[Float[np.ndarray, "times 3"], Frames]:
-        """Offsets (T, 3) and displacements (T, N, 3) from the rest, in metres."""
-        numbers, rest = self._networks.offsets, np.asarray(shape.points, dtype=float)
+        """Offsets (T, 3) and displacements (T, N, 3) from rest, in metres."""
+        components, rest = self._networks.offsets, np.asarray(shape.points, dtype=float)
         theta = np.array([value for name, value in parameters.items() if not name.startswith("initial_offset")])
         if self.schema.scene == AUTHORS_MASS_ELASTIC:
             theta = 2.0 * (theta / LARGEST - 0.5)
         middle, half = normalisation(rest)
-        scale = SCALES[numbers]
+        scale = SCALES[components]
         offsets, frames = self._networks.solve(
-            (rest - middle) / half, theta, scale * self._offset(parameters)[-numbers:], self._times
+            (rest - middle) / half, theta, scale * self._offset(parameters)[-components:], self._times
         )
-        # a height is the last of three
-        whole = np.pad(offsets.astype(float) / scale, ((0, 0), (3 - numbers, 0)))
-        return whole, half * frames + (middle - rest)
-
-
-def _place(shape: Geometry, frames: Frames) -> EvaluatedBasis:
-    """Motions of a shape as sums of its displacements (T, N, 3)."""
-    points = np.asarray(shape.points, dtype=np.float32)
-    count = len(points)
-    still = [np.tile(np.eye(3), count), points.reshape(1, -1)]
-    rows = np.concatenate([*still, frames.reshape(len(frames), -1)]).astype(np.float32)
-    none = DisplacementBasis(np.zeros((1, 3)), np.zeros((5, 0)), 1.0)
-    space = ReducedSpace(np.zeros(3), 1.0, none, None)
-    reach = np.linalg.norm(frames, axis=2).max(axis=1)
-    return _EvaluatedFrames(shape, space, 0.0, points, points, rows, reach, surface_weights(shape))
+        # a single component is a height, the last of three
+        padded = np.pad(offsets.astype(float) / scale, ((0, 0), (3 - components, 0)))
+        return padded, half * frames + (middle - rest)

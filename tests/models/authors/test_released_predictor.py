@@ -93,8 +93,8 @@ def test_points_move_and_splats_are_refused(drop: Predictor) -> None:
     rest = body()
     cloud = drop.solve(PointCloud(rest.points))
     assert np.array_equal(cloud.vertices(2.2), drop.solve(rest).vertices(2.2))
-    with pytest.raises(InputError, match="gradients"):
-        cloud.gradients(2.2)
+    with pytest.raises(InputError, match="splats"):
+        cloud.covariances(2.2)
     count = len(rest.points)
     splats = GaussianSplats(rest.points, np.zeros((count, 3, 3)), np.zeros((count, 1, 3)), np.ones(count))
     with pytest.raises(InputError, match="splats"):
