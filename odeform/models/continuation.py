@@ -1,13 +1,13 @@
 """The motion beyond the trained window: a learned autonomous dynamics in phase space.
 
-A latent state that is told the time knows nothing of times it was not trained on. What a body does next follows from
-where it is, how it moves and how it is deformed, whatever the time. From frame to frame of the trained rate,
+A latent state that depends on the time knows nothing of times it was not trained on. What a body does next follows
+from its position, motion and deformation, at any time. From frame to frame of the trained rate,
 
     y[k+1] = flight(y[k], y[k-1]) + sum_j weights[j] exp(-|features(y[k], y[k-1], theta) - centers[j]|^2 / 2).
 
-`flight` is the prior: constant acceleration of the shift, constant rate of turn, no deformation. The rest is what the
-training motions do otherwise, at contacts: kernel ridge regression on centres chosen among them (Rasmussen and
-Williams, Gaussian Processes for Machine Learning, 8.3.1). Far from all of them it is zero, and the body flies.
+`flight` is the prior: constant acceleration of the shift, constant rate of rotation, no deformation. The sum is how
+training motions differ from it, at contacts: kernel ridge regression on centres chosen among them (Rasmussen and
+Williams, Gaussian Processes for Machine Learning, 8.3.1). Far from all centres it is zero, and the body flies.
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,7 @@ from jaxtyping import Float
 from odeform.motion.base import SolveStats
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
+from odeform.motion.splines import catmull_rom
 from odeform.schema import Window
 from odeform.types import Arrays, Floats
 
@@ -29,26 +30,27 @@ PREFIX = "continuation."
 def kernel(
     features: Float[np.ndarray, "states features"], centers: Float[np.ndarray, "centers features"]
 ) -> Float[np.ndarray, "states centers"]:
+    """Gaussian kernel exp(-|f - c|^2 / 2) between features and centres."""
     squares = (features**2).sum(axis=-1)[:, None] + (centers**2).sum(axis=-1)
     return np.exp(np.minimum(features @ centers.T - 0.5 * squares, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Dynamics:
-    """The next frame of a motion from its last two. Heights are those of the anchor above where it rests."""
+    """The next frame of a motion from its last two. Heights are those of the anchor above its rest position."""
 
     gravity: Float[np.ndarray, "3"]
     """Metres per frame squared."""
     touch: float
-    """The height in metres below which a body that has not turned meets something."""
+    """The height in metres below which a body that has not turned is in contact."""
     width: float
-    """Metres below `touch` over which motion comes to matter."""
+    """Metres below `touch` over which the features of the motion set in."""
     gains: Float[np.ndarray, "features"]
     centers: Float[np.ndarray, "centers features"]
     weights: Float[np.ndarray, "centers y"]
 
     def flight(self, before: Float[np.ndarray, "*batch y"], now: Float[np.ndarray, "*batch y"]) -> Floats:
-        """The next frame (..., 6 + K) of a body that meets nothing."""
+        """The next frame (..., 6 + K) of a body without contact."""
         out = 2.0 * now - before
         out[..., :3] += self.gravity
         out[..., POSE:] = 0.0
@@ -62,7 +64,7 @@ class Dynamics:
     ) -> Floats:
         """(..., features): depths below `touch`, motion since the last frame, deformation and parameters.
 
-        Off the ground an undeformed body has none: all of free flight is one place, of any height, speed and mass.
+        An undeformed body off the ground has zero features: free flight is a single point, at any height and speed.
         """
         ahead = 2.0 * now[..., 2:3] - before[..., 2:3] + self.gravity[2]
         depths = np.maximum(self.touch - np.concatenate([ahead, now[..., 2:3]], axis=-1), 0.0)
@@ -77,6 +79,7 @@ class Dynamics:
         now: Float[np.ndarray, "states y"],
         theta: Float[np.ndarray, "states parameters"],
     ) -> Float[np.ndarray, "states y"]:
+        """The next frame (S, 6 + K) from the last two."""
         return self.flight(before, now) + kernel(self.features(before, now, theta), self.centers) @ self.weights
 
     def arrays(self) -> Arrays:
@@ -86,7 +89,7 @@ class Dynamics:
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, coordinates: int, parameters: int) -> "Dynamics | None":
-        """None where a checkpoint has none. ValueError unless they are of 6 + K coordinates, and finite."""
+        """None for a checkpoint without continuation. ValueError unless arrays are finite and of 6 + K coordinates."""
         if PREFIX + "weights" not in arrays:
             return None
         gravity, ground, gains, centers, weights = (
@@ -94,57 +97,55 @@ class Dynamics:
         )
         features = 2 + POSE + 2 * (coordinates - POSE) + parameters
         count = len(weights)
-        wanted = ((3,), (2,), (features,), (count, features), (count, coordinates))
-        for array, shape in zip((gravity, ground, gains, centers, weights), wanted, strict=True):
+        shapes = ((3,), (2,), (features,), (count, features), (count, coordinates))
+        for array, shape in zip((gravity, ground, gains, centers, weights), shapes, strict=True):
             if array.shape != shape or not np.isfinite(array).all():
                 raise ValueError(f"{PREFIX}: expected finite arrays, one of shape {shape}, got {array.shape}")
         return cls(gravity, float(ground[0]), float(ground[1]), gains, centers, weights)
 
 
 class ContinuedTrajectory:
-    """A trajectory up to the end of the trained window, to the last bit as it is, and the dynamics from there on.
+    """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on.
 
-    Frames of the trained rate, each from the two before: whatever times are asked for, they are the same ones. Between
-    them a cubic with central differences for slopes (Catmull and Rom 1974), which is exact for free flight.
+    Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
+    spline between them is exact for free flight.
     """
 
-    def __init__(self, known: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> None:
-        self._known, self._dynamics, self._theta = known, dynamics, theta
+    def __init__(self, solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> None:
+        self._solved, self._dynamics, self._theta = solved, dynamics, theta
         self._stop, self._rate = window.stop, window.rate
         self._frames: list[Floats] = []
 
     @property
     def stats(self) -> SolveStats:
-        return self._known.stats
+        return self._solved.stats
 
     @property
     def last_good(self) -> float:
-        return self._known.last_good
+        return self._solved.last_good
 
     def reduced(self, times: Floats) -> Floats:
-        asked = np.asarray(times, dtype=float)
-        y = self._known.reduced(np.minimum(asked, self._stop))
-        later = asked > self._stop
-        # one that fails within the window stays as it was last
+        """(T,) seconds -> (T, 6 + K)."""
+        times = np.asarray(times, dtype=float)
+        y = self._solved.reduced(np.minimum(times, self._stop))
+        later = times > self._stop
+        # a trajectory that failed within the window stays at its last state
         if later.any() and self.last_good >= self._stop:
             y = y.copy()
-            y[later] = self._between(self._rate * (asked[later] - self._stop))
+            y[later] = self._between(self._rate * (times[later] - self._stop))
         return y
 
     def _between(self, frames: Floats) -> Floats:
-        """(T, 6 + K) at (T,) frames after the end of the window, not whole ones."""
+        """(T, 6 + K) at (T,) frames after the end of the window, as fractions."""
         index = np.floor(frames).astype(int)
         self._extend(int(index.max()) + 4)
-        # the first of them is a frame before the end
-        last, here, there, after = (np.stack([self._frames[i + k] for i in index]) for k in range(4))
-        u = (frames - index)[:, None]
-        start, end = 0.5 * (there - last), 0.5 * (after - here)
-        bend = 2.0 * (here - there) + start + end
-        return here + u * (start + u * (3.0 * (there - here) - 2.0 * start - end + u * bend))
+        # the first kept frame is one before the end of the window
+        four = [np.stack([self._frames[i + k] for i in index]) for k in range(4)]
+        return catmull_rom(*four, share=(frames - index)[:, None])
 
     def _extend(self, count: int) -> None:
         if not self._frames:
-            self._frames = list(self._known.reduced(self._stop - np.array([1.0, 0.0]) / self._rate))
+            self._frames = list(self._solved.reduced(self._stop - np.array([1.0, 0.0]) / self._rate))
         while len(self._frames) < count:
             before, now = (frame[None] for frame in self._frames[-2:])
             self._frames.append(self._dynamics.next(before, now, self._theta[None])[0])

@@ -1,4 +1,4 @@
-"""How wrong a model is likely to be: an error bar from its errors on sequences that it was not trained on."""
+"""How wrong a model is likely to be: an error band from its errors on sequences that it was not trained on."""
 
 import numpy as np
 
@@ -8,35 +8,36 @@ __all__ = ["ErrorBand"]
 
 NOMINAL = 0.9
 WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
-"""Candidates for the distance in normalised parameters over which errors are alike."""
+"""Candidates for the distance in normalised parameters over which errors are similar."""
 TINY = 1e-6  # mm
-FARTHEST = 10.0  # widths outside, from where on the band is as wide as it gets
-ABOUT = 0.05  # of the frames on either side have their say in the quantiles of a frame
+FARTHEST = 10.0  # widths outside the trained range, from where on the band stops widening
+ABOUT = 0.05  # share of the frames, on either side, that the quantiles of a frame are taken over
 
 
 class ErrorBand:
-    """The RMSE that half, and `NOMINAL` of all, unseen motions of these parameters keep to at a time.
+    """The RMSE over time that half, and a share `NOMINAL`, of unseen motions with given parameters stay within.
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
-    the product of a profile over time, a scale that is smooth over the parameters, and a rest whose quantiles about
-    each time, with each sequence's scale told by the others alone, make the band. Beyond the trained ranges nothing was
-    validated: there the band doubles with each `width` outside. Beyond the window it grows in proportion to the time,
-    or as the errors of a continuation did when it foretold the last third of the window, if that is more.
+    the product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles
+    around each time make the band; the scale of a sequence is estimated from the others alone. Beyond the trained
+    ranges nothing was validated: there the band doubles with each `width` outside. Beyond the window it grows in
+    proportion to the time, or as the errors of the continuation did when it predicted the last third of the window, if
+    that is more.
     """
 
     def __init__(self, arrays: Arrays) -> None:
-        """`val.theta` (S, P) in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T); KeyError without them. Of a
-        continuation, `val.later_mm` (S, L) so many frames after the last that it was given."""
+        """From `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
+        continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
         profile = np.median(logs, axis=0)
         self._levels = (logs - profile).mean(axis=1)
-        rests = {width: self._levels - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
-        self._width = min(WIDTHS, key=lambda width: float((rests[width] ** 2).mean()))
-        rest = logs - profile - (self._levels - rests[self._width])[:, None]
+        residuals = {width: self._levels - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
+        self._width = min(WIDTHS, key=lambda width: float((residuals[width] ** 2).mean()))
+        residual = logs - profile - (self._levels - residuals[self._width])[:, None]
         near, count = round(ABOUT * len(profile)), len(profile)
-        quantiles = [np.quantile(rest[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
+        quantiles = [np.quantile(residual[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
         self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
         later = arrays.get("val.later_mm", np.zeros((1, 1)))
         self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
@@ -50,7 +51,7 @@ class ErrorBand:
         return (weights @ self._levels) / weights.sum(axis=1)
 
     def at(self, theta: Floats, times: Times) -> Floats:
-        """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and what `NOMINAL` keep to."""
+        """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and the quantile `NOMINAL`."""
         inside = np.clip(theta, -1.0, 1.0)
         outside = min(float(np.linalg.norm(theta - inside)) / self._width, FARTHEST)
         level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * outside

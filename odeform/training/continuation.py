@@ -1,4 +1,4 @@
-"""What continues motions beyond the window, fitted to all training motions, and kept where it foretells."""
+"""The dynamics that continue motions beyond the window: fitted to training motions, kept where they predict well."""
 
 from dataclasses import replace
 
@@ -12,17 +12,17 @@ from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
 
-__all__ = ["fit_dynamics", "foretold", "with_continuation"]
+__all__ = ["fit_dynamics", "predicted_errors", "with_continuation"]
 
 # chosen on validation sequences of `mass-elastic`, ten frames beyond windows of 40, 45, 50, 60, 65, 70, 80 and 90
 CENTERS = 300
 RIDGE = 1e-7  # on the mean square over states
-MOTION = 0.3  # gain of changes of deformation, in largest ones; depths, velocities and deformations have 1
+MOTION = 0.3  # gain of changes of deformation, relative to the largest; depths, velocities and deformations have 1
 PARAMETERS = 0.3  # gain of parameters, in halves of their range
 WIDTH = 0.05  # of the largest depth
-FREE = 0.01  # of the largest acceleration that is not gravity: what is less is no contact
+FREE = 0.01  # share of the largest acceleration besides gravity, below which there is no contact
 CANDIDATES = 20_000  # states among which centres are chosen
-TINY = 1e-9  # metres; smaller is nothing
+TINY = 1e-9  # metres; against division by zero
 
 
 def _largest(vectors: Floats) -> float:
@@ -32,7 +32,7 @@ def _largest(vectors: Floats) -> float:
 def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, float]:
     """Gravity in metres per frame squared, the height of first touch, and the largest depth below it, in metres.
 
-    Where bodies are in the upper half of their heights they are taken to fly.
+    Bodies in the upper half of their heights are assumed to fly.
     """
     acceleration = (after - 2.0 * now + before)[:, :3]
     height = now[:, 2]
@@ -44,9 +44,9 @@ def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, 
 
 
 def _spread(features: Floats, count: int) -> Floats:
-    """(C, F) of the features (S, F), the ones that the others follow from best.
+    """(C, F) of the features (S, F), chosen so that the kernel explains the others best.
 
-    Each is the one that the kernel explains least by those before it: pivoted Cholesky (Fine and Scheinberg 2001).
+    Each is the one that those before it explain least: pivoted Cholesky (Fine and Scheinberg 2001).
     """
     unexplained, factor, chosen = np.ones(len(features)), np.zeros((len(features), count)), []
     while len(chosen) < count and unexplained.max() > 1e-7:
@@ -61,9 +61,9 @@ def _spread(features: Floats, count: int) -> Floats:
 
 
 def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: int = 0) -> Dynamics:
-    """From parameters (S, P) in [-1, 1] and motions (S, T, 6 + K) of at least three frames."""
+    """Fit to parameters (S, P) in [-1, 1] and motions (S, T, 6 + K) of at least three frames."""
     before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
-    told = np.repeat(theta, reduced.shape[1] - 2, axis=0)
+    conditions = np.repeat(theta, reduced.shape[1] - 2, axis=0)
     gravity, touch, depth = _ground(before, now, after)
     change = now - before
     speed, bent, bending = (_largest(part) for part in (change[:, :3], now[:, POSE:], change[:, POSE:]))
@@ -73,32 +73,32 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
     empty = np.zeros((0, len(gains))), np.zeros((0, reduced.shape[2]))
     dynamics = Dynamics(gravity, touch, WIDTH * depth, gains, *empty)
-    features = dynamics.features(before, now, told)
+    features = dynamics.features(before, now, conditions)
     drawn = np.random.default_rng(seed).permutation(len(features))[:CANDIDATES]
     centers = _spread(features[drawn], CENTERS)
-    seen = kernel(features, centers)
-    normal = seen.T @ seen + RIDGE * len(features) * kernel(centers, centers)
+    values = kernel(features, centers)
+    normal = values.T @ values + RIDGE * len(features) * kernel(centers, centers)
     normal[np.diag_indices_from(normal)] += 1e-10 * np.trace(normal) / len(normal)  # against rounding
-    weights = np.linalg.solve(normal, seen.T @ (after - dynamics.flight(before, now)))
+    weights = np.linalg.solve(normal, values.T @ (after - dynamics.flight(before, now)))
     return replace(dynamics, centers=centers, weights=weights)
 
 
-def foretold(model: ODeform, data: TrainingData) -> Floats | None:
-    """(S, L) mm RMSE of the last third of the window, kept from the fit, of the validation motions, when continued from
-    the model's own motions. None if they are nearer to motions that stop there, or where a spline filled in frames: it
-    knows no contacts."""
-    known = round(len(data.times) / (1.0 + REACH))
-    if known < 4 or not data.observed["train"].all():
+def predicted_errors(model: ODeform, data: TrainingData) -> Floats | None:
+    """(S, L) RMSE in mm of the validation motions over the last third of the window, which is held out of the fit, when
+    continued from the model's own motions. None if motions that stop there have smaller errors, and where a spline
+    filled in frames: it knows no contacts."""
+    kept = round(len(data.times) / (1.0 + REACH))
+    if kept < 4 or not data.observed["train"].all():
         return None
-    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :known], data.space.gyration_radius)
-    window = replace(data.schema.window, stop=float(data.times[known - 1]))
-    evaluated, later = model.evaluate_basis(model.rest, 0.0), data.times[known:]
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"][:, :kept], data.space.gyration_radius)
+    window = replace(data.schema.window, stop=float(data.times[kept - 1]))
+    evaluated, later = model.evaluate_basis(model.rest, 0.0), data.times[kept:]
     continued, stopped = [], []
     for theta in data.theta["val"]:
         motion = model.integrate(theta, evaluated, model.qualities["reference"], window.stop)
         continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
-    truth, gyration_radius = data.reduced["val"][:, known:], data.space.gyration_radius
+    truth, gyration_radius = data.reduced["val"][:, kept:], data.space.gyration_radius
     moved, held = (
         small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (continued, stopped)
     )
@@ -106,9 +106,9 @@ def foretold(model: ODeform, data: TrainingData) -> Floats | None:
 
 
 def with_continuation(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained model with the dynamics that continue it, and their errors on validation; as it is
-    where these do not foretell."""
-    errors = foretold(ODeform(checkpoint), data)
+    """The checkpoint of a trained model with the dynamics that continue it and their validation errors; unchanged where
+    these dynamics predict worse than motions that stop."""
+    errors = predicted_errors(ODeform(checkpoint), data)
     if errors is None:
         return checkpoint
     dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.gyration_radius)

@@ -1,9 +1,9 @@
 """Training of the ODeform network by whole roll-outs and variable projection.
 
-The readout of the decoders is linear, so its best value for any states is known: a least-squares solve. Each step
-solves for it on its batch and descends in everything else (variable projection, Golub & Pereyra 1973): descent shapes
-the states, and the last millimetres, which it would take hours for, come from the solve. Once that is done, random
-features of what the decoders see widen them, and one solve in double precision uses them all.
+The readout of the decoders is linear, so its best value for given states is a least-squares solve. Each step solves for
+it on its batch and descends in everything else (variable projection, Golub & Pereyra 1973): descent shapes the states,
+and the solve removes the last millimetres, which would take descent hours. Afterwards random features of the decoders'
+inputs are added, and one solve in double precision uses them all.
 """
 
 import time
@@ -24,12 +24,12 @@ __all__ = ["network_weights", "train_network"]
 
 
 def _descend(trainer: Trainer, config: TrainConfig, report: Callable[[str], None], part: Path | None) -> None:
-    """Take steps until the budget of `config` is spent."""
+    """Take steps until the budget of `config` is spent; save the state to `part` now and then."""
     seconds = 60.0 * config.minutes * (1.0 - config.widening * bool(config.random_features))
     begin, printed = time.process_time() - trainer.elapsed, trainer.elapsed
 
     def spent() -> float:
-        """The share of the budget."""
+        """The share of the budget that is spent."""
         done, budget = (trainer.elapsed, seconds) if config.steps is None else (trainer.done, config.steps)
         return done / budget if budget else 1.0
 
@@ -60,9 +60,9 @@ def train_network(
     part: Path | None = None,
     resume: bool = False,
 ) -> dict[str, float]:
-    """Train in place, on a GPU where there is one; returns validation errors in mm and the number of steps.
+    """Train in place, on a GPU if there is one; return validation errors in mm, steps, batch size and seconds.
 
-    The state goes to the file `part` at every report and when interrupted; `resume` continues from there.
+    The state is written to `part` at every report and on interruption; `resume` continues from there.
     """
     begin = time.process_time()
     with small_batches():
@@ -72,7 +72,7 @@ def train_network(
             begin -= trainer.elapsed
             report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
         elif part is not None and part.exists():
-            report(f"starts anew; {part} of an interrupted training will be overwritten (--resume would continue it)")
+            report(f"starts over and overwrites {part} of an interrupted training (--resume would continue it)")
         _descend(trainer, config, report, part)
         if part is not None:
             trainer.save(part)
@@ -89,11 +89,12 @@ def train_network(
         "val_rigid_rmse_mm": rigid,
         "val_deformation_rmse_mm": local,
         "steps": trainer.done,
+        "batch": trainer.batch,
         "seconds": time.process_time() - begin,
     }
 
 
 def network_weights(net: ODeformNet) -> Arrays:
-    """All in single precision but readouts, whose large weights cancel."""
+    """Arrays of a checkpoint: single precision, except for readouts, whose large weights cancel."""
     state = {name: value.detach().cpu() for name, value in net.state_dict().items()}
     return {k: (v if k.endswith("readout.weight") else v.float()).numpy() for k, v in state.items()}

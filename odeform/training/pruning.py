@@ -1,6 +1,6 @@
-"""Without the modes that a trained model does not need: each is read, added and sent for every point of every frame.
+"""Drops the modes that a trained model does not need: each costs time and memory at every point of every frame.
 
-How many modes the data need is known before training, how many of them a network knows well enough to tell, only after.
+How many modes the data need is known before training; how many of them a network predicts well, only after.
 """
 
 from dataclasses import replace
@@ -17,13 +17,14 @@ __all__ = ["FINE", "LARGE", "needed_modes", "without_modes"]
 
 FINE = SolverSettings("dopri5", tolerance=1e-6, dtype="float64")
 WORSE = 1.01
-"""As many times the error of the deformation may be without the modes that are left out, where there is one to see."""
+"""Factor by which dropping modes may increase the error of large deformations."""
 LARGE = 0.1
-"""Of its peak in a motion: what `deformation_relative` looks at, too. Errors long after a contact would hide others."""
+"""Share of the peak from which a deformation is large, as in `deformation_relative`: errors long after a contact would
+hide others."""
 
 
 def needed_modes(model: ODeform, data: TrainingData) -> int:
-    """As few of the first modes as miss the large deformations of the validation motions by hardly more than all do."""
+    """The fewest modes whose error of large validation deformations is at most `WORSE` times that of all modes."""
     evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
     motions = [model.integrate(theta, evaluated, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
     truth = data.reduced["val"][..., POSE:]
@@ -31,13 +32,13 @@ def needed_modes(model: ODeform, data: TrainingData) -> int:
     weights = data.observed["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
     off = np.stack(motions)[..., POSE:] - truth
     missed, still = (np.einsum("st,stk->k", weights, x**2) for x in (off, truth))
-    # what is left out is missed as a whole
+    # the error of a dropped mode is the whole mode
     errors = [missed[:count].sum() + still[count:].sum() for count in range(1, len(missed) + 1)]
     return 1 + int(np.argmax(np.array(errors) <= WORSE**2 * errors[-1]))
 
 
 def without_modes(checkpoint: Checkpoint, data: TrainingData) -> tuple[Checkpoint, TrainingData]:
-    """The checkpoint of a trained ODeform and its data, with the modes that it needs."""
+    """The checkpoint of a trained ODeform and its data, with only the modes that it needs."""
     count = needed_modes(ODeform(checkpoint), data)
     space = replace(data.space, basis=data.space.basis.first(count))
     reduced = {split: y[..., : POSE + count] for split, y in data.reduced.items()}

@@ -1,4 +1,4 @@
-"""What integration costs and how far it is off: the frontier of a checkpoint, from its own validation split."""
+"""Cost and error of the integration: the frontier of a checkpoint, measured on its own validation split."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,8 +17,8 @@ from odeform.types import Floats
 __all__ = ["choose_qualities", "measure_frontier", "with_qualities"]
 
 SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
-"""Solver error that a quality may add, as a share of the model's own: of all, and of the deformation alone. A tenth
-adds half a per cent to the total, three tenths four to the deformation."""
+"""Solver error that a quality may add, as a share of the model's own error: in total, and of the deformation alone. A
+tenth adds half a per cent to the total error, three tenths add four per cent to that of the deformation."""
 
 
 def _candidates(step: float) -> list[SolverSettings]:
@@ -30,22 +30,22 @@ def _candidates(step: float) -> list[SolverSettings]:
 
 
 def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
-    """The settings worth choosing from, and the model's own errors in mm, over the validation sequences.
+    """The non-dominated settings, and the model's own errors in mm, over the validation sequences.
 
-    The solver's error is that against tolerance 1e-10 in double precision, the model's that of this reference against
-    the data, of all and of the deformation alone; both are root mean squares over the body's points and coordinates,
-    and over time.
+    The solver's error is measured against tolerance 1e-10 in double precision, the model's is that of this reference
+    against the data; both in total and of the deformation alone, as root mean squares over points, coordinates and
+    time.
     """
     evaluated = model.evaluate_basis(model.rest, 0.0)
 
     def motions(quality: SolverSettings) -> tuple[Floats, float]:
-        """(S, T, y), not a number where the integration failed, and the mean count of evaluations."""
+        """(S, T, y), NaN where the integration failed, and the mean number of evaluations."""
         stop = float(data.times[-1])
         solved = [model.integrate(theta, evaluated, quality, stop) for theta in data.theta["val"]]
         reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
-    # what a spline filled in is no truth, and at rest nothing is missed
+    # frames that a spline filled in are no truth, and at rest there is no error
     frames = data.observed["val"] & (data.times > 0.0)
 
     def errors_mm(motion: Floats, truth: Floats) -> tuple[float, float]:
@@ -67,7 +67,7 @@ def choose_qualities(
     model_errors_mm: tuple[float, float],
     shares: Mapping[str, tuple[float, float]] = SHARES,
 ) -> dict[str, Any]:
-    """Settings of each quality: the cheapest whose errors keep to their shares of the model's; the finest of all."""
+    """Settings of each quality: the cheapest within its shares of the model's errors; `reference` is the finest."""
     chosen = {
         name: cheapest_within_error(frontier, *np.multiply(share, model_errors_mm)) for name, share in shares.items()
     }
@@ -75,8 +75,7 @@ def choose_qualities(
 
 
 def with_qualities(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained model, with its frontier and the qualities on it: the solver may add to the model's
-    error, not more."""
+    """The checkpoint of a trained model with its frontier, and the qualities that are chosen on it."""
     frontier, errors_mm = measure_frontier(ODeform(checkpoint), data)
     settings = {"qualities": choose_qualities(frontier, errors_mm), "frontier": [p.to_json() for p in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})

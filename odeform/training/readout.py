@@ -1,6 +1,6 @@
-"""What is solved for rather than descended to: the readout of a decoder, and random features that make it wider.
+"""What is solved for, not descended in: the readout of a decoder, and random features that widen it.
 
-A readout is linear, so its best value for any features is a least-squares solve.
+A readout is linear, so its best value for given features is a least-squares solve.
 """
 
 import torch
@@ -10,14 +10,14 @@ __all__ = ["NormalEquations", "random_layer"]
 STATE_GAINS = (0.1, 1.0)
 CLOCK_GAINS = (1.0, 10.0)
 PARAMETER_GAINS = (0.1, 1.0)
-"""How sharply features bend at sharpness 1: per standard deviation of the principal components together, per unit of
-the clock, and of parameters. Each draws its own between these, alike on a logarithmic scale: contacts are short, and
-where a bounce sends a body depends on the parameters more finely than the motion until then does.
+"""Slopes of random features at sharpness 1: per standard deviation of the principal components together, per unit of
+the clock, and of parameters. Each feature draws its own between these, uniformly on a logarithmic scale: contacts are
+short, and the motion after a bounce depends on the parameters more finely than the motion before.
 """
 
 
 def _squared(x: torch.Tensor) -> torch.Tensor:
-    """x.T x; on a processor by numpy, which computes one half of it alone."""
+    """x.T x; on a CPU by numpy, which computes only one half."""
     if x.device.type != "cpu":
         return x.T @ x
     rows = x.numpy()
@@ -25,7 +25,7 @@ def _squared(x: torch.Tensor) -> torch.Tensor:
 
 
 class NormalEquations:
-    """Those of one decoder's readout, in double precision; features may come in chunks."""
+    """The normal equations of one decoder's readout, in double precision; features may be added in chunks."""
 
     def __init__(self) -> None:
         self._gram: torch.Tensor | None = None
@@ -38,7 +38,7 @@ class NormalEquations:
         self._gram, self._cross = (gram, cross) if self._gram is None else (self._gram + gram, self._cross + cross)
 
     def solve(self, ridge: float) -> torch.Tensor:
-        """(outputs, F), with a ridge relative to the mean square of a feature."""
+        """The readout (outputs, F), with a ridge relative to the mean square of a feature."""
         assert self._gram is not None
         gram = self._gram.clone()
         gram.diagonal().add_(ridge * gram.diagonal().mean() + 1e-30)
@@ -46,31 +46,31 @@ class NormalEquations:
 
 
 def random_layer(
-    seen: list[torch.Tensor],
+    inputs: list[torch.Tensor],
     parameters: int,
     components: int,
     count: int,
     sharpness: float,
     generator: torch.Generator,
 ) -> dict[str, torch.Tensor]:
-    """Weights of two linear layers: whitened principal components of what is seen, and random directions in them.
+    """Weights of two linear layers: whitened principal components of the inputs, and random directions in them.
 
-    `seen` are (rows, inputs) of which the last columns, the clock and `parameters` in [-1, 1], are passed on as they
-    are. Values are rounded to single precision, as checkpoints keep them.
+    `inputs` are chunks (rows, inputs), of which the last columns, the clock and `parameters` in [-1, 1], are passed on
+    unchanged. Weights are rounded to single precision, as checkpoints store them.
     """
-    told = 1 + parameters
-    split = seen[0].shape[1] - told
-    rows = sum(len(x) for x in seen)
-    mean = torch.stack([x[:, :split].double().sum(dim=0) for x in seen]).sum(dim=0) / rows
-    spread = torch.stack([(c := x[:, :split].double() - mean).T @ c for x in seen]).sum(dim=0) / rows
+    conditions = 1 + parameters
+    split = inputs[0].shape[1] - conditions
+    rows = sum(len(x) for x in inputs)
+    mean = torch.stack([x[:, :split].double().sum(dim=0) for x in inputs]).sum(dim=0) / rows
+    spread = torch.stack([(c := x[:, :split].double() - mean).T @ c for x in inputs]).sum(dim=0) / rows
     values, vectors = torch.linalg.eigh(spread)
     values, vectors = values.flip(0)[:components], vectors.flip(1)[:, :components]
     # directions without motion carry nothing but rounding
     gains = torch.where(values > 1e-10 * values[0], values.clamp_min(1e-300).rsqrt(), 0.0)
-    squeeze = torch.zeros(components + told, split + told, dtype=torch.float64)
+    squeeze = torch.zeros(components + conditions, split + conditions, dtype=torch.float64)
     squeeze[:components, :split] = gains[:, None] * vectors.T
-    squeeze[components:, split:] = torch.eye(told, dtype=torch.float64)
-    offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(told, dtype=torch.float64)])
+    squeeze[components:, split:] = torch.eye(conditions, dtype=torch.float64)
+    offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(conditions, dtype=torch.float64)])
     draw = {"generator": generator, "dtype": torch.float64, "device": generator.device}
     directions, reach = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
     for width, (low, high) in ((components, STATE_GAINS), (1, CLOCK_GAINS), (parameters, PARAMETER_GAINS)):

@@ -1,4 +1,4 @@
-"""The network before its first step."""
+"""The network before the first training step."""
 
 import numpy as np
 import torch
@@ -11,11 +11,14 @@ from odeform.motion.reduced_space import POSE
 
 __all__ = ["build_network", "training_shape"]
 
-CLOCK_GAINS = (3.0, 30.0)  # how sharply features of the clock bend at first: contacts are short, and descent is slow
+CLOCK_GAINS = (
+    3.0,
+    30.0,
+)  # initial slopes of features of the clock: contacts are short, and descent sharpens slowly
 
 
 def build_network(data: TrainingData, seed: int) -> ODeformNet:
-    """A fresh network, whitened by the training data alone."""
+    """A new network, whitened by the training data alone."""
     torch.manual_seed(seed)
     train = data.reduced["train"]
     config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE)
@@ -24,16 +27,16 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
     gains = np.concatenate(
         [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
     )
-    # what does not move, as the turn of a ball that falls straight, is not blown up to size one
+    # what does not move, such as the rotation of a ball that falls straight, is not scaled up to one
     floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.gyration_radius, 1.0], [3, 3, len(gains) - POSE])
     floor[POSE:] = 1e-9
     net.gains.copy_(torch.as_tensor(np.maximum(gains, floor)))
-    # fields of order one should cross the latent space in a few frames, not in a second
+    # a field of order one should cross the latent space in a few frames, not in a second
     net.time_scale.fill_(0.05)
     for decoder in net.decoders:
         for layer in decoder.hidden:
             if isinstance(layer, nn.Linear):
-                # features have to differ before a readout can make use of them
+                # features must differ before a readout can use them
                 layer.weight.data *= 2.0
                 nn.init.uniform_(layer.bias, -1.0, 1.0)
         first = decoder.hidden[0]
@@ -49,5 +52,5 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
 
 
 def training_shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
-    """Points (N, 3) in units of the body's size, and their weights (N,)."""
+    """Points (N, 3) in units of the radius of gyration, and their weights (N,)."""
     return torch.as_tensor(data.rest / data.space.gyration_radius).float(), torch.as_tensor(data.weights).float()

@@ -1,4 +1,4 @@
-"""Descent: one step at a time, with what it needs kept on one device, and a state that can be saved and restored."""
+"""Gradient descent on roll-outs: one step at a time, on one device, with a state that can be saved and restored."""
 
 import json
 import math
@@ -27,18 +27,20 @@ from odeform.training.tree import fill, strip
 
 __all__ = ["CHUNK", "Trainer"]
 
-CHUNK = 64  # sequences rolled out at once where no gradients are wanted
+CHUNK = 64  # sequences rolled out at once where no gradients are needed
 
 
 def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
-    """Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al. 2024): roll-outs bend the loss differently in
-    every direction, and it takes hundreds of steps to where Adam takes thousands."""
+    """Adam in the eigenbasis of Shampoo's preconditioner (Vyas et al. 2024). The loss of roll-outs is badly
+    conditioned: SOAP takes hundreds of steps where Adam takes thousands."""
     from pytorch_optimizer import SOAP
 
     return SOAP(weights, lr=rate, weight_decay=1e-4)
 
 
 class Trainer:
+    """A network in training. Readouts of decoders are solved for in each step, everything else is descended in."""
+
     def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device) -> None:
         self.net, self.config, self.device = net.to(device), config, device
         self.metric = Metric(net.gains, data.space.gyration_radius)
@@ -52,12 +54,12 @@ class Trainer:
         self.observed = {"train": torch.where(train, 1.0, FILLED_WEIGHT), "val": val.float()}
         self.theta = {k: torch.as_tensor(v).float().to(device) for k, v in data.theta.items()}
         self.times = torch.as_tensor(data.times).float().to(device)
-        self.shown, self.counted = (
+        self.visible, self.counted = (
             torch.as_tensor(v.T.copy()).to(device) for v in observed_frames(data.observed["train"])
         )
-        # of whole motions every other frame tells as much, and a solve costs as much as the roll-out; where fewer are
-        # known all are solved for, and a batch has more motions
-        whole, few = len(self.times), len(self.shown)
+        # a solve costs as much as a roll-out, and every other frame of whole motions is as good as all; where fewer
+        # frames are observed, the solve uses all of them, and a batch has more motions
+        whole, few = len(self.times), len(self.visible)
         self.stride = 2 if 2 * few > whole else 1
         self.batch = max(config.batch, config.batch * whole // (2 * few))
         frame = float(data.times[1] - data.times[0])
@@ -76,32 +78,32 @@ class Trainer:
         self.elapsed = 0.0
 
     def states(self, theta: torch.Tensor, counts: list[int]) -> torch.Tensor:
-        """At the start and after each frame, which is integrated in `counts` steps."""
+        """(F + 1, B, state) at the start and after each frame, which is integrated in `counts` steps."""
         start = self.net.encode(self.shape, theta)
         steps = [self.frame / count for count in counts for _ in range(count)]
         return self.net.roll_out(start, theta, steps)[np.cumsum([0, *counts])]
 
     def draw_counts(self, frames: int) -> list[int]:
-        """Some frames in one step more than others: a field that leans on the error of its steps gains nothing by it.
+        """Steps for each frame, at random one more for some, so that the error of the steps cannot be exploited.
 
-        Descent finds such fields otherwise, which fit the data at one step and miss it by ten times as much at another.
+        Otherwise descent finds fields that fit the data at one step size and are ten times worse at another.
         """
         more = torch.randint(0, 2, (frames,), generator=self.generator)
         return (self.substeps + more).tolist()
 
     def loss(self, rows: torch.Tensor, frames: int) -> torch.Tensor:
-        """Of a batch, after its readout has been solved for."""
+        """The loss of a batch of sequences over the first `frames`, after its readout has been solved for."""
         theta = self.theta["train"][rows]
-        early = self.shown[:, rows] <= frames
+        early = self.visible[:, rows] <= frames
         some = early.any(dim=1)
-        shown, weights = self.shown[some][:, rows].clamp(max=frames), (early & self.counted[:, rows])[some].float()
+        visible, weights = self.visible[some][:, rows].clamp(max=frames), (early & self.counted[:, rows])[some].float()
         motions = torch.arange(len(rows), device=self.device)
-        truth = self.truth["train"][shown, rows]
-        states = self.states(theta, self.draw_counts(frames))[shown, motions]
-        told = self.net.told(self.times[: frames + 1], theta)[shown, motions]
+        truth = self.truth["train"][visible, rows]
+        states = self.states(theta, self.draw_counts(frames))[visible, motions]
+        conditions = self.net.conditions(self.times[: frames + 1], theta)[visible, motions]
         predicted = [states.new_zeros(*states.shape[:-1], POSE)] if not self.net.config.rigid else []
-        for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
-            features = decoder.features(states[..., place], told)
+        for decoder, state, out in zip(self.net.decoders, self.net.config.states, self.outputs, strict=True):
+            features = decoder.features(states[..., state], conditions)
             readout = NormalEquations()
             part = slice(None, None, self.stride)
             readout.add(features.detach()[part], truth[part][..., out], weights[part])
@@ -110,7 +112,7 @@ class Trainer:
         return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:])[-len(self.outputs) :])
 
     def advance(self, share: float) -> None:
-        """One step of descent."""
+        """One step of descent, at this share of the training."""
         config = self.config
         start, grown = config.horizon
         frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
@@ -126,7 +128,7 @@ class Trainer:
 
     @torch.no_grad()
     def paths(self, split: str) -> torch.Tensor:
-        """States (2 T + 1, B, state) of all sequences, at their frames and halfway between, with no error of steps."""
+        """States (2 T + 1, B, state) of all sequences, at frames and halfway between, with fine steps."""
         count = self.config.refine * self.substeps
         steps = [self.frame / 2.0 / count] * (2 * self.frames * count)
         chunks = self.theta[split].split(CHUNK)
@@ -135,12 +137,12 @@ class Trainer:
 
     @torch.no_grad()
     def solve_readout(self, ridge: float) -> None:
-        """The readout of all training sequences."""
-        states, told = self.paths("train")[::2], self.net.told(self.times, self.theta["train"])
-        for decoder, place, out in zip(self.net.decoders, self.net.places, self.outputs, strict=True):
+        """Solve for the readouts over all training sequences."""
+        states, conditions = self.paths("train")[::2], self.net.conditions(self.times, self.theta["train"])
+        for decoder, state, out in zip(self.net.decoders, self.net.config.states, self.outputs, strict=True):
             equations = NormalEquations()
             for rows in torch.arange(states.shape[1]).split(CHUNK):
-                features = decoder.features(states[:, rows][..., place], told[:, rows])
+                features = decoder.features(states[:, rows][..., state], conditions[:, rows])
                 equations.add(features, self.truth["train"][:, rows][..., out], self.observed["train"][:, rows])
             decoder.readout.weight.data = equations.solve(ridge).to(decoder.readout.weight.dtype)
 
@@ -153,7 +155,7 @@ class Trainer:
         return rigid, local
 
     def double(self) -> None:
-        """Go on in double precision."""
+        """Continue in double precision."""
         self.net.double()
         self.metric.double()
         self.truth, self.observed, self.theta = (
@@ -163,12 +165,13 @@ class Trainer:
         self.times = self.times.double()
 
     def _fingerprint(self) -> dict[str, Any]:
-        """What has to be the same for a training to go on."""
+        """What must be the same for a training to be resumed."""
         config = {k: v for k, v in asdict(self.config).items() if k not in FREE}
         network = {k: v for k, v in asdict(self.net.config).items() if k not in FREE}
         return {"data": self.identity, "network": network, "config": config}
 
     def save(self, path: Path) -> None:
+        """Write the state, from which `restore` continues bit-exactly."""
         tensors = {f"net.{name}": value for name, value in self.net.state_dict().items()}
         optimiser = strip(self.optimiser.state_dict(), tensors, "optimiser")
         tensors["generator"] = self.generator.get_state()
@@ -177,16 +180,19 @@ class Trainer:
         atomic_write(path, save(tensors, {"training": json.dumps(meta)}))
 
     def restore(self, path: Path) -> None:
+        """Continue from a saved state; `InputError` where it is missing, damaged or of another training."""
         try:
             data = path.read_bytes()
         except OSError as error:
-            raise InputError(f"--resume: {path}: {error.strerror}; expected what an interrupted run left") from None
+            raise InputError(f"--resume: {path}: {error.strerror}; expected an interrupted training") from None
         try:
             tensors = load(data)
             meta: dict[str, Any] = json.loads(safetensors_metadata(data)["training"])
-            for part, wanted in json.loads(json.dumps(self._fingerprint())).items():
-                if meta[part] != wanted:
-                    raise InputError(f"--resume: {path}: another training, of {part} {meta[part]}; expected {wanted}")
+            for part, expected in json.loads(json.dumps(self._fingerprint())).items():
+                if meta[part] != expected:
+                    raise InputError(
+                        f"--resume: {path}: state of another training: expected {part} {expected}, got {meta[part]}"
+                    )
             weights = {k.removeprefix("net."): v for k, v in tensors.items() if k.startswith("net.")}
             self.net.load_state_dict(weights)
             optimiser = fill(meta["optimiser"], tensors)
@@ -197,4 +203,4 @@ class Trainer:
         except InputError:
             raise
         except (SafetensorError, KeyError, ValueError, TypeError, RuntimeError) as error:
-            raise InputError(f"--resume: {path}: not the state of this training: {error}") from None
+            raise InputError(f"--resume: {path}: not a state of this training: {error}") from None

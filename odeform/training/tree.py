@@ -1,4 +1,4 @@
-"""Nested dictionaries and lists of tensors and plain values, taken apart as safetensors can hold them."""
+"""Nested dictionaries and lists of tensors and plain values, split into what JSON and what safetensors can hold."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ MARK = "tensor:"
 
 
 def strip(tree: Any, tensors: dict[str, torch.Tensor], name: str) -> Any:
-    """The tree as JSON takes it, with names in place of its tensors, which go to `tensors`; they begin with `name`."""
+    """The tree for JSON, with names in place of its tensors, which are put into `tensors`. Names begin with `name`."""
     if isinstance(tree, torch.Tensor):
         tensors[name] = tree
         return MARK + name
@@ -22,7 +22,7 @@ def strip(tree: Any, tensors: dict[str, torch.Tensor], name: str) -> Any:
 
 
 def fill(tree: Any, tensors: dict[str, torch.Tensor]) -> Any:
-    """What `strip` made, whole again; tuples come back as lists. `KeyError` where a tensor is missing."""
+    """The inverse of `strip`; tuples come back as lists. `KeyError` where a tensor is missing."""
     if isinstance(tree, str) and tree.startswith(MARK):
         return tensors[tree.removeprefix(MARK)]
     if isinstance(tree, dict):

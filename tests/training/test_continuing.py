@@ -12,7 +12,7 @@ from odeform.models.base import Predictor
 from odeform.models.continuation import Dynamics
 from odeform.models.odeform.model import ODeform
 from odeform.training import continuation
-from odeform.training.continuation import fit_dynamics, foretold, with_continuation
+from odeform.training.continuation import fit_dynamics, predicted_errors, with_continuation
 from odeform.types import Floats
 
 RATE, GRAVITY, HEIGHT = 60.0, -10.0, 0.2
@@ -51,7 +51,7 @@ def test_a_second_landing_follows_from_the_first() -> None:
         return float(np.sqrt(((np.stack(y, axis=1) - truth[:, known:])[..., 2] ** 2).mean()))
 
     held = [truth[:, known - 1]] * later
-    assert (truth[:, known + 2 :, 6] > 0.0).any()  # it lands within what is foretold
+    assert (truth[:, known + 2 :, 6] > 0.0).any()  # it lands within the held-out part
     assert rms(out) < 0.25 * min(rms(held), rms(flown[2:]))
 
 
@@ -73,12 +73,12 @@ def test_what_does_not_foretell_is_not_kept(
         return Dynamics(np.array([0.0, 0.0, -1.0]), 0.0, 1.0, np.ones(width), *empty)
 
     monkeypatch.setattr(continuation, "fit_dynamics", falling)
-    assert foretold(model, data) is None
-    assert counts == [round(len(data.times) / 1.5)]  # fitted without what is foretold
+    assert predicted_errors(model, data) is None
+    assert counts == [round(len(data.times) / 1.5)]  # fitted without the held-out part
     assert with_continuation(model.checkpoint, data) is model.checkpoint
     # a criterion that passes whatever is kept
     errors = np.full((len(data.theta["val"]), 40), 3.0)
-    monkeypatch.setattr(continuation, "foretold", lambda *_: errors)
+    monkeypatch.setattr(continuation, "predicted_errors", lambda *_: errors)
     kept = with_continuation(model.checkpoint, data)
     assert kept.schema.window.reach > 0.0
     assert np.array_equal(kept.arrays["val.later_mm"], errors.astype(np.float32))

@@ -51,7 +51,7 @@ def test_descent_sees_as_many_frames_where_few_are_known(dataset: Dataset, stagg
     data = prepare(dataset, 8, FrameSubsampling(every=6, stagger=stagger))
     config = TrainConfig(batch=2)
     trainer = Trainer(build_network(data, 0), data, config, torch.device("cpu"))
-    assert trainer.batch * len(trainer.shown) >= config.batch * len(data.times) / 2 - len(trainer.shown)
+    assert trainer.batch * len(trainer.visible) >= config.batch * len(data.times) / 2 - len(trainer.visible)
     # what a spline filled in changes nothing
     rows, losses = torch.arange(trainer.batch), []
     for filled in (0.0, 1e3):

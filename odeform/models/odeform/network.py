@@ -1,7 +1,7 @@
 """The ODeform network (paper, Section III) in whitened reduced coordinates, for training and encoding.
 
-Dual encoders of P0 and theta, two neural ODEs of which the local one sees the global state, and two decoders. One
-state per object, whatever the number of its points.
+Two encoders of P0 and theta, two neural ODEs, of which the local one depends on the global state, and two decoders.
+There is one state per object, for any number of points.
 """
 
 import itertools
@@ -19,6 +19,7 @@ __all__ = ["Decoder", "ODeformNet", "ShapeEncoder"]
 
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:
+    """Linear layers of these widths with the activation between them."""
     layers: list[nn.Module] = []
     for before, after in itertools.pairwise(sizes):
         layers += [nn.Linear(before, after), activation()]
@@ -43,7 +44,7 @@ class ShapeEncoder(nn.Module):
         self.register_buffer("pooled_gain", torch.zeros(sizes["encoder.points"][-1]))
 
     def pool(self, points: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
-        """(N, 3) points in units of the body's size and (N,) weights summing to 1 -> (width,)."""
+        """(N, 3) points in units of the radius of gyration and (N,) weights summing to 1 -> (width,)."""
         return weights @ self.points(points)
 
     @torch.no_grad()
@@ -52,7 +53,7 @@ class ShapeEncoder(nn.Module):
         pooled = torch.stack([self.pool(points, weights) for points, weights in shapes])
         spread = pooled.std(dim=0, correction=0)
         self.pooled_mean.copy_(pooled.mean(dim=0))
-        # the same body under several discretisations differs by about 1e-3: not a shape of its own
+        # discretisations of one body differ by about 1e-3, which does not make them different shapes
         self.pooled_gain.copy_(torch.where(spread > 1e-2, 1.0 / spread.clamp_min(1e-12), 0.0))
 
     def forward(self, pooled: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
@@ -64,10 +65,10 @@ class ShapeEncoder(nn.Module):
 class Decoder(nn.Module):
     """Features of a state, and their linear readout, which training solves for rather than descends to.
 
-    It is told the time and the parameters besides. A smooth autonomous field leaves a contact of a few milliseconds and
-    the second of flight after it in states too alike for smooth features to tell apart; a clock does.
-    Motion is what the features moved since the start, so that y(0) = 0 exactly and no bias is needed. Random features
-    of all that, if there are any, are drawn once the rest is trained (Rahimi & Recht 2008).
+    It is conditioned on the time and the parameters as well: a smooth autonomous field leaves a contact of a few
+    milliseconds and the second of flight after it in states that smooth features cannot tell apart; a clock can.
+    Features are relative to those at the start, so that y(0) = 0 exactly and no bias is needed. Random features of all
+    these inputs, if there are any, are drawn once the rest is trained (Rahimi & Recht 2008).
     """
 
     def __init__(self, sizes: dict[str, list[int]]) -> None:
@@ -81,25 +82,25 @@ class Decoder(nn.Module):
         self.random = mlp(sizes["decoder.random"], nn.Identity) if sizes["decoder.random"][-1] else None
         self.readout = nn.Linear(*sizes["decoder.readout"], bias=False)
 
-    def features(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
+    def features(self, states: torch.Tensor, conditions: torch.Tensor) -> torch.Tensor:
         """(T, B, latent), (T, B, 1 + P) -> (T, B, F), relative to the first of the T."""
-        seen = self.seen(states, told)
-        features = seen[..., : -told.shape[-1]]
+        inputs = self.random_inputs(states, conditions)
+        features = inputs[..., : -conditions.shape[-1]]
         if self.random is not None:
-            features = torch.cat([features, nn.functional.silu(self.random(seen))], dim=-1)
+            features = torch.cat([features, nn.functional.silu(self.random(inputs))], dim=-1)
         return features - features[:1]
 
-    def seen(self, states: torch.Tensor, told: torch.Tensor) -> torch.Tensor:
-        """What random features are made of, (T, B, latent + width + 1 + P): the state, what descent has made of it, and
-        what the decoder is told."""
-        return torch.cat([states, self.hidden(torch.cat([states, told], dim=-1)), told], dim=-1)
+    def random_inputs(self, states: torch.Tensor, conditions: torch.Tensor) -> torch.Tensor:
+        """The inputs of random features, (T, B, latent + width + 1 + P): the state, its trained features, and the
+        conditions."""
+        return torch.cat([states, self.hidden(torch.cat([states, conditions], dim=-1)), conditions], dim=-1)
 
 
 class ODeformNet(nn.Module):
-    """theta, P0 -> state(0); state -> slope; states -> y in whitened units.
+    """Encoders (theta, P0) -> state(0), fields state -> slope, decoders states -> y in whitened units.
 
     The fields end in a linear layer on tanh units: their values are bounded, so states grow at most linearly in time.
-    `gains` (y,) turn whitened outputs to metres and radians; `time_scale` in seconds makes the field's unit of time.
+    `gains` (y,) turn whitened outputs into metres and radians; `time_scale` is the field's unit of time in seconds.
     """
 
     gains: torch.Tensor
@@ -121,7 +122,7 @@ class ODeformNet(nn.Module):
         self.register_buffer("time_scale", torch.ones(()))
 
     def widen(self, count: int) -> None:
-        """Room for that many random features in each decoder, in place."""
+        """Make room for `count` random features in each decoder, in place."""
         self.config = replace(self.config, random_features=count)
         for branch, decoder in zip(self.config.branches, self.decoders, strict=True):
             like = decoder.readout.weight
@@ -137,12 +138,6 @@ class ODeformNet(nn.Module):
     def decoders(self) -> list[Decoder]:
         return ([self.rigid_decoder] if self.config.rigid else []) + [self.local_decoder]
 
-    @property
-    def places(self) -> list[slice]:
-        """Where in the state each branch lives."""
-        split = self.config.rigid_latent
-        return [slice(0, split), slice(split, None)] if self.config.rigid else [slice(0, None)]
-
     def encode(self, shape: tuple[torch.Tensor, torch.Tensor], theta: torch.Tensor) -> torch.Tensor:
         """One shape (points (N, 3), weights (N,)) and (B, P) parameters -> (B, state)."""
         return torch.cat(
@@ -151,21 +146,21 @@ class ODeformNet(nn.Module):
         )
 
     def roll_out(self, start: torch.Tensor, theta: torch.Tensor, steps: Sequence[float]) -> torch.Tensor:
-        """States (T + 1, B, state) after RK4 steps of those seconds. The local field sees the global state (paper,
-        III-C); parameters enter as a bias."""
+        """States (T + 1, B, state) after RK4 steps of these lengths in seconds. The local field depends on the global
+        state (paper, III-C); parameters enter as a bias."""
         fields = [self.rigid_field, self.local_field] if self.config.rigid else [self.local_field]
         branches = []
-        for field, place in zip(fields, self.places, strict=True):
+        for field, state in zip(fields, self.config.states, strict=True):
             first, second, last = (layer for layer in field if isinstance(layer, nn.Linear))
-            seen = first.in_features - self.config.parameters
-            seeing, bias = first.weight[:, :seen], first.bias + theta @ first.weight[:, seen:].T
+            inputs = first.in_features - self.config.parameters
+            weight, bias = first.weight[:, :inputs], first.bias + theta @ first.weight[:, inputs:].T
             rate = 1.0 / self.time_scale
             branches.append(
-                Branch(seen, place, seeing, bias, second.weight, second.bias, last.weight * rate, last.bias * rate)
+                Branch(inputs, state, weight, bias, second.weight, second.bias, last.weight * rate, last.bias * rate)
             )
         return roll_out(start, steps, branches)
 
-    def told(self, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+    def conditions(self, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
         """(T,) seconds, (B, P) -> (T, B, 1 + P): the clock and the parameters, for the decoders."""
         clock = 2.0 * times / (times + self.config.clock) - 1.0
         shape = len(times), len(theta), -1
@@ -173,10 +168,10 @@ class ODeformNet(nn.Module):
 
     def decode(self, states: torch.Tensor, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
         """(T, B, state) at (T,) seconds, (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""
-        told = self.told(times, theta)
+        conditions = self.conditions(times, theta)
         out = [
-            decoder.readout(decoder.features(states[..., place], told))
-            for decoder, place in zip(self.decoders, self.places, strict=True)
+            decoder.readout(decoder.features(states[..., part], conditions))
+            for decoder, part in zip(self.decoders, self.config.states, strict=True)
         ]
         if not self.config.rigid:
             out.insert(0, states.new_zeros(*states.shape[:-1], POSE))
