@@ -15,12 +15,12 @@ def branches(seed: int, batch: int = 5, rigid: int = 4, state: int = 11) -> list
     def weight(*shape: int) -> torch.Tensor:
         return torch.randn(*shape, generator=generator, dtype=torch.float64).mul(0.5).requires_grad_()
 
-    def branch(seen: int, out: slice, width: int) -> Branch:
+    def branch(inputs: int, out: slice, width: int) -> Branch:
         count = out.stop - out.start
         return Branch(
-            seen,
+            inputs,
             out,
-            weight(width, seen),
+            weight(width, inputs),
             weight(batch, width),
             weight(width, width),
             weight(width),
@@ -34,7 +34,7 @@ def branches(seed: int, batch: int = 5, rigid: int = 4, state: int = 11) -> list
 def field(parts: list[Branch], state: torch.Tensor) -> torch.Tensor:
     slopes = []
     for part in parts:
-        hidden = torch.tanh(state[:, : part.seen] @ part.w1.T + part.b1)
+        hidden = torch.tanh(state[:, : part.inputs] @ part.w1.T + part.b1)
         slopes.append(torch.tanh(hidden @ part.w2.T + part.b2) @ part.w3.T + part.b3)
     return torch.cat(slopes, dim=1)
 
