@@ -1,10 +1,10 @@
-"""How wrong a model is, as far as it matters to parameters that are inferred from it.
+"""Model discrepancy: the error of a model as it affects parameters that are estimated from it.
 
-A model's error is no noise: it is alike from frame to frame, so that a hundred frames may tell as little as three. It
-is measured on the validation split, at parameters that are known there. What of it follows from the parameters, as a
-linear function of them, is taken off; the rest is told as a variance of each cause in each frame, as large as errors
-independent of each other would have to be in order to mislead as much (Kennedy & O'Hagan 2001, on calibration with
-model discrepancy; composite likelihoods: Varin, Reid & Firth 2011).
+Model error is correlated from frame to frame, so a hundred frames may carry as little information as three. It is
+measured on the validation split, where the parameters are residuals. The part that is linear in the parameters is
+subtracted. The rest is described by a variance of each cause in each frame, as large as independent errors would have
+to be to bias the estimates as much (calibration with model discrepancy: Kennedy & O'Hagan 2001; composite likelihoods:
+Varin, Reid & Firth 2011).
 """
 
 from collections.abc import Callable
@@ -24,62 +24,62 @@ from odeform.types import Floats, Ints, Times
 __all__ = ["NOMINAL", "TWO_SIDED", "Discrepancy", "calibrate"]
 
 NOMINAL, TWO_SIDED = 0.9, 1.6449
-"""The share of truths that intervals are to hold, and how many standard deviations of a normal law that takes."""
-FLOOR_MM = 2e-3  # what rounding of the data leaves in a cause
+"""Nominal coverage of the intervals, and the matching number of standard deviations of a normal distribution."""
+FLOOR_MM = 2e-3  # error of a cause from rounding of the data
 FIRST_SPAN = 0.025  # s; each span of time is twice as long as all before it
 DISCOUNT = 2.0
-"""Power of how much more than independent errors those of a span mislead. By 1 each span alone would be right; but
-spans mislead alike, the late ones most. Of powers 1 and 2, the second takes a quarter off
-the errors of kicks on validation."""
+"""Power of the ratio by which the errors of a span bias more than independent ones. A power of 1 would be right for a
+single span, but spans are correlated, late ones most. On validation, a power of 2 reduces the errors of kicks by a
+quarter against a power of 1."""
 LEAST = 8  # sequences
-RIDGE = 1.0  # on the slopes of what follows from the parameters, in sequences
+RIDGE = 1.0  # on the slopes of the linear part, in sequences
 
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """`variances` (T, 6 + K) mm^2 of the causes at `times` (T,) seconds, and their `means` (T, 6 + K, 1 + P) mm: as
-    they are in the middle of the trained ranges, and what half of each range adds."""
+    """`variances` (T, 6 + K) mm^2 of the causes at `times` (T,) s, and their `means` (T, 6 + K, 1 + P) mm: the value in
+    the middle of the trained ranges, and the change over half of each range."""
 
     times: Times
     variances: Float[np.ndarray, "times causes"]
     means: Float[np.ndarray, "times causes terms"]
 
     def at(self, times: Times) -> Floats:
-        """Variances (T, 6 + K) mm^2 at any (T,) seconds; after the last one as there."""
+        """Variances (T, 6 + K) mm^2 at `times` (T,) s; constant after the last one."""
         return np.exp(_between(times, self.times, np.log(self.variances)))
 
-    def less_mean(self, linear: Linear, theta: Floats, times: Times) -> Linear:
-        """A comparison at theta (P,), less what is expected of the model's error there."""
+    def minus_mean(self, linear: Linear, theta: Floats, times: Times) -> Linear:
+        """A comparison at theta (P,), minus the expected error of the model there."""
         means = _between(times, self.times, self.means)
         expected = linear.spread @ (means @ np.concatenate([[1.0], theta]))[..., None]
-        slopes = means[..., 1 : 1 + linear.gain.shape[-1]]  # none where a comparison has none
+        slopes = means[..., 1 : 1 + linear.gain.shape[-1]]  # empty if the comparison has no gains
         return replace(linear, off=linear.off - expected[..., 0], gain=linear.gain + slopes)
 
 
-def _between(asked: Floats, times: Floats, values: Floats) -> Floats:
-    """Values (T, ...) at (T,) `times`, linear between them: (A, ...) at the (A,) moments `asked`."""
+def _between(queries: Floats, times: Floats, values: Floats) -> Floats:
+    """Linear interpolation of `values` (T, ...) at `times` (T,), to (A, ...) at `queries` (A,)."""
     flat = values.reshape(len(times), -1)
-    columns = [np.interp(asked, times, column) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(len(asked), *values.shape[1:])
+    columns = [np.interp(queries, times, column) for column in flat.T]
+    return np.stack(columns, axis=1).reshape(len(queries), *values.shape[1:])
 
 
 @dataclass(frozen=True, eq=False)
-class _Known:
-    """Errors (S, T, 6 + K) mm and gains (S, T, 6 + K, P) of sequences whose parameters are known."""
+class _Residuals:
+    """Errors (S, T, 6 + K) mm and gains (S, T, 6 + K, P) of sequences whose parameters are residuals."""
 
     errors: Floats
     gains: Floats
 
-    def part(self, rows: slice) -> "_Known":
-        return _Known(self.errors[rows], self.gains[rows])
+    def part(self, rows: slice) -> "_Residuals":
+        return _Residuals(self.errors[rows], self.gains[rows])
 
 
 def calibrate(
     predictor: Predictor, dataset: Dataset, split: str = "val", progress: Callable[[float], None] = lambda _: None
 ) -> Discrepancy:
-    """From a split that the model was not trained on; never the one that is then scored. Seconds to half a minute.
+    """Measure the discrepancy of a model on a split that it was not trained on. Takes seconds to half a minute.
 
-    `progress` is told the share that is done.
+    Do not score on the same split. `progress` gets the share done. Raises `InputError` where the split is too small.
     """
     entries = dataset.select(split)
     if len(entries) < LEAST:
@@ -87,28 +87,30 @@ def calibrate(
     errors, gains, thetas, times = [], [], [], np.zeros(0)
     for index, entry in enumerate(entries):
         sequence = dataset.read(entry)
-        observation = observe(sequence, predictor.schema, View()).thinned()
+        observation = observe(sequence, predictor.schema, View()).subsampled()
         thetas.append(predictor.schema.vector(sequence.parameters))
         linear = Comparison(predictor, observation).at(thetas[-1])
         normal = linear.spread.swapaxes(1, 2) @ linear.spread
         pulled = linear.spread.swapaxes(1, 2) @ linear.off[..., None]
         errors.append(np.linalg.solve(normal, pulled)[..., 0])
         gains.append(linear.gain)
-        times = observation.times  # the frames of the window, for all
+        times = observation.times  # the frames of the window, the same for all
         progress((index + 1) / len(entries))
-    means, rest = _expected(np.array(errors), np.array(thetas))
-    known = _Known(rest, np.array(gains) + means[..., 1:])
-    table = _variances(known, times)
-    # half of them say how far intervals from the other half are off
+    means, rest = _linear_part(np.array(errors), np.array(thetas))
+    residuals = _Residuals(rest, np.array(gains) + means[..., 1:])
+    table = _variances(residuals, times)
+    # cross-validation: each half scores the intervals of the other
     halves = [slice(0, None, 2), slice(1, None, 2)]
-    scores = [_scores(known.part(there), _variances(known.part(here), times)) for here, there in (halves, halves[::-1])]
+    scores = [
+        _scores(residuals.part(there), _variances(residuals.part(here), times))
+        for here, there in (halves, halves[::-1])
+    ]
     scale = np.quantile(np.abs(np.concatenate(scores)), NOMINAL) / TWO_SIDED
     return Discrepancy(times, table * max(float(scale), 1.0) ** 2, means)
 
 
-def _expected(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
-    """What follows of errors (S, T, 6 + K) from theta (S, P), as (T, 6 + K, 1 + P), and what is then left of each
-    sequence by means of all the others."""
+def _linear_part(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
+    """Linear part of errors (S, T, 6 + K) in theta (S, P), as (T, 6 + K, 1 + P), and the leave-one-out residuals."""
     terms = np.concatenate([np.ones((len(thetas), 1)), thetas], axis=1)
     ridge = RIDGE * np.diag([0.0] + [1.0] * thetas.shape[1])
     solved = np.linalg.solve(terms.T @ terms + ridge, terms.T)
@@ -118,44 +120,44 @@ def _expected(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
 
 
 def _spans(times: Times) -> Ints:
-    """(T,) the number of the span of time that each moment is in."""
+    """(T,) index of the time span that each frame is in."""
     return np.floor(np.log2(np.maximum(times / FIRST_SPAN, 1.0) + 1e-9)).astype(int)
 
 
-def _variances(known: _Known, times: Times) -> Floats:
-    """(T, 6 + K): mean squares, each span and kind of causes as much larger as its errors mislead."""
-    plain = (known.errors**2).mean(axis=0) + FLOOR_MM**2
+def _variances(residuals: _Residuals, times: Times) -> Floats:
+    """(T, 6 + K) mm^2: mean squares, inflated in each span and kind of causes by how much its errors bias."""
+    plain = (residuals.errors**2).mean(axis=0) + FLOOR_MM**2
     table, spans, kinds = plain.copy(), _spans(times), np.arange(plain.shape[1]) >= POSE
     for span in np.unique(spans):
         for kind in np.unique(kinds):
             block = np.nonzero(spans == span)[0][:, None], np.nonzero(kinds == kind)[0]
-            table[block] *= max(_misled(known, plain, block), 1.0) ** DISCOUNT
+            table[block] *= max(_inflation(residuals, plain, block), 1.0) ** DISCOUNT
     return table
 
 
-def _weighed(known: _Known, variances: Floats, block: tuple[Ints, Ints]) -> tuple[Floats, Floats]:
-    """Information (S, P, P) and score (S, P) in a block of frames and causes."""
+def _weighted(residuals: _Residuals, variances: Floats, block: tuple[Ints, Ints]) -> tuple[Floats, Floats]:
+    """Fisher information (S, P, P) and score (S, P) of a block of frames and causes."""
     frames, causes = block
     deviations = np.sqrt(variances[block])
-    count, parameters = len(known.errors), known.gains.shape[-1]
-    gains = (known.gains[:, frames, causes] / deviations[..., None]).reshape(count, -1, parameters)
-    errors = (known.errors[:, frames, causes] / deviations).reshape(count, -1)
+    count, parameters = len(residuals.errors), residuals.gains.shape[-1]
+    gains = (residuals.gains[:, frames, causes] / deviations[..., None]).reshape(count, -1, parameters)
+    errors = (residuals.errors[:, frames, causes] / deviations).reshape(count, -1)
     return gains.swapaxes(1, 2) @ gains, np.einsum("snp,sn->sp", gains, errors)
 
 
-def _misled(known: _Known, variances: Floats, block: tuple[Ints, Ints]) -> float:
-    """Mean square, in standard deviations, by which the errors of a block mislead; 1 for independent ones."""
-    information, score = _weighed(known, variances, block)
+def _inflation(residuals: _Residuals, variances: Floats, block: tuple[Ints, Ints]) -> float:
+    """Mean squared bias of the estimates from a block, in standard deviations; 1 for independent errors."""
+    information, score = _weighted(residuals, variances, block)
     values, vectors = np.linalg.eigh(information)
     along = np.einsum("spq,sp->sq", vectors, score) ** 2
-    told = values > 1e-6 * values.max(axis=1, keepdims=True) + 1e-12
-    return float((along[told] / values[told]).mean()) if told.any() else 1.0
+    informative = values > 1e-6 * values.max(axis=1, keepdims=True) + 1e-12
+    return float((along[informative] / values[informative]).mean()) if informative.any() else 1.0
 
 
-def _scores(known: _Known, variances: Floats) -> Floats:
-    """(S, P) errors of the parameters, in the standard deviations that `variances` gives them."""
+def _scores(residuals: _Residuals, variances: Floats) -> Floats:
+    """(S, P) errors of the estimates, in the standard deviations that follow from `variances`."""
     frames, causes = (np.arange(size) for size in variances.shape)
-    information, score = _weighed(known, variances, (frames[:, None], causes))
+    information, score = _weighted(residuals, variances, (frames[:, None], causes))
     covariance = np.linalg.pinv(information, hermitian=True)
     deviations = np.sqrt(np.einsum("spp->sp", covariance))
     return np.einsum("spq,sq->sp", covariance, score) / np.maximum(deviations, 1e-12)

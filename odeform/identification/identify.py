@@ -1,4 +1,4 @@
-"""Physical parameters from an observed motion, all together, each with how sure that is."""
+"""Physical parameters from an observed motion, all together, each with an interval."""
 
 import time
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from odeform.identification.discrepancy import TWO_SIDED, Discrepancy
-from odeform.identification.fit import Fit, fit
+from odeform.identification.fit import ParameterFit, fit_parameters
 from odeform.identification.linear import Comparison
 from odeform.identification.observation import Observation
 from odeform.models.base import Predictor
@@ -19,10 +19,10 @@ __all__ = ["Identification", "Identified", "identify"]
 
 @dataclass(frozen=True)
 class Identified:
-    """One parameter: the value found, and the interval that holds nine in ten truths, within the trained range.
+    """One parameter: the estimate, and its 90 % interval within the trained range, in the parameter's unit.
 
-    `identifiable` is whether that interval was narrower than the trained range: a motion that leaves more than that
-    open says nothing. `unit` and `reach` are the value and half the interval with the trained range as [-1, 1].
+    `identifiable` is False where the interval is as wide as the trained range: the motion then says nothing about the
+    parameter. `unit` and `reach` are the estimate and half the interval, with the trained range as [-1, 1].
     """
 
     value: float
@@ -35,7 +35,7 @@ class Identified:
 
 @dataclass(frozen=True)
 class Identification:
-    """`parameters` by name; `misfit` is 1 or less where model and noise explain what was seen."""
+    """`parameters` by name; `misfit` is at most 1 if model and noise explain the observation."""
 
     parameters: dict[str, Identified]
     misfit: float
@@ -55,18 +55,18 @@ def identify(
     """
     begin = time.perf_counter()
 
-    def tell(theta: Floats) -> None:
+    def report(theta: Floats) -> None:
         progress({p.name: p.denormalise(float(unit)) for p, unit in zip(predictor.schema.learned, theta, strict=True)})
 
-    found = fit(Comparison(predictor, observation.thinned()), discrepancy, tell)
+    found = fit_parameters(Comparison(predictor, observation.subsampled()), discrepancy, report)
     reaches = _reaches(found)
     pairs = zip(predictor.schema.learned, found.theta, reaches, strict=True)
     parameters = {p.name: _identified(p, float(unit), float(reach)) for p, unit, reach in pairs}
     return Identification(parameters, found.misfit, time.perf_counter() - begin)
 
 
-def _reaches(found: Fit) -> Floats:
-    """(P,) half the intervals: from the curvature, and wider where what was seen is not explained."""
+def _reaches(found: ParameterFit) -> Floats:
+    """(P,) half the intervals: from the curvature, and wider where the observation is not explained."""
     size = len(found.theta)
     covariance = np.linalg.inv(found.information + 1e-6 * np.eye(size))
     return TWO_SIDED * np.sqrt(np.diag(covariance) * max(found.misfit, 1.0))

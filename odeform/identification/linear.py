@@ -1,8 +1,8 @@
-"""A predicted motion near some parameters, held against an observation.
+"""A predicted motion, linearised at some parameters and compared with an observation.
 
-What a point is off by has few causes: the body is shifted, turned, or deformed in its modes. These `causes` are 6 + K
-numbers a frame, each in millimetres of RMS displacement over the body. Both a change of the parameters and the error of
-a model are told in them, which is what lets them be weighed against each other.
+The difference at a point has few causes: the body is shifted, rotated, or deformed in its modes. These `causes` are
+6 + K numbers a frame, each in millimetres of RMS displacement over the body. Changes of the parameters and errors of
+the model are both expressed in them, so that one can be weighed against the other.
 """
 
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ from odeform.types import Floats, Frames, PointCloud, Rotations, Times, Vectors
 __all__ = ["ACCURATE", "Comparison", "Linear", "derivatives", "parameters_of"]
 
 ACCURATE = SolverSettings("dopri5", tolerance=1e-6)
-"""Solver errors below 0.01 mm. The first frames of a kick, where models err by some hundredths, tell most of all."""
-ENOUGH = 4  # points that have a pose of their own
-APART = 1e-2  # of central differences, in halves of the trained range
+"""Solver errors stay below 0.01 mm: the first frames of a kick, with model errors of some hundredths, matter most."""
+ENOUGH = 4  # points that define a pose
+APART = 1e-2  # step of central differences, in halves of the trained range
 
 
 @runtime_checkable
 class Differentiable(Protocol):
-    """A predictor that gives exact derivatives."""
+    """A predictor with exact derivatives."""
 
     def sensitivities(
         self, theta: Floats, times: Times, quality: SolverSettings
@@ -41,8 +41,11 @@ class Differentiable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """`off` (T, 3 N) mm is observed less predicted, `spread` (T, 3 N, 6 + K) what the causes do to the points, and
-    `gain` (T, 6 + K, P) mm, the causes by a change of each parameter by half of its trained range."""
+    """A linearised comparison.
+
+    `off` (T, 3 N) mm is observed minus predicted, `spread` (T, 3 N, 6 + K) the effect of each cause on the points, and
+    `gain` (T, 6 + K, P) mm the causes for a change of each parameter by half of its trained range.
+    """
 
     off: Float[np.ndarray, "times coordinates"]
     spread: Float[np.ndarray, "times coordinates causes"]
@@ -85,17 +88,17 @@ def derivatives(predictor: Predictor, theta: Floats, times: Times) -> Float[np.n
 
 
 class Comparison:
-    """An observation held against what a predictor says of it under any parameters."""
+    """An observation compared with the motion of a predictor at any parameters."""
 
     def __init__(self, predictor: Predictor, observation: Observation) -> None:
         self.predictor, self.observation = predictor, observation
         self._space = _solved(predictor, {}).space
         evaluated = evaluate_basis(PointCloud(observation.rest), self._space, observation.heading)
         self._rest, self._modes = evaluated.rest.astype(float), evaluated.values.astype(float)
-        self._seen = to_canonical(observation.positions, self._space.anchor, observation.heading)
+        self._observed = to_canonical(observation.positions, self._space.anchor, observation.heading)
 
     def at(self, theta: Floats, sloped: bool = True) -> Linear:
-        """Under theta (P,) in [-1, 1]; unless `sloped`, without the gains, which is cheaper."""
+        """The comparison at theta (P,) in [-1, 1]; without gains unless `sloped`, which is cheaper."""
         times, modes = self.observation.times, self._modes
         jet = derivatives(self.predictor, theta, times) if sloped else _motion(self.predictor, theta, times)[None]
         y, change = jet[0], jet[1:]
@@ -104,26 +107,26 @@ class Comparison:
         lever = self._space.gyration_radius * np.sqrt(2.0 / 3.0)  # see `small_motion`
         posed = np.zeros((len(y), POSE))
         if len(self._rest) >= ENOUGH:
-            # errors of the pose are large enough to look like deformations unless they are seen as turns
-            predicted, (turn, shift) = turn, _pose(body, self._seen)
+            # pose errors are so large that they look like deformations unless they are treated as rotations
+            predicted, (turn, shift) = turn, _pose(body, self._observed)
             spin = vector_from_rotation(predicted.swapaxes(1, 2) @ turn)
             posed = 1e3 * np.concatenate([shift - y[:, :3], lever * spin], axis=1)
-        # in the body's own axes, where the modes stay as they are
+        # in the body's own axes, where the modes are constant
         spread = np.empty((*body.shape, y.shape[1]))
         spread[..., :3] = turn.swapaxes(1, 2)[:, None]
         spread[..., 3:POSE] = np.cross(np.eye(3)[:, None, None], body).transpose(1, 2, 3, 0) / lever
         spread[..., POSE:] = modes.reshape(len(modes), -1, 3).transpose(1, 2, 0)
         spread = spread.reshape(len(y), -1, y.shape[1])
-        off = 1e3 * ((self._seen - shift[:, None]) @ turn - body).reshape(len(y), -1)
+        off = 1e3 * ((self._observed - shift[:, None]) @ turn - body).reshape(len(y), -1)
         off += (spread[..., :POSE] @ posed[..., None])[..., 0]
         spin = lever * body_spin(y[:, 3:POSE], change[..., 3:POSE])
         gain = 1e3 * np.concatenate([change[..., :3], spin, change[..., POSE:]], axis=2)
         return Linear(off, spread, gain.transpose(1, 2, 0))
 
 
-def _pose(body: Frames, seen: Frames) -> tuple[Rotations, Vectors]:
-    """The turn about the anchor and the shift that take `body` (T, N, 3) closest to `seen` (T, N, 3)."""
+def _pose(body: Frames, observed: Frames) -> tuple[Rotations, Vectors]:
+    """The rotation about the anchor and the shift that bring `body` (T, N, 3) m closest to `observed` (T, N, 3) m."""
     even = np.full(body.shape[1], 1.0 / body.shape[1])
-    turn, shift = best_rigid(body, seen, even)
+    turn, shift = best_rigid(body, observed, even)
     centre = body.mean(axis=1)
     return turn, shift + centre - np.einsum("tij,tj->ti", turn, centre)

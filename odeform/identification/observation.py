@@ -1,4 +1,4 @@
-"""What was seen of a motion: points of the body at rest, and where they were at some moments."""
+"""An observed motion: points of the body at rest, and their positions at some times."""
 
 import zlib
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from odeform.types import Floats, Ints, MotionSequence, Points, Times
 
 __all__ = ["ROUNDING_MM", "Observation", "View", "observe"]
 
-ROUNDING_MM = 0.02  # of the bundled data, and more than what the modes of the models leave out
+ROUNDING_MM = 0.02  # of the bundled data; more than the truncation error of the modes
 MOST_POINTS, MOST_FRAMES = 64, 160
 
 
@@ -29,18 +29,18 @@ class Observation:
     noise_mm: float = ROUNDING_MM
 
     def __post_init__(self) -> None:
-        wanted = (len(self.times), *self.rest.shape)
-        if self.positions.shape != wanted:
-            raise InputError(f"observation: expected positions of shape {wanted}, got {self.positions.shape}")
+        expected = (len(self.times), *self.rest.shape)
+        if self.positions.shape != expected:
+            raise InputError(f"observation: expected positions of shape {expected}, got {self.positions.shape}")
         if not self.positions.size:
-            raise InputError("observation: expected at least one point at one moment")
+            raise InputError("observation: expected at least one point and one time")
         if not all(np.isfinite(x).all() for x in (self.rest, self.times, self.positions)):
             raise InputError("observation: expected finite points and times")
         if self.times.min() < 0.0 or not self.noise_mm > 0.0:
-            raise InputError("observation: expected times from 0 on and positive noise")
+            raise InputError("observation: expected times of at least 0 and positive noise")
 
-    def thinned(self, points: int = MOST_POINTS, frames: int = MOST_FRAMES) -> "Observation":
-        """At most so many points and frames, evenly chosen: more cost time and tell little."""
+    def subsampled(self, points: int = MOST_POINTS, frames: int = MOST_FRAMES) -> "Observation":
+        """At most `points` points and `frames` frames, evenly chosen: more take time and add little."""
         kept, at = _evenly(len(self.rest), points), _evenly(len(self.times), frames)
         positions = self.positions[at][:, kept]
         return Observation(self.rest[kept], self.times[at], positions, self.heading, self.noise_mm)
@@ -52,42 +52,42 @@ def _evenly(count: int, most: int) -> Ints:
 
 @dataclass(frozen=True)
 class View:
-    """How much of a recorded motion is seen."""
+    """The part of a recorded motion that is observed."""
 
     points: int | None = None
-    """So many, drawn on the surface; None: the vertices."""
+    """Number of random points on the surface; None: the vertices."""
     frames: int | None = None
-    """So many of the trained ones after the first, drawn at random; None: all."""
+    """Number of random frames of the trained window, without the first; None: all."""
     noise_mm: float = 0.0
-    """Standard deviation of what is added to each coordinate."""
+    """Standard deviation of the noise added to each coordinate."""
     seed: int = 0
 
     def __post_init__(self) -> None:
         if any(count is not None and count < 1 for count in (self.points, self.frames)) or self.seed < 0:
-            raise InputError("view: expected at least one point and one frame, and a seed from 0 on")
+            raise InputError("view: expected at least one point and one frame, and a seed of at least 0")
         if not 0.0 <= self.noise_mm < float("inf"):
             raise InputError(f"view: expected noise of at least 0 mm, got {self.noise_mm}")
 
 
 def observe(recorded: MotionSequence, schema: Schema, view: View) -> Observation:
-    """What `view` sees of a sequence on the window's frames. The seed and the sequence's name decide what is drawn."""
+    """Observe a sequence on frames of the window. The view's seed and the sequence's name fix the random part."""
     rng = np.random.default_rng([view.seed, zlib.crc32(recorded.name.encode())])
     sequence = recorded.until(schema.window.stop)
     frames = schema.window.times[1:]
     if view.frames is not None:
         frames = np.sort(rng.choice(frames, min(view.frames, len(frames)), replace=False))
     at = np.abs(sequence.times[:, None] - frames).argmin(axis=0)
-    seen = sequence.vertices[np.concatenate([[0], at])].astype(float)
+    observed = sequence.vertices[np.concatenate([[0], at])].astype(float)
     if view.points is not None:
-        seen = _on_surface(sequence, seen, view.points, rng)
-    rest, positions = seen[0], seen[1:]
+        observed = _on_surface(sequence, observed, view.points, rng)
+    rest, positions = observed[0], observed[1:]
     positions = positions + 1e-3 * view.noise_mm * rng.normal(size=positions.shape)
     noise = float(np.hypot(view.noise_mm, ROUNDING_MM))
     return Observation(rest, sequence.times[at], positions, schema.azimuth(sequence.parameters), noise)
 
 
 def _on_surface(sequence: MotionSequence, frames: Floats, count: int, rng: np.random.Generator) -> Floats:
-    """(T, N, 3) frames -> (T, count, 3), points drawn evenly over the faces, with which they move."""
+    """(T, N, 3) m -> (T, count, 3) m: random points, uniform over the surface, that move with their faces."""
     corners = frames[0][sequence.faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     faces = sequence.faces[rng.choice(len(areas), count, p=areas / areas.sum())]

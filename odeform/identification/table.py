@@ -1,4 +1,4 @@
-"""Identification over a split, scored where the parameters are known (as the paper's Table V, one at a time there)."""
+"""Identification over a split with known parameters, scored as in the paper's Table V (one at a time there)."""
 
 import sys
 import time
@@ -28,20 +28,21 @@ CALIBRATION = "val"
 def identify_split(
     predictor: Predictor, dataset: Dataset, split: str = "test", limit: int | None = None, view: View | None = None
 ) -> dict[str, Any]:
-    """Scores and a row for each of the first `limit` sequences, as far as `view` sees them (default: whole).
+    """Scores, and a row for each of the first `limit` sequences, observed by `view` (default: everything).
 
-    On every core; `seconds` is what a sequence takes by the clock on all of them, in each row what it took on its own.
+    Runs on all cores: `seconds` is wall time per sequence over all of them, and in a row the time of that sequence.
+    Raises `InputError` for another scene, an empty split, or too few sequences to calibrate on.
     """
     if predictor.schema.scene != dataset.schema.scene:
         raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {dataset.schema.scene}")
-    seen = view or View()
+    view_used = view or View()
     entries = dataset.select(split)[:limit]
     if not entries:
         raise InputError(f"{dataset.root}: no sequence in split {split}")
     if split in (CALIBRATION, "all"):
-        print(f"note: intervals are calibrated on {CALIBRATION}, which is among what is scored", file=sys.stderr)
+        print(f"note: the intervals are calibrated on split {CALIBRATION}, which is also scored", file=sys.stderr)
     discrepancy = _calibrated(predictor, dataset)
-    observed = [(entry, observe(dataset.read(entry), predictor.schema, seen)) for entry in entries]
+    observed = [(entry, observe(dataset.read(entry), predictor.schema, view_used)) for entry in entries]
     work = partial(_identified, type(predictor), predictor.checkpoint, discrepancy)
     begin = time.perf_counter()
     rows = parallel_map(f"identify {dataset.schema.scene}", work, observed)
@@ -50,7 +51,7 @@ def identify_split(
         "model": predictor.model,
         "scene": dataset.schema.scene,
         "split": split,
-        "view": asdict(seen),
+        "view": asdict(view_used),
         "sequences": len(rows),
         "seconds": seconds,
         "parameters": {p.name: _scores(p, rows) for p in predictor.schema.learned},
@@ -72,46 +73,46 @@ def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:
     progress = Progress("calibrate", 100)
     done = 0
 
-    def tell(share: float) -> None:
+    def report_share(share: float) -> None:
         nonlocal done
         ahead = int(100 * share) - done
         progress.advance(ahead)
         done += ahead
 
-    discrepancy = calibrate(predictor, dataset, CALIBRATION, tell)
+    discrepancy = calibrate(predictor, dataset, CALIBRATION, report_share)
     progress.close()
     return discrepancy
 
 
 def _row(name: str, truth: Parameters, found: Identification) -> dict[str, Any]:
-    values = {key: {"true": truth[key], **_claim(one)} for key, one in found.parameters.items()}
+    values = {key: {"true": truth[key], **_found_json(one)} for key, one in found.parameters.items()}
     return {"name": name, "parameters": values, "misfit": found.misfit, "seconds": found.seconds}
 
 
-def _claim(one: Identified) -> dict[str, Any]:
+def _found_json(one: Identified) -> dict[str, Any]:
     return {"found": one.value, "low": one.low, "high": one.high, "identifiable": one.identifiable}
 
 
 def _scores(parameter: Parameter, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Errors over all rows, in units and in halves of the trained range; coverage over those that claim something.
+    """Errors over all rows, in the parameter's unit and in halves of the trained range, and coverage of the intervals.
 
-    `identifiable` is the share of rows that do.
+    Coverage is over rows where the parameter is identifiable; `identifiable` is their share.
     """
-    cells = [row["parameters"][parameter.name] for row in rows]
-    apart = [parameter.normalise(cell["found"]) - parameter.normalise(cell["true"]) for cell in cells]
-    claimed = [cell["low"] <= cell["true"] <= cell["high"] for cell in cells if cell["identifiable"]]
+    found = [row["parameters"][parameter.name] for row in rows]
+    apart = [parameter.normalise(one["found"]) - parameter.normalise(one["true"]) for one in found]
+    covered = [one["low"] <= one["true"] <= one["high"] for one in found if one["identifiable"]]
     return {
-        "mae": float(np.mean([abs(cell["found"] - cell["true"]) for cell in cells])),
+        "mae": float(np.mean([abs(one["found"] - one["true"]) for one in found])),
         "unit": parameter.unit,
         "mae_normalised": float(np.abs(apart).mean()),
         "largest_normalised": float(np.abs(apart).max()),
-        "coverage_90": float(np.mean(claimed)) if claimed else None,
-        "identifiable": len(claimed) / len(cells),
+        "coverage_90": float(np.mean(covered)) if covered else None,
+        "identifiable": len(covered) / len(found),
     }
 
 
 def report(result: dict[str, Any]) -> str:
-    """A table for people."""
+    """The result as a text table."""
     view = result["view"]
     points = f"{view['points']} points" if view["points"] else "all points"
     frames = f"{view['frames']} frames" if view["frames"] else "all frames"

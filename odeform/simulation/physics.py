@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.geometry.shape import surface_weights
 from odeform.types import Faces, Floats, Frames, Ints, Mesh, Perpoint, Points, Pose, Times
@@ -36,8 +37,8 @@ class SampledMotion:
     times: Times
     local: Frames
     vertices: Frames
-    fine_times: Times
-    fine_poses: Pose
+    fine_times: Float[np.ndarray, " fine"]
+    fine_poses: Float[np.ndarray, "fine 4 4"]
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What may be asked of a model: parameters far beyond the trained box, every solver at its extremes, odd shapes."""
+"""Extreme inputs: parameters far outside the trained box, every solver at its limits, odd shapes."""
 
 import itertools
 import math
@@ -12,10 +12,10 @@ from odeform.solver.integrate import SolverSettings
 from odeform.solver.registry import METHODS
 from odeform.types import Floats, Geometry, Mesh, PointCloud
 
-__all__ = ["Case", "draws", "inside", "random_quality", "shapes", "thinned"]
+__all__ = ["Case", "extreme_cases", "inside", "random_quality", "shapes", "subsampled"]
 
 SPREADS = (1.0, 1.5, 3.0, 10.0)
-"""Halves of the trained range, from its middle."""
+"""Distances from the middle of the trained range, in halves of the range."""
 ENORMOUS = (0.0, *(sign * size for size in (1e-300, 1e300, 1.7e308, math.inf) for sign in (1.0, -1.0)), math.nan)
 DTYPES = ("float32", "float64")
 CONTROLLED = tuple(name for name, method in METHODS.items() if method.controls_step)
@@ -23,9 +23,9 @@ CONTROLLED = tuple(name for name, method in METHODS.items() if method.controls_s
 
 @dataclass(frozen=True)
 class Case:
-    """One solution: a shape by name, `values` of all parameters in the schema's order, a way to integrate.
+    """One solve: the name of a shape, `values` of all parameters in the schema's order, and the solver settings.
 
-    `quality` is None for the model's own "balanced".
+    `quality` None stands for the model's own "balanced".
     """
 
     shape: str
@@ -34,13 +34,13 @@ class Case:
 
 
 def inside(schema: Schema, count: int, seed: int, reach: float = 1.0) -> list[dict[str, float]]:
-    """`count` sets of parameters, drawn evenly from `reach` times the trained box."""
+    """`count` parameter sets, uniformly sampled from `reach` times the trained box."""
     rng = np.random.default_rng(seed)
     return [{p.name: p.denormalise(rng.uniform(-reach, reach)) for p in schema.parameters} for _ in range(count)]
 
 
-def draws(schema: Schema, integrates: bool, count: int, seed: int) -> list[Case]:
-    """`count` distinct ones, the same for the same seed: corners and extremes, or some of these, then random ones."""
+def extreme_cases(schema: Schema, integrates: bool, count: int, seed: int) -> list[Case]:
+    """`count` distinct cases, fixed by the seed: corners and extremes (some, if `count` is small), then random ones."""
     rng, window = np.random.default_rng(seed), schema.window.stop
     middle = tuple(p.default for p in schema.parameters)
 
@@ -58,7 +58,7 @@ def draws(schema: Schema, integrates: bool, count: int, seed: int) -> list[Case]
         values = tuple(p.denormalise(float(rng.uniform(-reach, reach))) for p in schema.parameters)
         out[Case("body", values, ways([random_quality(rng, window)])[0])] = None
     every = max(len(out) / count, 1.0)
-    return [draw for index, draw in enumerate(out) if index % every < 1.0]
+    return [case for index, case in enumerate(out) if index % every < 1.0]
 
 
 def _enormous(schema: Schema, middle: tuple[float, ...]) -> Iterator[tuple[float, ...]]:
@@ -68,7 +68,7 @@ def _enormous(schema: Schema, middle: tuple[float, ...]) -> Iterator[tuple[float
 
 
 def _extremes(window: float) -> list[SolverSettings]:
-    """Every method at steps and tolerances coarser and finer than anyone would choose."""
+    """Every method at coarser and finer steps and tolerances than anyone would choose."""
     fixed = [
         SolverSettings(m, step=window / n, dtype=d) for d, m, n in itertools.product(DTYPES, METHODS, (4.0, 1000.0))
     ]
@@ -78,7 +78,7 @@ def _extremes(window: float) -> list[SolverSettings]:
 
 
 def _limits(window: float) -> list[SolverSettings]:
-    """Settings at which solvers do hardly anything, give up, or reach their limit of steps."""
+    """Settings at which solvers take a single step, fail, or reach their step limit."""
     fixed = [
         SolverSettings(m, step=window * n, dtype=d)
         for d, m, n in itertools.product(DTYPES, METHODS, (1e-4, 1e-6, 10.0))
@@ -89,6 +89,7 @@ def _limits(window: float) -> list[SolverSettings]:
 
 
 def random_quality(rng: np.random.Generator, window: float) -> SolverSettings:
+    """Random solver settings for a window of `window` seconds."""
     dtype = str(rng.choice(DTYPES))
     if rng.random() < 0.5:
         return SolverSettings(
@@ -100,19 +101,19 @@ def random_quality(rng: np.random.Generator, window: float) -> SolverSettings:
 SHAPES = ("one point", "duplicate points", "1e-6 m", "1e6 m", "1e6 m away", "a million points")
 
 
-def thinned(rest: Mesh) -> PointCloud:
-    """Some 400 points of a body: the motion of a few tells that of all."""
+def subsampled(rest: Mesh) -> PointCloud:
+    """About 400 points of a body, which represent the motion of all."""
     points = np.asarray(rest.points, dtype=np.float32)
     return PointCloud(points[:: max(len(points) // 400, 1)])
 
 
 def shapes(rest: Mesh) -> dict[str, Geometry]:
-    """The body's own points, thinned out, as "body", and odd ones by name."""
-    points, few = np.asarray(rest.points, dtype=np.float32), thinned(rest).points
+    """Some of the body's own points as "body", and odd shapes by name."""
+    points, few = np.asarray(rest.points, dtype=np.float32), subsampled(rest).points
     rng = np.random.default_rng(0)
     centre = points.mean(axis=0)
     return {
-        "body": thinned(rest),
+        "body": subsampled(rest),
         "one point": PointCloud(few[:1]),
         "duplicate points": Mesh(np.concatenate([rest.points, rest.points]), np.zeros((4, 3), dtype=int)),
         "1e-6 m": PointCloud(_sized(few, centre, 1e-6)),

@@ -1,4 +1,4 @@
-"""What a stress run says of a model: a measured figure, and the bound that a user would need."""
+"""A check of a stress run: a measured figure and the bound that a user needs."""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ __all__ = ["Check", "Checks"]
 
 @dataclass(frozen=True)
 class Check:
-    """`figure` should not exceed `bound`, or should reach it where `at_least`; what is not finite never holds."""
+    """`figure` should be at most `bound`, or at least `bound` if `at_least`; non-finite figures never hold."""
 
     figure: float | int
     bound: float | int
@@ -17,11 +17,13 @@ class Check:
 
     @property
     def holds(self) -> bool:
+        """Whether the figure keeps its bound."""
         return math.isfinite(self.figure) and (
             self.figure >= self.bound if self.at_least else self.figure <= self.bound
         )
 
     def to_json(self) -> dict[str, Any]:
+        """`holds`, `figure` (None: not finite) and `bound`."""
         return {
             "holds": self.holds,
             "figure": self.figure if math.isfinite(self.figure) else None,
@@ -30,4 +32,4 @@ class Check:
 
 
 Checks = dict[str, Check]
-"""By name; the names end in units."""
+"""Checks by name; the names end in units."""

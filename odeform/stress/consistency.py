@@ -1,4 +1,4 @@
-"""Whether a motion is a function of what was asked: of parameters, points and time, and of nothing else."""
+"""Whether a motion depends on parameters, points and time, and on nothing else."""
 
 import numpy as np
 
@@ -8,39 +8,39 @@ from odeform.stress.cases import inside
 from odeform.stress.check import Check, Checks
 from odeform.types import Floats, PointCloud
 
-__all__ = ["check_answers"]
+__all__ = ["check_consistency"]
 
-ROUNDING = 1e-6  # m; what single precision rounds coordinates of metres by
-DRAWS = 6
+ROUNDING = 1e-6  # m; rounding of coordinates of metres in single precision
+SAMPLES = 6
 
 
-def check_answers(predictor: Predictor, seed: int = 0) -> Checks:
-    """Any set of queries in any order, repetition, parts of a shape, and precision."""
+def check_consistency(predictor: Predictor, seed: int = 0) -> Checks:
+    """The same motion for any set and order of times, repeated solves, parts of a shape, and both precisions."""
     window, rng = predictor.schema.window, np.random.default_rng(seed)
     times = window.times
     grid = order = again = part = precision = 0.0
     few = rng.permutation(len(predictor.rest.points))[:50]
     body = PointCloud(np.asarray(predictor.rest.points, dtype=np.float32))
-    for parameters in inside(predictor.schema, DRAWS, seed):
+    for parameters in inside(predictor.schema, SAMPLES, seed):
         motion = predictor.solve(body, parameters)
         frames = motion.vertices(times)
         shuffled = rng.permutation(len(times))
-        grid = max(grid, _apart(motion.vertices(times[shuffled]), frames[shuffled]))
+        grid = max(grid, _largest_difference(motion.vertices(times[shuffled]), frames[shuffled]))
         late = predictor.solve(body, parameters, until=3.0 * window.stop)
         for row in shuffled[:20]:
             one = motion.vertices(float(times[row]))
-            grid = max(grid, _apart(one, frames[row]))
-            order = max(order, _apart(one, late.vertices(float(times[row]))))
-        again = max(again, _apart(predictor.solve(body, parameters).vertices(times), frames))
+            grid = max(grid, _largest_difference(one, frames[row]))
+            order = max(order, _largest_difference(one, late.vertices(float(times[row]))))
+        again = max(again, _largest_difference(predictor.solve(body, parameters).vertices(times), frames))
         some = predictor.solve(PointCloud(body.points[few]), parameters)
-        part = max(part, _apart(some.vertices(times), frames[:, few]))
+        part = max(part, _largest_difference(some.vertices(times), frames[:, few]))
         single, double = (
             predictor.solve(body, parameters, SolverSettings("rk4", step=1.0 / window.rate, dtype=dtype)).vertices(
                 times
             )
             for dtype in ("float32", "float64")
         )
-        precision = max(precision, _apart(single, double))
+        precision = max(precision, _largest_difference(single, double))
     return {
         "grid_invariance_m": Check(grid, ROUNDING),
         "scrub_order_m": Check(order, 0.0),
@@ -50,5 +50,5 @@ def check_answers(predictor: Predictor, seed: int = 0) -> Checks:
     }
 
 
-def _apart(one: Floats, other: Floats) -> float:
+def _largest_difference(one: Floats, other: Floats) -> float:
     return float(np.abs(np.subtract(one, other, dtype=float)).max())

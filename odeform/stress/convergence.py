@@ -1,4 +1,4 @@
-"""Whether smaller steps do what they should: errors fall at the order of the method, and never rise against truth."""
+"""Convergence: errors fall with the step at the order of the method, and never rise against the truth."""
 
 from collections.abc import Iterable
 
@@ -16,14 +16,14 @@ from odeform.types import Floats
 
 __all__ = ["check_orders", "check_refining", "observed_order"]
 
-NODES = 32  # moments at which solutions are compared; each step size divides them
-REFINED = (48, 64, 96)  # steps between two of them
-SHORT, FINER = 16, (12, 16, 24)  # the part of the window that is looked at in extended precision, and steps there
-DOUBLE = 4  # the highest order that shows in double precision
-DRAWS = 2
+NODES = 32  # times at which solutions are compared; each step size divides the intervals
+REFINED = (48, 64, 96)  # steps between two of these times
+SHORT, FINER = 16, (12, 16, 24)  # in extended precision: the fraction of the window, and the steps
+DOUBLE = 4  # the highest order that can be observed in double precision
+SAMPLES = 2
 SEQUENCES = 8
 STEPS_A_FRAME = (1, 2, 4)
-CHANCE = 1.01  # once the solver's error is a fraction of the model's, it adds to it or takes from it
+CHANCE = 1.01  # a solver error that is a fraction of the model error may add to it or cancel some of it
 
 
 def observed_order(steps: list[float], errors: list[float]) -> float:
@@ -32,10 +32,10 @@ def observed_order(steps: list[float], errors: list[float]) -> float:
 
 
 def _order(field: Field, start: Floats, method: Method, span: float) -> float:
-    """Of the norm of errors over `NODES` moments.
+    """Observed order of the norm of errors at `NODES` times.
 
-    Dormand and Prince made the leading term of their error so small that on a sharp field the next one rules until
-    rounding in double precision does. Steps small enough, of extended precision, are for a part of the window.
+    The leading error term of Dormand-Prince is so small that on a stiff field the next one dominates until rounding in
+    double precision does. Extended precision allows smaller steps, on a part of the window.
     """
     refined, part = (REFINED, span) if start.dtype == np.float64 else (FINER, span / SHORT)
 
@@ -49,11 +49,11 @@ def _order(field: Field, start: Floats, method: Method, span: float) -> float:
 
 
 def check_orders(model: ODeform, seed: int = 0) -> Checks:
-    """`order_METHOD_deviation`: how far the observed order is from the method's own, on the model's field."""
+    """`order_METHOD_deviation`: difference between the observed order and the method's own, on the model's field."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     fields = {dtype: make_field(model.weights, model.config, dtype) for dtype in (np.float64, np.longdouble)}
     off = dict.fromkeys(METHODS, 0.0)
-    for parameters in inside(schema, DRAWS, seed):
+    for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)
         _, start, _ = model.problem(theta, evaluated, np.float64)
         for name, method in METHODS.items():
@@ -64,8 +64,8 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
 
 
 def check_refining(model: ODeform, dataset: Dataset) -> Checks:
-    """`refining_error_ratio`: the largest ratio of the pooled error against some test sequences to that of the next
-    coarser step, from a step a frame on, of any method."""
+    """`refining_error_ratio`: largest ratio, of any method, between the pooled error on some test sequences and that at
+    the next coarser step. The coarsest is one step per frame."""
     window = model.schema.window
     read = (dataset.read(entry).frames(window.stop, window.rate) for entry in dataset.select("test")[:SEQUENCES])
     truths = [(truth.rest, truth) for truth in read]

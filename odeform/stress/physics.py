@@ -11,7 +11,7 @@ from odeform.stress.check import Check, Checks
 
 __all__ = ["check_physics"]
 
-DRAWS = 24
+SAMPLES = 24
 
 
 def check_physics(predictor: Predictor, seed: int = 0) -> Checks:
@@ -19,7 +19,7 @@ def check_physics(predictor: Predictor, seed: int = 0) -> Checks:
     scene = find_scene(predictor.schema.scene)
     checks = scene.checks if scene is not None else STANDARD_CHECKS
     worst: dict[str, float | int] = {}
-    for parameters in inside(predictor.schema, DRAWS, seed):
+    for parameters in inside(predictor.schema, SAMPLES, seed):
         motion = _sampled(predictor, parameters)
         for check in checks:
             figure = check.figure(motion)

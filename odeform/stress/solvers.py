@@ -1,4 +1,4 @@
-"""What a model's own field does to small differences, and whether what is said of them is so."""
+"""How the field of a model amplifies small differences, and whether the reported errors and derivatives are right."""
 
 import math
 
@@ -18,24 +18,26 @@ from odeform.types import Floats
 __all__ = ["check_calibration", "check_field", "check_sensitivities"]
 
 TRUTH = SolverSettings("dopri5", tolerance=1e-11, dtype="float64")
-CALIBRATION = (40, 12)  # motions, and ways to integrate each
-DRAWS = 2
-HALF_STEP = 0.005  # of a half of the trained range: sliders divide the whole into two hundred steps
+CALIBRATION = (40, 12)  # motions, and solver settings for each
+SAMPLES = 2
+HALF_STEP = 0.005  # in halves of the trained range: half a slider step of 1/200 of the range
 
 
 def check_field(model: ODeform, seed: int = 0) -> Checks:
-    """`lyapunov_per_s`: largest finite-time exponent over the window, from the derivative of its end by its start.
+    """Growth of differences and of the state.
 
-    Its bound lets rounding in single precision grow to a thousandth. `state_growth`: the largest latent number ever
-    shown, at late times too, over the largest within the window. `until_divergence_unbounded_windows`: when deformation
-    would exceed twice the largest within the window if clocks did not stop; to where they stop it has to be sound.
+    `lyapunov_per_s`: largest finite-time Lyapunov exponent over the window, from the derivative of the final state by
+    the initial one; the bound lets rounding in single precision grow to a thousandth. `state_growth`: largest latent
+    value at any time, late ones included, over the largest within the window. `until_divergence_unbounded_windows`:
+    windows until the deformation would exceed twice the largest within the window if the clock did not stop; it has to
+    stay below that until the clock stops.
     """
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     window, step = schema.window, SolverSettings("rk4", step=1.0 / schema.window.rate)
-    # a motion that is continued does not use later states
+    # a continued motion does not use later states
     last = window.stop if window.reach else float(window.soft_clamped(np.array(10.0 * window.stop)))
     exponent, within, ever, by = -math.inf, 0.0, 0.0, 1e-6
-    for parameters in inside(schema, DRAWS, seed):
+    for parameters in inside(schema, SAMPLES, seed):
         field, start, _ = model.problem(schema.inputs(parameters), evaluated, np.float64)
 
         def end(at: Floats, field: Field = field) -> Floats:
@@ -58,26 +60,26 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
 
 
 def _divergence(model: ODeform, seed: int) -> float:
-    """Windows, at most 10, after which any motion of the trained box is deformed twice as much as any within it."""
+    """Windows (at most 10) until a motion of the trained box deforms by more than twice the largest in the window."""
     schema, step = model.schema, SolverSettings("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
     times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
-    drawn = inside(schema, 4 * DRAWS, seed)
-    motions = [as_reduced(model.solve(None, parameters, step)).trajectory.reduced(times) for parameters in drawn]
+    sampled = inside(schema, 4 * SAMPLES, seed)
+    motions = [as_reduced(model.solve(None, parameters, step)).trajectory.reduced(times) for parameters in sampled]
     deformed = np.max([np.linalg.norm(y[:, POSE:], axis=1) for y in motions], axis=0)
     diverged = deformed > 2.0 * deformed[times <= schema.window.stop].max()
     return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)
 
 
 def check_calibration(model: ODeform, seed: int = 0) -> Checks:
-    """`solver_error_rank_correlation` (Spearman) of the error that is shown with that against tolerance 1e-11.
+    """`solver_error_rank_correlation` (Spearman) between the reported solver error and that against tolerance 1e-11.
 
-    Over random settings, at parameters up to ten times beyond the trained box; what is shown as unknown is left out.
-    `solver_error_underestimated`: the share of those whose error is more than twice what is shown.
+    Settings are random, and parameters reach up to ten times beyond the trained box; solves without an estimate are
+    left out. `solver_error_underestimated`: share of solves whose error is more than twice the reported one.
     """
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     rng, stop = np.random.default_rng(seed), schema.window.stop
     times = np.linspace(0.0, stop, 129)[1:]
-    said, true = [], []
+    reported, true = [], []
     for index in range(CALIBRATION[0]):
         reach = (1.0, 1.5, 3.0, 10.0)[index % 4]
         theta = schema.inputs(inside(schema, 1, seed + index, reach)[0])
@@ -86,19 +88,19 @@ def check_calibration(model: ODeform, seed: int = 0) -> Checks:
             motion = model.integrate(theta, evaluated, random_quality(rng, stop), stop)
             estimate = motion.stats.solver_error_mm
             if estimate is not None:
-                said.append(estimate)
+                reported.append(estimate)
                 true.append(1e3 * float(small_motion(motion.reduced(times) - truth, model.space.gyration_radius).max()))
     return {
         "solver_error_rank_correlation": Check(
-            float(np.corrcoef(rankdata(said), rankdata(true))[0, 1]), 0.9, at_least=True
+            float(np.corrcoef(rankdata(reported), rankdata(true))[0, 1]), 0.9, at_least=True
         ),
-        "solver_error_underestimated": Check(float(np.mean(np.array(true) > 2.0 * np.array(said))), 0.05),
+        "solver_error_underestimated": Check(float(np.mean(np.array(true) > 2.0 * np.array(reported))), 0.05),
     }
 
 
 def check_sensitivities(model: ODeform, seed: int = 0) -> Checks:
-    """`sensitivity_relative`: derivatives by the parameters, carried through the ODE, against central differences over
-    a step of a slider, relative to the largest over the window; the worst parameter, pose and deformation together."""
+    """`sensitivity_relative`: derivatives by the parameters, from the ODE, against central differences over a slider
+    step; relative to the largest in the window, for the worst parameter, pose and deformation together."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     finest = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
     times, worst = schema.window.times, 0.0
@@ -106,7 +108,7 @@ def check_sensitivities(model: ODeform, seed: int = 0) -> Checks:
     def ends(theta: Floats) -> Floats:
         return model.integrate(theta, evaluated, finest, schema.window.stop).reduced(times)
 
-    for parameters in inside(schema, DRAWS, seed):
+    for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)
         derivatives = model.sensitivities(theta, times, finest)[1:]
         for unit, exact in zip(np.eye(len(theta)), derivatives, strict=True):

@@ -1,4 +1,4 @@
-"""How far a body is deformed over two parameters and time, inside the trained box and beyond."""
+"""Stability plot: deformation over two parameters and time, inside the trained box and beyond."""
 
 from dataclasses import dataclass
 
@@ -20,11 +20,11 @@ FAILED = (60, 60, 60)
 
 @dataclass(frozen=True, eq=False)
 class StabilityMap:
-    """`values[t, i, j]`: RMS deformation, relative to the largest in the trained box, with the first of `names` at
-    `units[j]` and the second at `units[i]` (halves of its trained range, from its middle), at `times[t]` seconds.
+    """RMS deformation over two parameters and time; all other parameters have their defaults.
 
-    `sound` is False where the integration failed and the last good state is shown. All other parameters are at their
-    defaults.
+    `values[t, i, j]` is relative to the largest in the trained box, with the first of `names` at `units[j]` and the
+    second at `units[i]` (halves of the trained range, from its middle), at `times[t]` seconds. `window` is the trained
+    one, in seconds. `sound` is False where the integration failed and the last good state is used.
     """
 
     names: tuple[str, str]
@@ -36,7 +36,7 @@ class StabilityMap:
 
 
 def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) -> float:
-    """RMS deformation in metres, the largest of some motions of the trained box within the trained window."""
+    """Largest RMS deformation in metres of `count` random motions of the trained box, within the trained window."""
     times = predictor.schema.window.times
     motions = (predictor.solve(None, parameters) for parameters in inside(predictor.schema, count, seed))
     return max(float(motion.deformation_rms(times).max()) for motion in motions)
@@ -50,8 +50,10 @@ def stability_map(
     moments: tuple[float, ...] = MOMENTS,
     quality: str = "balanced",
 ) -> StabilityMap:
-    """Over `count` x `count` values of two parameters (default: the first two), up to `reach` times the trained box, at
-    `moments` in trained windows."""
+    """Solve `count` x `count` values of two parameters (default: the first two), up to `reach` times the trained box.
+
+    `moments` are the times, in trained windows.
+    """
     schema = predictor.schema
     known = {p.name: p for p in schema.learned}
     first, second = (known[name] for name in names or list(known)[:2])
@@ -69,11 +71,11 @@ def stability_map(
 
 
 def map_image(plot: StabilityMap) -> Image.Image:
-    """A panel a moment; grey is where the integration failed."""
+    """One panel per time, grey where the integration failed."""
 
     side = CELL * len(plot.units)
     image = Image.new("RGB", (GAP + len(plot.times) * (side + GAP), side + 3 * GAP), (255, 255, 255))
-    draw = ImageDraw.Draw(image)
+    case = ImageDraw.Draw(image)
     for index, time in enumerate(plot.times):
         left = GAP + index * (side + GAP)
         cells = np.where(plot.sound[index][..., None], _colors(plot.values[index]), FAILED).astype(np.uint8)
@@ -81,13 +83,13 @@ def map_image(plot: StabilityMap) -> Image.Image:
         image.paste(panel, (left, GAP))
         reach = plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0])
         low, high = (0.5 * side * (1.0 + end / reach) for end in (-1.0, 1.0))
-        draw.rectangle((left + low, GAP + low, left + high, GAP + high), outline=(0, 0, 0))
-        draw.text((left, 6), f"{time:.3g} s = {time / plot.window:g} windows", fill=(0, 0, 0))
-        draw.text((left, side + GAP + 4), f"{plot.names[0]} to the right, {plot.names[1]} up", fill=(0, 0, 0))
+        case.rectangle((left + low, GAP + low, left + high, GAP + high), outline=(0, 0, 0))
+        case.text((left, 6), f"{time:.3g} s = {time / plot.window:g} windows", fill=(0, 0, 0))
+        case.text((left, side + GAP + 4), f"x: {plot.names[0]}, y: {plot.names[1]}", fill=(0, 0, 0))
     text = (
-        "RMS deformation, of the largest trained: 0 (pale), 1 (orange), 2 and more (dark red). Framed: the trained box"
+        "RMS deformation over the largest trained: 0 (pale), 1 (orange), 2 or more (dark red). Frame: the trained box"
     )
-    draw.text((GAP, side + 2 * GAP), f"{text}; to the edge {plot.units[-1]:g} times as far", fill=(0, 0, 0))
+    case.text((GAP, side + 2 * GAP), f"{text}; the edge is {plot.units[-1]:g} times as far", fill=(0, 0, 0))
     return image
 
 

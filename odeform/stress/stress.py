@@ -1,4 +1,4 @@
-"""Numerical stability at the extremes: what is shown for whatever is asked, each claim with a figure and a bound."""
+"""Numerical stability at extreme inputs, as checks with a figure and a bound: `odeform stress`."""
 
 import time
 from collections import Counter
@@ -16,15 +16,15 @@ from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load_reduced
 from odeform.parallel import parallel_map
 from odeform.schema import Window
-from odeform.stress.cases import Case, draws, shapes, thinned
+from odeform.stress.cases import Case, extreme_cases, shapes, subsampled
 from odeform.stress.check import Check, Checks
-from odeform.stress.consistency import check_answers
+from odeform.stress.consistency import check_consistency
 from odeform.stress.convergence import check_orders, check_refining
 from odeform.stress.physics import check_physics
 from odeform.stress.solvers import check_calibration, check_field, check_sensitivities
 from odeform.types import Floats, Geometry
 
-__all__ = ["Outcome", "report", "show", "stress"]
+__all__ = ["Outcome", "report", "run_case", "stress"]
 
 CASES = 20_000
 MOMENTS = (0.0, 0.05, 0.3, 1.0, 1.5, 3.0, 10.0)  # trained windows
@@ -34,37 +34,37 @@ BATCH = 64  # cases that a process takes at a time
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a draw: a status, and what was shown at `MOMENTS`.
+    """The outcome of a case: a status, and figures of the motion at `MOMENTS`.
 
-    `moved` and `deformed` are (T,): the largest distance of a point from rest, and the RMS deformation; metres.
+    `moved` and `deformed` are (T,) m: the largest distance of a point from rest, and the RMS deformation.
     """
 
     status: str
     seconds: float
     non_finite: int = 0
-    """Frames of which any coordinate is not finite."""
+    """Number of frames with a non-finite coordinate."""
     start_off: float = 0.0
-    """Largest distance of P(0) from P0 in metres."""
+    """Largest difference between the first frame and the rest points, in metres."""
     moved: tuple[float, ...] = ()
     deformed: tuple[float, ...] = ()
 
 
-def show(predictor: Predictor, draw: Case, geometries: Mapping[str, Geometry]) -> Outcome:
-    """Solve one draw, and look at it until ten windows. Refusals and faults are outcomes, too."""
+def run_case(predictor: Predictor, case: Case, geometries: Mapping[str, Geometry]) -> Outcome:
+    """Solve one case and evaluate it up to ten windows. Rejected inputs and exceptions are outcomes, too."""
     begin = time.perf_counter()
     try:
-        return _shown(predictor, draw, geometries[draw.shape], begin)
+        return _evaluated(predictor, case, geometries[case.shape], begin)
     except InputError:
         return Outcome("refused", time.perf_counter() - begin)
     except Exception as error:
         return Outcome(f"fault: {type(error).__name__}", time.perf_counter() - begin)
 
 
-def _shown(predictor: Predictor, draw: Case, geometry: Geometry, begin: float) -> Outcome:
+def _evaluated(predictor: Predictor, case: Case, geometry: Geometry, begin: float) -> Outcome:
     schema = predictor.schema
-    parameters = {p.name: value for p, value in zip(schema.parameters, draw.values, strict=True)}
+    parameters = {p.name: value for p, value in zip(schema.parameters, case.values, strict=True)}
     times = schema.window.stop * np.array(MOMENTS)
-    motion = predictor.solve(geometry, parameters, draw.quality or "balanced", until=times[-1])
+    motion = predictor.solve(geometry, parameters, case.quality or "balanced", until=times[-1])
     frames, rest = motion.vertices(times), np.asarray(geometry.points, dtype=np.float32)
     moved = np.sqrt(((frames - rest) ** 2).sum(axis=2).max(axis=1))
     return Outcome(
@@ -78,29 +78,29 @@ def _shown(predictor: Predictor, draw: Case, geometry: Geometry, begin: float) -
 
 
 def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
-    """`count` distinct draws and all checks, as JSON; the same for the same seed, but for wall times."""
+    """`count` distinct cases and all checks, as JSON. The seed fixes everything but wall times."""
     predictor = load_reduced(checkpoint)
     schema = predictor.schema
-    asked = draws(schema, bool(predictor.qualities), count, seed)
-    outcomes = parallel_map("stress", partial(_show_from, checkpoint), asked, batch_size=BATCH)
-    checks = _of_all(predictor, asked, outcomes)
-    checks |= check_answers(predictor, seed) | check_physics(predictor, seed)
+    cases = extreme_cases(schema, bool(predictor.qualities), count, seed)
+    outcomes = parallel_map("stress", partial(_run_from, checkpoint), cases, batch_size=BATCH)
+    checks = _overall(predictor, cases, outcomes)
+    checks |= check_consistency(predictor, seed) | check_physics(predictor, seed)
     if isinstance(predictor, ODeform):
         checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
         checks |= check_field(predictor, seed) | check_calibration(predictor, seed)
         if schema.scene in bundled_datasets():
             checks |= check_refining(predictor, open_dataset(schema.scene))
     return {
-        "cases": len(asked),
+        "cases": len(cases),
         "non_finite_shown": sum(outcome.non_finite for outcome in outcomes),
         "by_status": dict(Counter(outcome.status for outcome in outcomes).most_common()),
         "checks": {name: check.to_json() for name, check in checks.items()},
     }
 
 
-def _show_from(checkpoint: str, case: Case) -> Outcome:
+def _run_from(checkpoint: str, case: Case) -> Outcome:
     predictor, geometries = _opened(checkpoint)
-    return show(predictor, case, geometries)
+    return run_case(predictor, case, geometries)
 
 
 @cache
@@ -110,16 +110,19 @@ def _opened(checkpoint: str) -> tuple[Predictor, dict[str, Geometry]]:
     return predictor, shapes(predictor.rest)
 
 
-def _of_all(predictor: Predictor, asked: list[Case], outcomes: list[Outcome]) -> Checks:
-    """What all outcomes have to keep to.
+def _overall(predictor: Predictor, cases: list[Case], outcomes: list[Outcome]) -> Checks:
+    """Checks over all outcomes.
 
-    Growth is relative to the largest of the trained motions: what is moved or deformed twice as far as anything
-    that was trained is no motion of that body. Settings coarser than a step a frame or a tolerance of 1e-2 count apart.
+    Growth is relative to the largest of the trained motions: a body cannot move or deform twice as far. Settings
+    coarser than one step per frame or a tolerance of 1e-2 are counted separately.
     """
     largest = _trained(predictor)
-    of_body = [(d, o) for d, o in zip(asked, outcomes, strict=True) if o.moved and d.shape == "body"]
-    growth = np.array([np.divide((o.moved, o.deformed), largest[:, None]) for _, o in of_body])  # (draws, 2, moments)
-    coarse = np.array([_coarse(d, predictor.schema.window) for d, _ in of_body])
+    of_body = [
+        (case, outcome) for case, outcome in zip(cases, outcomes, strict=True) if outcome.moved and case.shape == "body"
+    ]
+    # (cases, 2, times)
+    growth = np.array([np.divide((outcome.moved, outcome.deformed), largest[:, None]) for _, outcome in of_body])
+    coarse = np.array([_coarse(case, predictor.schema.window) for case, _ in of_body])
     sound = growth[~coarse]
     diverged = (sound > 2.0).any(axis=(0, 1))
     return {
@@ -135,8 +138,8 @@ def _of_all(predictor: Predictor, asked: list[Case], outcomes: list[Outcome]) ->
 
 
 def _trained(predictor: Predictor) -> Floats:
-    """(2,) metres: largest distance of a point from rest, and RMS deformation, of the trained motions and window."""
-    times, rest, rows = predictor.schema.window.times, thinned(predictor.rest), []
+    """(2,) m: largest distance of a point from rest and largest RMS deformation of the trained motions."""
+    times, rest, rows = predictor.schema.window.times, subsampled(predictor.rest), []
     for theta in predictor.checkpoint.arrays["training.theta"]:
         units = zip(predictor.schema.learned, theta, strict=True)
         motion = predictor.solve(rest, {p.name: p.denormalise(float(unit)) for p, unit in units})
@@ -145,16 +148,16 @@ def _trained(predictor: Predictor) -> Floats:
     return np.max(rows, axis=0)
 
 
-def _coarse(draw: Case, window: Window) -> bool:
-    quality = draw.quality
+def _coarse(case: Case, window: Window) -> bool:
+    quality = case.quality
     if quality is None:
         return False
     return quality.tolerance > 1e-2 if quality.tolerance is not None else (quality.step or 0.0) > 1.01 / window.rate
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The result as a few lines of text."""
-    lines = [f"{result['cases']} cases, {result['non_finite_shown']} frames shown that were not finite"]
+    """The result as text, one line per status and check."""
+    lines = [f"{result['cases']} cases, {result['non_finite_shown']} non-finite frames"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
     for name, check in result["checks"].items():
         figure = "not finite" if check["figure"] is None else f"{check['figure']:.4g}"

@@ -22,7 +22,7 @@ SPLATS = 100_000
 
 
 def drag(models: list[Predictor], truth: Column | None, messages: int, points: int) -> dict[str, float]:
-    """Latency of dragging the first slider, with all models on a round_mesh of `points`, and the truth if given.
+    """Latency of dragging the first slider, with all models on a round mesh of `points`, and the truth if given.
 
     The answers are the vertices of the last column, which are sent last. Every message asks for another value, so an
     answer tells which message it serves.

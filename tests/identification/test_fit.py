@@ -23,8 +23,8 @@ def observed(linear: Linear, variances: np.ndarray, theta: np.ndarray, rng: np.r
 
 
 @pytest.mark.parametrize("coordinates", [COORDINATES, 3])
-def test_agrees_with_the_covariance_written_out(coordinates: int) -> None:
-    """Also with fewer coordinates than causes, where those could not be solved for."""
+def test_normal_equations_agree_with_the_full_covariance(coordinates: int) -> None:
+    """Also with fewer coordinates than causes, which alone could not be determined."""
     linear, variances = problem()
     linear = observed(linear, variances, np.array([0.3, -0.5]), np.random.default_rng(1))
     linear = Linear(linear.off[:, :coordinates], linear.spread[:, :coordinates], linear.gain)
@@ -41,7 +41,7 @@ def test_agrees_with_the_covariance_written_out(coordinates: int) -> None:
     assert ours[2] == pytest.approx(cost)
 
 
-def test_intervals_cover_as_often_as_they_claim() -> None:
+def test_intervals_have_their_nominal_coverage() -> None:
     linear, variances = problem()
     rng, theta, inside = np.random.default_rng(2), np.array([0.3, -0.5]), []
     for _ in range(500):

@@ -17,14 +17,14 @@ FINE = SolverSettings("dopri5", tolerance=1e-7, dtype="float64")
 
 
 def certain(predictor: Predictor) -> Discrepancy:
-    """A model that is hardly wrong."""
+    """A discrepancy of almost nothing."""
     times = predictor.schema.window.times[1:]
     causes, terms = 6 + predictor.solve().space.basis.modes, 1 + len(predictor.schema.learned)
     return Discrepancy(times, np.full((len(times), causes), 1e-6), np.zeros((len(times), causes, terms)))
 
 
-def seen(predictor: Predictor, theta: np.ndarray, times: np.ndarray, points: int = 40) -> Observation:
-    """The model's own motion, at points of the surface that are no vertices."""
+def observed(predictor: Predictor, theta: np.ndarray, times: np.ndarray, points: int = 40) -> Observation:
+    """The model's own motion, at points on the surface that are not vertices."""
     mesh = predictor.rest
     chosen = np.random.default_rng(0).choice(len(mesh.faces), points, replace=False)
     rest = mesh.points[mesh.faces[chosen]].mean(axis=1)
@@ -42,10 +42,10 @@ CASES = {"kick": (0.4, -0.7, 0.3, 0.8), "mass-elastic": (-0.35, 0.6)}
 
 @pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("scene", CASES)
-def test_recovers_what_a_model_was_told(scene: str) -> None:
+def test_recovers_the_parameters_of_a_prediction(scene: str) -> None:
     predictor, theta = load(scene), np.array(CASES[scene])
     times = predictor.schema.window.times[1::3]
-    found = identify(predictor, seen(predictor, theta, times), certain(predictor))
+    found = identify(predictor, observed(predictor, theta, times), certain(predictor))
     assert np.abs(units(found) - theta).max() < 1e-3
     assert found.misfit <= 1.0
     assert all(one.identifiable and one.low <= one.value <= one.high for one in found.parameters.values())
@@ -55,7 +55,7 @@ def test_recovers_what_a_model_was_told(scene: str) -> None:
 def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
     predictor, theta = load("mass-elastic"), np.array([-1.0, 1.0])
     steps: list[dict[str, float]] = []
-    view = seen(predictor, theta, predictor.schema.window.times[1:60:2])
+    view = observed(predictor, theta, predictor.schema.window.times[1:60:2])
     found = identify(predictor, view, certain(predictor), steps.append)
     assert np.abs(units(found) - theta).max() < 1e-3
     assert len(steps) > 2
@@ -72,15 +72,15 @@ def test_can_be_cancelled() -> None:
         raise Cancelled
 
     predictor = load("mass-elastic")
-    view = seen(predictor, np.zeros(2), predictor.schema.window.times[1::20])
+    view = observed(predictor, np.zeros(2), predictor.schema.window.times[1::20])
     with pytest.raises(Cancelled):
         identify(predictor, view, certain(predictor), cancel)
 
 
 @pytest.mark.usefixtures("unchecked")
-def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
+def test_few_noisy_points_give_wider_intervals_that_contain_the_truth() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
-    clean = seen(predictor, theta, predictor.schema.window.times[2:90:3], points=5)
+    clean = observed(predictor, theta, predictor.schema.window.times[2:90:3], points=5)
     noise = np.random.default_rng(0).normal(size=clean.positions.shape)
     noisy = replace(clean, positions=clean.positions + 1e-3 * noise, noise_mm=1.0)
     sure, unsure = (identify(predictor, view, certain(predictor)) for view in (clean, noisy))
@@ -91,10 +91,10 @@ def test_few_noisy_points_give_wider_intervals_that_hold_the_truth() -> None:
 
 
 @pytest.mark.usefixtures("unchecked")
-def test_what_is_expected_of_the_error_is_taken_off() -> None:
+def test_the_expected_model_error_is_subtracted() -> None:
     predictor, theta = load("mass-elastic"), np.array([0.3, -0.4])
     whole = certain(predictor)
-    true = seen(predictor, theta, whole.times[:60])  # the first contact tells enough
+    true = observed(predictor, theta, whole.times[:60])  # the first contact is enough
     # a model that is off by 3 mm, and by 2 mm more for each half of the range of mass
     means = whole.means.copy()
     means[:, 2, :2] = 3.0, 2.0
@@ -105,10 +105,10 @@ def test_what_is_expected_of_the_error_is_taken_off() -> None:
         assert (off < 1e-3) == close, off
 
 
-def test_free_flight_tells_nothing() -> None:
-    """All balls fall alike: what a model makes of mass and bending before the first landing is less than its error."""
+def test_free_flight_identifies_nothing() -> None:
+    """All balls fall alike: until they land, mass and bending change the motion by less than the model error."""
     predictor = load("mass-elastic")
-    flight = seen(predictor, np.array([0.5, 0.5]), np.arange(1, 25) / 120.0)
+    flight = observed(predictor, np.array([0.5, 0.5]), np.arange(1, 25) / 120.0)
     vague = replace(certain(predictor), variances=np.ones_like(certain(predictor).variances))
     found = identify(predictor, replace(flight, noise_mm=1.0), vague)
     for parameter, one in zip(predictor.schema.learned, found.parameters.values(), strict=True):
@@ -118,9 +118,9 @@ def test_free_flight_tells_nothing() -> None:
 
 
 @pytest.mark.usefixtures("unchecked")
-def test_what_no_parameters_explain_widens_the_intervals() -> None:
+def test_unexplained_observations_widen_the_intervals() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
-    view = seen(predictor, theta, predictor.schema.window.times[1:60:4], points=8)
+    view = observed(predictor, theta, predictor.schema.window.times[1:60:4], points=8)
     other = view.positions + 5e-3 * np.random.default_rng(1).normal(size=view.positions.shape)
     sure, unsure = (
         identify(predictor, replace(view, positions=positions, noise_mm=0.1), certain(predictor))
@@ -139,12 +139,12 @@ def test_a_model_without_gradients() -> None:
         for shift in ([0.0, 2e-3], [0.0, -2e-3])
     ]
     assert np.allclose(jet[2], (motions[0] - motions[1]) / 4e-3, atol=2e-2 * np.abs(jet[2]).max())
-    found = identify(predictor, seen(predictor, theta, times), certain(predictor))
+    found = identify(predictor, observed(predictor, theta, times), certain(predictor))
     assert np.abs(units(found) - theta).max() < 1e-3
 
 
-def test_looking_up_has_no_slope_and_claims_nothing() -> None:
+def test_a_model_without_slopes_identifies_nothing() -> None:
     predictor = load("mass-elastic/nearest")
     times = predictor.schema.window.times[1::10]
-    found = identify(predictor, seen(predictor, np.zeros(2), times), certain(predictor))
+    found = identify(predictor, observed(predictor, np.zeros(2), times), certain(predictor))
     assert not any(one.identifiable for one in found.parameters.values())

@@ -21,16 +21,16 @@ def few() -> Dataset:
     return replace(whole, entries=(*whole.select("val")[:8], *whole.select("test")[:2]))
 
 
-def test_errors_that_are_alike_count_for_less(few: Dataset) -> None:
+def test_correlated_errors_carry_less_information(few: Dataset) -> None:
     predictor = load("mass-elastic")
     shares: list[float] = []
     discrepancy = calibrate(predictor, few, progress=shares.append)
     assert shares == pytest.approx(np.arange(1, 9) / 8)
     assert np.isfinite(discrepancy.variances).all()
-    # never below what rounding leaves; beyond the last frame as there
+    # never below the rounding error; constant after the last frame
     assert discrepancy.variances.min() >= 0.99 * 2e-3**2
     assert np.array_equal(discrepancy.at(np.array([9.0]))[0], discrepancy.at(discrepancy.times[-1:])[0])
-    # a fall is predicted better than what comes after the landings
+    # the fall is predicted better than the motion after the landings
     assert np.median(discrepancy.at(np.array([0.2]))) < np.median(discrepancy.at(np.array([1.0])))
 
 
@@ -53,21 +53,21 @@ def test_the_command(
     assert "2 sequences of test" in table
 
 
-def test_too_few_to_calibrate_on(few: Dataset) -> None:
+def test_too_few_sequences_to_calibrate_on_are_rejected(few: Dataset) -> None:
     with pytest.raises(InputError, match="at least 8"):
         identify_split(load("mass-elastic"), replace(few, entries=few.entries[5:]))
 
 
-def test_nothing_to_identify(few: Dataset) -> None:
+def test_an_empty_split_is_rejected(few: Dataset) -> None:
     with pytest.raises(InputError, match="train"):
         identify_split(load("mass-elastic"), few, "train")
 
 
-def test_another_scene(few: Dataset) -> None:
+def test_a_data_set_of_another_scene_is_rejected(few: Dataset) -> None:
     with pytest.raises(InputError, match="kick"):
         identify_split(load("kick"), few)
 
 
-def test_a_limit_that_is_none(capsys: pytest.CaptureFixture) -> None:
+def test_a_limit_of_zero_is_rejected(capsys: pytest.CaptureFixture) -> None:
     assert main(["identify", "mass-elastic", "--data", "mass-elastic", "--limit", "0"]) == 2
     assert "--limit" in capsys.readouterr().err

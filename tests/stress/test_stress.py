@@ -1,4 +1,4 @@
-"""A short stress run on really trained models, and that each check finds what it is there to find."""
+"""A short stress run on trained models; each check finds the defect that it is meant to find."""
 
 import itertools
 import json
@@ -26,7 +26,7 @@ from odeform.solver.runge_kutta import ExplicitRungeKutta
 from odeform.solver.tableau import RK4
 from odeform.stress import cases as cases_module
 from odeform.stress import consistency, convergence, physics, solvers, stress
-from odeform.stress.cases import draws, shapes
+from odeform.stress.cases import extreme_cases, shapes
 from odeform.stress.check import Check
 from odeform.stress.stability import map_image, stability_map
 
@@ -42,21 +42,21 @@ def model(predictors: dict[str, Predictor]) -> ODeform:
 
 @pytest.fixture
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One motion where a full run takes many, and no million points."""
+    """One motion per check, and no million points."""
     monkeypatch.setattr(cases_module, "SHAPES", cases_module.SHAPES[:-1])
     for module in (consistency, convergence, physics, solvers):
-        monkeypatch.setattr(module, "DRAWS", 1)
+        monkeypatch.setattr(module, "SAMPLES", 1)
     monkeypatch.setattr(solvers, "CALIBRATION", (4, 6))
     monkeypatch.setattr(convergence, "SEQUENCES", 1)
     monkeypatch.setattr(convergence, "REFINED", REFINED)
     monkeypatch.setattr(convergence, "FINER", FINER)
 
 
-def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
-    some = draws(model.schema, True, 3000, seed=0)
+def test_cases_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
+    some = extreme_cases(model.schema, True, 3000, seed=0)
     assert len(set(some)) == len(some) == 3000
-    assert repr(draws(model.schema, True, 3000, seed=0)) == repr(some)
-    assert repr(draws(model.schema, True, 3000, seed=1)) != repr(some)
+    assert repr(extreme_cases(model.schema, True, 3000, seed=0)) == repr(some)
+    assert repr(extreme_cases(model.schema, True, 3000, seed=1)) != repr(some)
     assert {d.shape for d in some} == set(shapes(model.rest))
     ways = {(d.quality.method, d.quality.dtype) for d in some if d.quality}
     assert ways == set(itertools.product(registry.METHODS, ("float32", "float64")))
@@ -64,7 +64,7 @@ def test_draws_are_distinct_reproducible_and_reach_every_extreme(model: ODeform)
     assert set(np.round([model.schema.parameters[0].normalise(m) for m in mass if 0.0 < m < 1e9], 6)) >= {
         sign * reach for sign in (-1.0, 1.0) for reach in (1.0, 1.5, 3.0, 10.0)
     }
-    few = draws(model.schema, True, 50, seed=0)
+    few = extreme_cases(model.schema, True, 50, seed=0)
     assert len(few) == 50
     assert sum(math.isinf(max(d.values)) for d in some) > 0
 
@@ -103,7 +103,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
 
 
 def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(convergence, "DRAWS", 1)
+    monkeypatch.setattr(convergence, "SAMPLES", 1)
     monkeypatch.setattr(convergence, "REFINED", REFINED)
     monkeypatch.setattr(convergence, "METHODS", {name: registry.METHODS[name] for name in ("midpoint", "rk4")})
     wrong = tuple(Fraction(1, part) for part in (6, 3, 6, 3))
@@ -113,14 +113,14 @@ def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytes
 
 
 def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(solvers, "DRAWS", 1)
+    monkeypatch.setattr(solvers, "SAMPLES", 1)
     assert solvers.check_sensitivities(model)["sensitivity_relative"].holds
     sound = ODeform.sensitivities
     monkeypatch.setattr(ODeform, "sensitivities", lambda *asked: 1.1 * sound(*asked))
     assert not solvers.check_sensitivities(model)["sensitivity_relative"].holds
 
 
-def test_refining_that_leads_away_from_the_truth_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refining_that_increases_the_error_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "METHODS", {"rk4": registry.METHODS["rk4"]})
     model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
     assert isinstance(model, ODeform)
@@ -136,11 +136,11 @@ def test_refining_that_leads_away_from_the_truth_is_found(monkeypatch: pytest.Mo
 
 
 def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:
-    some = draws(model.schema, True, 3000, seed=0)[-5:]
-    return (stress.show(model, draw, shapes(model.rest)) for draw in some)
+    some = extreme_cases(model.schema, True, 3000, seed=0)[-5:]
+    return (stress.run_case(model, case, shapes(model.rest)) for case in some)
 
 
-def test_what_is_not_finite_is_counted(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_non_finite_frames_are_counted(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(outcome.non_finite == 0 for outcome in _outcomes(model))
     sound = LatentTrajectory.reduced
 
@@ -159,20 +159,20 @@ def test_faults_are_outcomes(model: ODeform, monkeypatch: pytest.MonkeyPatch) ->
     assert {outcome.status for outcome in _outcomes(model)} == {"fault: ZeroDivisionError"}
 
 
-def test_answers_that_depend_on_the_question_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(consistency, "DRAWS", 1)
+def test_results_that_depend_on_the_query_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(consistency, "SAMPLES", 1)
     sound, asked = ReducedMotion.vertices, itertools.count()
 
     def broken(self: ReducedMotion, t: Any) -> Any:
         return sound(self, t) + np.float32(1e-5 * next(asked))
 
     monkeypatch.setattr(ReducedMotion, "vertices", broken)
-    failed = {name for name, check in consistency.check_answers(model).items() if not check.holds}
+    failed = {name for name, check in consistency.check_consistency(model).items() if not check.holds}
     assert failed >= {"grid_invariance_m", "scrub_order_m", "determinism_m", "batch_invariance_m"}
 
 
 def test_exaggerated_deformations_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(physics, "DRAWS", 1)
+    monkeypatch.setattr(physics, "SAMPLES", 1)
     arrays = model.checkpoint.arrays
     weights = {"basis.weights": 50.0 * arrays["basis.weights"]}
     wild = ODeform(replace(model.checkpoint, arrays={**arrays, **weights}))
@@ -181,7 +181,7 @@ def test_exaggerated_deformations_are_found(model: ODeform, monkeypatch: pytest.
 
 
 @pytest.mark.parametrize(("restitution", "gained"), [(0.8, 0.0), (1.0, 0.0), (1.1, 0.21), (1.4, 0.96)])
-def test_energy_out_of_nothing(restitution: float, gained: float) -> None:
+def test_energy_gained_by_a_bounce(restitution: float, gained: float) -> None:
     """A point mass is dropped and leaves the floor with `restitution` times the speed it had."""
     times, drop, gravity = np.linspace(0.0, 0.6, 601), 0.5, 9.81
     landing = math.sqrt(2.0 * drop / gravity)
@@ -189,8 +189,8 @@ def test_energy_out_of_nothing(restitution: float, gained: float) -> None:
     bounce = restitution * gravity * landing * after - 0.5 * gravity * after**2
     poses = np.tile(np.eye(4), (len(times), 1, 1))
     poses[:, 2, 3] = np.where(times < landing, -0.5 * gravity * times**2, bounce - drop)
-    said = energy_gained(times, poses, np.array([[0.0, 0.0, drop]]), np.ones(1))
-    assert said == pytest.approx(gained, abs=0.02)
+    gain = energy_gained(times, poses, np.array([[0.0, 0.0, drop]]), np.ones(1))
+    assert gain == pytest.approx(gained, abs=0.02)
 
 
 def test_spin_is_energy() -> None:
@@ -206,7 +206,7 @@ def test_spin_is_energy() -> None:
     assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
 
 
-def test_map_shows_where_and_when(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_plot_shows_where_and_when_a_model_is_unstable(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     plot = stability_map(model, ("force", "mass"), reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")
     assert plot.values.shape == plot.sound.shape == (3, 3, 3)
