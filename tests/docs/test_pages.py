@@ -94,6 +94,15 @@ def test_commands_in_sentences_exist_with_these_options(page: Path):
         assert given <= known[command], f"{page.name}: {code}"
 
 
+@pytest.mark.parametrize("package", ["odeform", "odeform_viz"])
+def test_the_page_of_architecture_has_every_package(package: str):
+    modules = {
+        file.stem for file in (ROOT / package).iterdir() if not file.name.startswith(("_", "py.typed", "assets"))
+    }
+    named = set(re.findall(r"`([a-z_]+)/?`", (ROOT / "docs" / "architecture.md").read_text()))
+    assert modules <= named
+
+
 def test_the_page_of_baselines_has_every_model():
     rows = re.findall(r"^\| (`[^|]+`) \|", (ROOT / "docs" / "baselines.md").read_text(), re.MULTILINE)
     named = {name for row in rows for name in re.findall(r"`([\w-]+)`", row)}
