@@ -1,4 +1,6 @@
+import argparse
 import json
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -6,6 +8,7 @@ import pytest
 import trimesh
 
 from odeform.cli import main, run_guarded
+from odeform.cli.entry import COMMANDS
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.formats.reading import read_geometry
@@ -224,6 +227,28 @@ def test_faults_in_one_line(
     assert len(captured.err.splitlines()) == 1
     assert captured.err.startswith("error: ")
     assert list((tmp_path / "empty").iterdir()) == []
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out == f"odeform {version('odeform')}\n"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_argument_has_a_help_text(command: str) -> None:
+    parser = argparse.ArgumentParser()
+    COMMANDS[command].add_options(parser)
+    assert all(action.help for action in parser._actions)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_lists_the_arguments(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([command, "--help"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: odeform {command} ")
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["predict"], ["predict", "a", "--out"], ["train", "a"]], ids=str)

@@ -1,4 +1,4 @@
-"""What looking at a model costs to import: neither the training framework, nor GUI, recorder or simulator."""
+"""What a start imports: predicting loads neither the training framework nor GUI, recorder or simulator."""
 
 import subprocess
 import sys
@@ -7,6 +7,29 @@ from pathlib import Path
 import pytest
 
 HEAVY = ("torch", "viser", "rerun", "mujoco", "joblib", "odeform_viz")
+LIBRARIES = ("numpy", "scipy", "trimesh", "safetensors", *HEAVY)
+
+
+def run(script: str, folder: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=folder, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_bare_import_loads_no_library(tmp_path: Path) -> None:
+    """Nor does the help of the command; names are imported when they are first used."""
+    script = f"""
+import sys
+import odeform
+from odeform.cli import main
+assert "simulate" in dir(odeform)
+try:
+    main(["--help"])
+except SystemExit as end:
+    assert end.code == 0
+found = [name for name in {LIBRARIES!r} if name in sys.modules]
+assert not found, found
+"""
+    run(script, tmp_path)
 
 
 @pytest.mark.parametrize("model", ["odeform", "pod-rbf", "nearest"])
@@ -22,5 +45,4 @@ assert main(["info", {str(trained[model])!r}]) == 0
 found = [name for name in {HEAVY!r} if name in sys.modules]
 assert not found, found
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert done.returncode == 0, done.stderr
+    run(script, tmp_path)

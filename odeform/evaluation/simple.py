@@ -12,7 +12,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
-from odeform.evaluation.metrics import Scores
+from odeform.evaluation.scores import Scores
 from odeform.simulation.physics import GRAVITY
 from odeform.types import Frames, MotionSequence
 

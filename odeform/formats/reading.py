@@ -21,7 +21,22 @@ def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
     a mesh that coincide become one unless `merge` is false, which keeps the vertices and their order as in the file, so
     that they correspond between frames. Splats with values that are not finite are left out, and `notes` say so.
 
-    Raises `InputError` for a missing, damaged or unknown file, and for one without extent.
+    Args:
+        path: The file.
+        merge: Whether coinciding vertices of a mesh become one.
+
+    Returns:
+        A `Mesh`, `PointCloud` or `GaussianSplats` of N points.
+
+    Raises:
+        InputError: A missing, damaged or unknown file, or one without extent.
+
+    Examples:
+        >>> import odeform
+        >>> odeform.write_shape(odeform.load("kick").rest, "ball.ply")
+        >>> ball = odeform.read_geometry("ball.ply")
+        >>> ball.points.shape, ball.faces.shape
+        ((2306, 3), (4608, 3))
     """
     path = Path(path)
     if not path.is_file():

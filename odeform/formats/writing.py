@@ -15,9 +15,19 @@ __all__ = ["shape_at", "write_motion", "write_shape"]
 
 
 def write_shape(geometry: Geometry, out: str | Path) -> None:
-    """Write a geometry as it is; the suffix of `out` selects the format (`shape_formats()`).
+    """Write a geometry as it is; the suffix of `out` selects the format.
 
-    Raises `InputError` for an unknown suffix, and where the format cannot hold this kind of geometry.
+    Args:
+        geometry: A shape of N points, in any unit.
+        out: A file name with a suffix of `odeform.formats.registry.shape_formats()`.
+
+    Raises:
+        InputError: An unknown suffix, or a format that cannot hold this kind of geometry.
+
+    Examples:
+        >>> import odeform
+        >>> motion = odeform.load("kick").solve()
+        >>> odeform.write_shape(odeform.Mesh(motion.vertices(0.5), motion.geometry.faces), "ball.obj")
     """
     path = Path(out)
     writer = WRITERS.get(path.suffix.lower())
@@ -30,8 +40,26 @@ def write_motion(motion: Motion, times: Floats, out: str | Path, fit: FittedShap
     """Write the frames of `motion` at `times` (T,) s; the suffix of `out` selects the format.
 
     `.npz` holds all frames. A name with `{frame}` in it, for instance `ball_{frame}.ply`, gives one file per frame in
-    any format of `shape_formats()`. With `fit`, lengths, position and axes are those of its file, and files of single
-    frames include the part that stands still. Raises `InputError` for any other name.
+    any format of `shape_formats()`.
+
+    Args:
+        motion: What `Predictor.solve` returned.
+        times: (T,) seconds, in any order.
+        out: A file name.
+        fit: How the shape was brought into the scene. Lengths, position and axes are then those of its file, and files
+            of single frames include the part that stands still.
+
+    Raises:
+        InputError: A name with an unknown suffix, or without `{frame}` where the format holds one frame.
+
+    Examples:
+        >>> import numpy as np
+        >>> import odeform
+        >>> motion = odeform.load("kick").solve(parameters={"mass": 0.6})
+        >>> odeform.write_motion(motion, np.arange(0.0, 0.3, 0.1), "motion.npz")
+        >>> np.load("motion.npz")["vertices"].shape
+        (3, 2306, 3)
+        >>> odeform.write_motion(motion, np.array([0.0, 0.5]), "ball_{frame}.ply")
     """
     path = Path(out)
     writer = WRITERS.get(path.suffix.lower(), Writer(""))

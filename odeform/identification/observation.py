@@ -18,9 +18,27 @@ MOST_POINTS, MOST_FRAMES = 64, 160
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """`rest` (N, 3) are points anywhere on the body as it rests in the scene, `positions` (T, N, 3) where they were
-    at `times` (T,) seconds after that; metres. `heading` in radians is the scene's azimuth, which is known. `noise_mm`
-    is the standard deviation of each coordinate."""
+    """Positions of points of a body over time, for `identify`.
+
+    Attributes:
+        rest: (N, 3) metres: points anywhere on the body, as it rests in the scene.
+        times: (T,) seconds from the start of the motion.
+        positions: (T, N, 3) metres: the same points at these times.
+        heading: The scene's azimuth in radians, which has to be known; 0 for a scene without one.
+        noise_mm: Standard deviation of each coordinate in millimetres.
+
+    Raises:
+        InputError: Shapes that do not agree, values that are not finite, negative times, or noise that is not positive.
+
+    Examples:
+        >>> import odeform
+        >>> truth = next(odeform.open_dataset("mass-elastic").sequences("val"))
+        >>> observation = odeform.Observation(
+        ...     rest=truth.vertices[0, ::40], times=truth.times[24::24], positions=truth.vertices[24::24, ::40]
+        ... )
+        >>> observation.rest.shape
+        (11, 3)
+    """
 
     rest: Points
     times: Times

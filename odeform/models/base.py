@@ -25,7 +25,22 @@ def check_finite(geometry: Geometry) -> None:
 
 
 class Predictor(ABC):
-    """A model of one scene, read from a checkpoint.
+    """A trained model of one scene. `odeform.load` returns one.
+
+    Attributes:
+        checkpoint: The file it was read from: provenance, scores, SHA-256.
+        schema: Its parameters and window of time.
+        rest: The trained body at rest, N vertices in metres.
+
+    Examples:
+        >>> import odeform
+        >>> predictor = odeform.load("kick")
+        >>> motion = predictor.solve(parameters={"mass": 0.6, "force": 140.0})
+        >>> motion.vertices(0.02).shape
+        (2306, 3)
+        >>> band = predictor.error_band(motion.parameters, predictor.schema.window.times)
+        >>> band.shape
+        (121, 2)
 
     A subclass sets `model`, reads its arrays in `_read` and predicts in `_solve`; how it is trained stands with it
     too (`odeform.models.registry`).

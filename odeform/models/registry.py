@@ -52,9 +52,21 @@ def open_checkpoint(name: str | Path) -> Checkpoint:
 
 
 def load(name: str | Path) -> Predictor:
-    """A predictor from a checkpoint's path, or from a bundled checkpoint's name (SCENE or SCENE/MODEL).
+    """Load a predictor.
 
-    `InputError` for a file that is no checkpoint, or whose model is unknown.
+    Args:
+        name: Path of a checkpoint (`.safetensors`, or `.pth` of the paper's authors), or name of a bundled one: SCENE,
+            which is its ODeform model, or SCENE/MODEL.
+
+    Raises:
+        InputError: Not a checkpoint, or one of an unknown model.
+
+    Examples:
+        >>> import odeform
+        >>> odeform.load("kick").model
+        'odeform'
+        >>> odeform.load("mass-elastic/pod-rbf").model
+        'pod-rbf'
     """
     checkpoint = open_checkpoint(name)
     try:

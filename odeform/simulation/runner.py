@@ -58,7 +58,7 @@ def simulate(
 
     Args:
         scene: Name of a scene, for example "kick".
-        out: Folder to write to: new, empty, or with an unfinished data set of the same arguments.
+        out: Folder to write to: empty, or with an unfinished data set of the same arguments.
         count: Number of sequences; default: that of the scene's own data set.
         seed: Seeds the parameters that are drawn and the splits.
         workers: Number of processes. The data do not depend on it.
@@ -67,10 +67,16 @@ def simulate(
         corners: Also simulate the corners of the parameter box, for the training split.
 
     Returns:
-        The data set. Sequences that failed stay in its index, with the reason as their status.
+        The data set. Failed sequences stay in its index, with the reason as their status.
 
     Raises:
         InputError: An unknown scene, a number out of range, or a folder with another data set.
+
+    Examples:
+        >>> import odeform
+        >>> dataset = odeform.simulate("kick", "kicks", count=1, rate=30.0, step=4e-3)
+        >>> next(dataset.sequences("all")).vertices.shape
+        (31, 402, 3)
     """
     known = get_scene(scene)
     count = known.count if count is None else count
@@ -83,7 +89,6 @@ def simulate(
     provenance |= {"corners": True} if corners else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
     done = _finished(root, plan, empty)
-    todo = [entry for entry in plan if entry.name not in done]
     progress = Progress(f"simulate {scene}", len(plan), done=len(done))
 
     def index() -> Dataset:
@@ -93,7 +98,7 @@ def simulate(
 
     root.mkdir(parents=True, exist_ok=True)
     work = partial(_one, simulate=known.simulate, root=root, rate=rate, step=step)
-    for _, entry in as_completed(work, todo, workers):
+    for _, entry in as_completed(work, [entry for entry in plan if entry.name not in done], workers):
         done[entry.name] = entry
         index()
         progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")

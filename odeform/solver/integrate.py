@@ -26,10 +26,23 @@ last one, a third of the steps into a landing were rejected."""
 
 @dataclass(frozen=True)
 class SolverSettings:
-    """A Runge-Kutta method with either a fixed step or a tolerance. Raises `InputError` for an invalid combination."""
+    """A method of integration, with a fixed step or with a tolerance, and its precision.
+
+    Raises:
+        InputError: An unknown method, not exactly one of step and tolerance, or one that is not positive.
+
+    Examples:
+        >>> import odeform
+        >>> predictor = odeform.load("kick")
+        >>> predictor.qualities["balanced"]
+        SolverSettings(method='bosh3', step=None, tolerance=0.01, dtype='float32')
+        >>> fine = odeform.SolverSettings("rk4", step=1 / 480)
+        >>> predictor.solve(quality=fine).stats.steps
+        480
+    """
 
     method: str
-    """A name in `odeform.solver.tableau.METHODS`."""
+    """A name in `odeform.solver.registry.METHODS`."""
     step: float | None = None
     """Fixed step in seconds."""
     tolerance: float | None = None

@@ -78,6 +78,14 @@ def train(
 
     Raises:
         InputError: An unknown model, a number out of range, frames that the data do not have, or nothing to resume.
+
+    Examples:
+        >>> import dataclasses, odeform
+        >>> dataset = odeform.open_dataset("mass-elastic")
+        >>> few = dataclasses.replace(dataset, entries=dataset.entries[::20])
+        >>> predictor = odeform.train(few, "drop.safetensors", "nearest", every=10, report=lambda line: None)
+        >>> predictor.model, predictor.checkpoint.scores["sequences"]
+        ('nearest', 4)
     """
     request = TrainRequest(model, seed, minutes, steps, window, every, stagger, resume)
     part = Path(f"{out}.part")

@@ -5,7 +5,8 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.evaluation.metrics import Scores, evaluate
+from odeform.evaluation.metrics import evaluate
+from odeform.evaluation.scores import Scores
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.models.base import Predictor
 from odeform.types import MotionSequence

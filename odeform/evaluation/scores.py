@@ -1,0 +1,86 @@
+"""Distances between predictions and the truth, in the units and averages of the field.
+
+All scores leave out frame 0, which is given. "Pooled" scores average over all coordinates of all frames of all
+sequences. The others average over the coordinates of a frame first, then over frames and sequences, as the paper does
+(arXiv:2607.20670), so that the mean RMSE squared lies below the mean MSE.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from odeform.errors import InputError
+from odeform.geometry.rigid import best_rigid
+from odeform.types import Floats, Frames, MotionSequence, Perpoint, Points
+
+__all__ = ["Mask", "Scores"]
+
+Mask = NDArray[np.bool_]
+
+
+def _deformation(vertices: Frames, rest: Points, weights: Perpoint) -> Frames:
+    """(T, N, 3) displacements from rest in metres that the best rigid motion of each frame leaves."""
+    rest = rest.astype(float)
+    rotation, shift = best_rigid(rest, vertices, weights)
+    centre = weights @ rest
+    back = np.einsum("tji,tnj->tni", rotation, vertices - (shift + centre)[:, None])
+    return back - (rest - centre)
+
+
+class Scores:
+    """Accumulates the errors of predictions, one sequence at a time."""
+
+    def __init__(self) -> None:
+        self._mse: list[Floats] = []
+        self._mae: list[Floats] = []
+        self._distance: list[Floats] = []
+        self._between: list[Floats] = []
+        self._moved: list[Floats] = []
+        self._residual = self._reference = 0.0
+
+    def add(self, predicted: Frames, truth: MotionSequence, counted: Mask, between: Mask) -> None:
+        """Add a prediction (T, N, 3) in metres of the sequence `truth`.
+
+        Scores average over the frames `counted` (T,), except frame 0. The frames `between` (T,) lie between those that
+        the model was trained on, and are scored separately.
+        """
+        error = 1e3 * (predicted.astype(float) - truth.vertices)
+        grid = counted.copy()
+        grid[0] = False
+        squares = (error**2).mean(axis=(1, 2))
+        self._mse.append(squares[grid])
+        self._mae.append(np.abs(error).mean(axis=(1, 2))[grid])
+        self._distance.append(np.linalg.norm(error, axis=2).mean(axis=1)[grid])
+        self._between.append(squares[between])
+        self._moved.append(1e6 * ((truth.vertices - truth.vertices[0]).astype(float) ** 2).mean(axis=(1, 2))[grid])
+        rest = truth.vertices[0]
+        true_local = _deformation(truth.vertices, rest, truth.weights)
+        size = (true_local**2).sum(axis=2).mean(axis=1)
+        large = grid & (np.sqrt(size) > 0.1 * np.sqrt(size[grid].max(initial=0.0)))
+        difference = _deformation(predicted, rest, truth.weights) - true_local
+        self._residual += float((difference[large] ** 2).sum(axis=2).mean(axis=1).sum())
+        self._reference += float(size[large].sum())
+
+    def result(self) -> dict[str, Any]:
+        """All scores by name, in millimetres or as ratios; `off_grid_rmse_mm` is the pooled RMSE between the trained
+        frames, None without any. `InputError` if nothing was added."""
+        if not self._mse:
+            raise InputError("evaluate: expected at least one sequence")
+        mse, mae, between = (np.concatenate(rows) for rows in (self._mse, self._mae, self._between))
+        pooled, moved = float(np.sqrt(mse.mean())), float(np.sqrt(np.concatenate(self._moved).mean()))
+        even = len({len(row) for row in self._mse}) == 1
+        return {
+            "rmse_mm": float(np.sqrt(mse).mean()),
+            "mae_mm": float(mae.mean()),
+            "mse_mm2": float(mse.mean()),
+            "rmse_pooled_mm": pooled,
+            "mae_pooled_mm": float(mae.mean()),
+            "mse_pooled_mm2": float(mse.mean()),
+            "vertex_mm": float(np.concatenate(self._distance).mean()),
+            "relative": pooled / moved if moved else None,
+            "deformation_relative": float(np.sqrt(self._residual / self._reference)) if self._reference else None,
+            "off_grid_rmse_mm": float(np.sqrt(between.mean())) if between.size else None,
+            "per_frame_rmse_mm": np.sqrt(np.mean(np.stack(self._mse), axis=0)).tolist() if even else [],
+            "sequences": len(self._mse),
+        }
