@@ -1,9 +1,11 @@
-"""Sequences in one small file: pose and POD coefficients of each, quantised, differenced in time and compressed.
+"""Data sets in one small file: pose and POD coefficients, quantised, differenced in time and compressed.
 
 A zip archive of stored members: `dataset.json` (the index, as in a folder; LZMA), `common.safetensors` (reference
-points, modes, faces, weights) and one for each sequence, so that one is read without the others. Every frame is a
-best-fit rigid motion of the reference and a sum of modes that are orthonormal over the vertices: a coefficient is an
-RMS displacement, and steps of `quantum` metres leave a known error.
+points, modes, faces, weights) and one per sequence, so that one is read without the others. Every frame is a best-fit
+rigid motion of the reference plus a sum of modes that are orthonormal over the vertices: a coefficient is an RMS
+displacement, and quantisation steps of `quantum` metres have a known error.
+
+The codec is not numcodecs', whose delta filter has one order for all series; the order is chosen per series here.
 """
 
 import hashlib
@@ -31,14 +33,14 @@ __all__ = ["SUFFIX", "open_packed", "pack"]
 
 SUFFIX = ".odp"
 HEADER = struct.Struct("<IId")  # frames, series, rate in Hz
-ORDERS = 4  # differences in time: none to third
+ORDERS = 4  # of differences in time, zeroth to third
 INDEX, COMMON = "dataset.json", "common.safetensors"
 LIMIT = 1 << 28  # bytes of one member, decompressed
 POSE = 6
 
 
 def _squeeze(values: NDArray[np.int64], rate: float) -> bytes:
-    """(T, S) integers -> bytes: each series differenced as often as pays off, then byte planes, then LZMA."""
+    """(T, S) integers -> bytes: differences of the order that is cheapest for each series, byte planes, LZMA."""
     residuals = [values]
     for _ in range(1, ORDERS):
         residuals.append(np.diff(residuals[-1], axis=0, prepend=0))
@@ -47,7 +49,7 @@ def _squeeze(values: NDArray[np.int64], rate: float) -> bytes:
     chosen = np.stack([residuals[order][:, s] for s, order in enumerate(orders)])
     limits = np.iinfo(np.int32)
     if chosen.min() < limits.min or chosen.max() > limits.max:
-        raise InputError("pack: no compression within so small a tolerance for motions so large")
+        raise InputError("pack: the tolerance is too small for motions this large")
     planes = chosen.astype("<i4").view(np.uint8).reshape(*chosen.shape, 4)
     body = orders.astype(np.uint8).tobytes() + np.moveaxis(planes, -1, 0).tobytes()
     return lzma.compress(HEADER.pack(*values.shape, rate) + body, preset=9)
@@ -58,13 +60,14 @@ def _decompress(data: bytes) -> bytes:
 
 
 def _expand(data: bytes) -> tuple[NDArray[np.int64], float]:
+    """The inverse of `_squeeze`. Raises `LZMAError`, `struct.error` or `ValueError` for damaged bytes."""
     body = _decompress(data)
     frames, series, rate = HEADER.unpack_from(body)
     if not (frames and series and 0.0 < rate < float("inf")):
-        raise ValueError("no frames, or no rate")
+        raise ValueError("no frames, or no frame rate")
     orders, planes = np.split(np.frombuffer(body, np.uint8, offset=HEADER.size), [series])
     if orders.max() >= ORDERS:
-        raise ValueError("differences of an order that is never written")
+        raise ValueError("invalid order of differences")
     residuals = np.ascontiguousarray(np.moveaxis(planes.reshape(4, series, frames), 0, -1)).view("<i4")[..., 0]
     values = residuals.astype(np.int64)
     for s, order in enumerate(orders):
@@ -74,7 +77,7 @@ def _expand(data: bytes) -> tuple[NDArray[np.int64], float]:
 
 
 def _moving(sequence: MotionSequence, reference: Floats) -> tuple[Floats, Floats]:
-    """Pose (T, 6) of the reference in each frame, and what remains, (T, 3 N) in its own axes."""
+    """Pose (T, 6) of the reference in each frame, and the deformation (T, 3 N) in body axes."""
     even = np.full(len(reference), 1.0 / len(reference))
     rotation, shift = best_rigid(reference, sequence.vertices, even)
     centre = even @ reference
@@ -83,14 +86,14 @@ def _moving(sequence: MotionSequence, reference: Floats) -> tuple[Floats, Floats
 
 
 def _steps(common: Arrays, quantum: float) -> Floats:
-    """(6 + K,) quantisation steps: metres, and radians that move the farthest vertex by as much."""
+    """(6 + K,) quantisation steps: metres, and radians that move the farthest vertex by as many metres."""
     points = common["points"]
     reach = np.linalg.norm(points - points.mean(axis=0), axis=1).max()
     return quantum / np.concatenate([np.ones(3), np.full(3, reach), np.ones(common["modes"].shape[1])])
 
 
 def _decode(data: bytes, common: Arrays, quantum: float) -> tuple[Floats, Floats]:
-    """Times (T,) and vertices (T, N, 3)."""
+    """Times (T,) s and vertices (T, N, 3) m."""
     values, rate = _expand(data)
     steps = _steps(common, quantum)
     if values.shape[1] != len(steps):
@@ -104,11 +107,11 @@ def _decode(data: bytes, common: Arrays, quantum: float) -> tuple[Floats, Floats
 
 
 def _modes(dataset: Dataset, reference: Floats) -> tuple[Floats, Floats]:
-    """(3 N, 3 N) POD modes, orthonormal in the mean over vertices, and the mean square displacement each carries."""
+    """(3 N, 3 N) POD modes, orthonormal in the mean over vertices, and the mean square displacement of each (3 N,)."""
     total, frames = np.zeros((reference.size, reference.size)), 0
     for sequence in dataset.sequences("all"):
         if sequence.vertices.shape[1:] != reference.shape:
-            raise InputError(f"{sequence.name}: expected {len(reference)} vertices as in the others")
+            raise InputError(f"{sequence.name}: expected {len(reference)} vertices, as in the other sequences")
         _, local = _moving(sequence, reference)
         total += local.T @ local
         frames += len(local)
@@ -117,13 +120,15 @@ def _modes(dataset: Dataset, reference: Floats) -> tuple[Floats, Floats]:
 
 
 class _TooCoarse(Exception):
-    """With its share of the error that no finer quantum would mend."""
+    """A vertex exceeds the tolerance. The argument is the part of its error, in tolerances, that comes from left-out
+    modes."""
 
 
 def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, float]:
-    """Write a compressed copy in which no vertex of any frame is off by more than `tolerance` metres.
+    """Write a compressed copy in which every vertex of every frame is within `tolerance` metres.
 
-    Returns what it took: modes, quantum, largest RMSE of a sequence and largest error of a vertex, in metres.
+    Returns the number of modes, the quantum, the largest RMSE of a sequence and the largest error of a vertex, all in
+    metres. Raises `InputError` if the meshes differ, or if no compression keeps the tolerance.
     """
     if not 0.0 < tolerance < float("inf"):
         raise InputError(f"pack: expected a positive tolerance, got {tolerance:g} m")
@@ -136,7 +141,7 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
     truncation, noise = 0.2 * tolerance, 0.6 * tolerance
     for _ in range(12):
         count = int(np.argmax(left <= truncation)) + 1 if left.min() <= truncation else len(left)
-        # errors of the rounded coefficients add up at a vertex like noise; six deviations are rarely left
+        # rounding errors of coefficients add up at a vertex like noise, which rarely exceeds six deviations
         quantum = noise * np.sqrt(12.0 / (count + POSE)) / 6.0
         common = {
             "points": reference,
@@ -162,7 +167,7 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
     with zipfile.ZipFile(archive, "w") as file:
         index = lzma.compress(index_to_json(replace(dataset, entries=entries), codec=codec), preset=9)
         for name, data in ((INDEX, index), (COMMON, save(common)), *blobs.items()):
-            # a fixed date: the same data give the same file
+            # a fixed date: equal data give equal files
             file.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
     atomic_write(out, archive.getvalue())
     return codec
@@ -171,7 +176,7 @@ def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, floa
 def _encode(
     dataset: Dataset, common: Arrays, quantum: float, tolerance: float
 ) -> tuple[dict[str, bytes], float, float]:
-    """A blob for each sequence, the largest RMSE of a sequence and the largest error of a vertex, in metres."""
+    """The bytes of each sequence, the largest RMSE of a sequence and the largest error of a vertex, in metres."""
     blobs: dict[str, bytes] = {}
     rmse = worst = 0.0
     selected = dataset.select("all")
@@ -181,7 +186,7 @@ def _encode(
         sequence = dataset.read(entry)
         same_weights = np.allclose(sequence.weights, common["weights"], rtol=0.0, atol=1e-9)
         if not (np.array_equal(sequence.faces, common["faces"]) and same_weights):
-            raise InputError(f"{entry.name}: expected the same mesh as in the others")
+            raise InputError(f"{entry.name}: expected the same mesh as in the other sequences")
         count = len(sequence.times)
         rate = (count - 1) / float(sequence.times[-1]) if count > 1 else dataset.schema.window.rate
         if not np.allclose(sequence.times, np.arange(count) / rate, atol=1e-9):
@@ -202,15 +207,15 @@ def _encode(
 
 
 def open_packed(path: Path) -> Dataset:
-    """The data set in that file."""
+    """Open a packed data set. Raises `InputError` for a missing or damaged file; sequences are checked when read."""
 
     def member(name: str) -> bytes:
         try:
             with zipfile.ZipFile(path) as file:
                 info = file.getinfo(name)
-                # members are stored as they are: nothing inflates before its size is known
+                # members are stored uncompressed: sizes are known before anything is decompressed
                 if info.compress_type != zipfile.ZIP_STORED or info.file_size > LIMIT:
-                    raise InputError(f"{path}: {name} is not as `odeform pack` writes it")
+                    raise InputError(f"{path}: {name}: expected a stored member, as `odeform pack` writes")
                 return file.read(name)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}") from None
@@ -222,14 +227,14 @@ def open_packed(path: Path) -> Dataset:
         common = load(member(COMMON))
         count = len(common["weights"])
         shapes = {name: common[name].shape for name in ("points", "modes", "faces", "weights")}
-        wanted = {"points": (count, 3), "modes": (3 * count, shapes["modes"][-1]), "faces": (len(common["faces"]), 3)}
-        if shapes != {**wanted, "weights": (count,)} or not 0.0 < quantum < 1.0:
+        expected = {"points": (count, 3), "modes": (3 * count, shapes["modes"][-1]), "faces": (len(common["faces"]), 3)}
+        if shapes != {**expected, "weights": (count,)} or not 0.0 < quantum < 1.0:
             raise ValueError(f"arrays of shapes {shapes}, quantum {quantum}")
 
         def read(entry: Entry) -> MotionSequence:
             data = member(entry.name)
             if hashlib.sha256(data).hexdigest() != entry.sha256:
-                raise InputError(f"{path}: checksum of {entry.name} does not match; the file is damaged")
+                raise InputError(f"{path}: checksum of {entry.name} does not match: the file is damaged")
             try:
                 times, vertices = _decode(data, common, quantum)
             except (lzma.LZMAError, struct.error, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Splats as they are trained: one row of numbers each, in a .ply.
+"""Gaussian splats as they are trained: one row of numbers each, in a .ply.
 
 Kerbl et al., "3D Gaussian Splatting for Real-Time Radiance Field Rendering" (2023), and their code's `save_ply`:
 logarithmic scales, quaternion w first, logit of the opacity, all of red's harmonics before green's and blue's.
@@ -20,26 +20,28 @@ __all__ = ["harmonic_columns", "inria_bytes", "inria_splats"]
 POINT = ("x", "y", "z")
 NORMAL = ("nx", "ny", "nz")
 SCALE = ("scale_0", "scale_1", "scale_2")
-TURN = ("rot_0", "rot_1", "rot_2", "rot_3")
+ROTATION = ("rot_0", "rot_1", "rot_2", "rot_3")
 CONSTANT = ("f_dc_0", "f_dc_1", "f_dc_2")
-HIGHEST = 3  # degree of harmonics; no viewer shows more
-SMALLEST = 2e-9  # m; viewers keep logarithms of scales above -20
-CERTAIN = 1e-7  # from opacities 0 and 1, whose logits are not finite
+MAX_DEGREE = 3  # of harmonics; no viewer shows more
+MIN_SCALE = 2e-9  # viewers clip logarithms of scales at -20
+MARGIN = 1e-7  # to opacities 0 and 1, whose logits are not finite
 
 
 def inria_splats(table: Table, path: Path) -> GaussianSplats:
-    """The element vertex -> splats. A file without colour is grey."""
+    """The element vertex -> splats; gray without colour. Raises `InputError` for missing columns."""
     notes = []
     if any(name in (table.dtype.names or ()) for name in CONSTANT):
         rest = harmonic_columns(table, path)
-        kept = [CONSTANT, *rest][: (HIGHEST + 1) ** 2]
+        kept = [CONSTANT, *rest][: (MAX_DEGREE + 1) ** 2]
         harmonics = columns(table, list(itertools.chain(*kept)), path).reshape(len(table), len(kept), 3)
         if len(rest) >= len(kept):
-            notes.append(f"colour beyond degree {HIGHEST} left out")
+            notes.append(f"colour beyond degree {MAX_DEGREE} left out")
     else:
         harmonics = np.zeros((len(table), 1, 3), np.float32)
-        notes.append("without colour, shown grey")
-    covariances = covariances_from_axes(np.exp(columns(table, SCALE, path), dtype=float), columns(table, TURN, path))
+        notes.append("without colour, shown gray")
+    covariances = covariances_from_axes(
+        np.exp(columns(table, SCALE, path), dtype=float), columns(table, ROTATION, path)
+    )
     opacities = 1.0 / (1.0 + np.exp(-columns(table, ["opacity"], path)[:, 0]))
     return GaussianSplats(columns(table, POINT, path), covariances, harmonics, opacities, tuple(notes))
 
@@ -54,15 +56,23 @@ def harmonic_columns(table: Table, path: Path) -> list[tuple[str, str, str]]:
 
 
 def inria_bytes(splats: GaussianSplats) -> bytes:
-    """A .ply that other viewers open, with float32 columns in the order of the original code."""
+    """The .ply of splats, with float32 columns in the order of the original code."""
     count = len(splats.points)
     scales, quaternions = axes_from_covariances(splats.covariances)
-    opacities = np.clip(splats.opacities, CERTAIN, 1.0 - CERTAIN, dtype=float)
+    opacities = np.clip(splats.opacities, MARGIN, 1.0 - MARGIN, dtype=float)
     further = splats.harmonics[:, 1:].swapaxes(1, 2).reshape(count, 3 * (splats.harmonics.shape[1] - 1))
-    names = [*POINT, *NORMAL, *CONSTANT, *(f"f_rest_{k}" for k in range(further.shape[1])), "opacity", *SCALE, *TURN]
+    names = [
+        *POINT,
+        *NORMAL,
+        *CONSTANT,
+        *(f"f_rest_{k}" for k in range(further.shape[1])),
+        "opacity",
+        *SCALE,
+        *ROTATION,
+    ]
     parts: list[Floats] = [
         *(splats.points, np.zeros((count, 3)), splats.harmonics[:, 0], further),
-        *(np.log(opacities / (1.0 - opacities))[:, None], np.log(np.maximum(scales, SMALLEST)), quaternions),
+        *(np.log(opacities / (1.0 - opacities))[:, None], np.log(np.maximum(scales, MIN_SCALE)), quaternions),
     ]
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
     header += [*(f"property float {name}" for name in names), "end_header", ""]

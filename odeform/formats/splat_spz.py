@@ -1,8 +1,8 @@
-"""Niantic's .spz: quantised splats, attribute by attribute, versions 1 to 4 (https://github.com/nianticlabs/spz).
+"""Niantic's .spz: quantised Gaussian splats, versions 1 to 4 (https://github.com/nianticlabs/spz).
 
-Versions up to 3 are one gzip stream, which some tools leave out; version 4 is a stream of zstandard for each attribute
-behind a table of their sizes. The format stores x right, y up, z backward; splats come out as the .ply of the same
-capture has them, x right, y down, z forward.
+Attributes are stored one after the other. Versions up to 3 are one gzip stream, which some tools omit; version 4 has a
+zstandard stream per attribute behind a table of their sizes. The format stores x right, y up, z backward; splats are
+returned as in the .ply of the same capture, x right, y down, z forward.
 """
 
 import struct
@@ -25,16 +25,16 @@ __all__ = ["read_spz", "spz_bytes", "spz_splats"]
 Bytes = NDArray[np.uint8]
 
 MAGIC = b"NGSP"
-HEADER = struct.Struct("<4sIIBBBB")  # magic, version, splats, degree, bits of a fraction, flags, streams
-HIGHEST = 3  # degree of harmonics; no viewer shows more
-EXTENDED = 2  # flag: a vendor's records follow
-CONSTANT = 0.15  # a byte of colour is this times the constant harmonic, about one half
-TIGHTEST = 1024  # no stream is packed more than this
+HEADER = struct.Struct("<4sIIBBBB")  # magic, version, splats, degree, fractional bits, flags, streams
+MAX_DEGREE = 3  # of harmonics; no viewer shows more
+EXTENDED = 2  # flag: vendor extensions follow
+COLOR_SCALE = 0.15  # a colour byte is 255 * (0.5 + COLOR_SCALE * constant harmonic)
+MAX_RATIO = 1024  # of compression
 AXES = np.diag([1.0, -1.0, -1.0])
 
 
 class Header(NamedTuple):
-    """What every version starts with; `streams` counts in version 4 only."""
+    """The header of all versions; `streams` is used in version 4 only."""
 
     magic: bytes
     version: int
@@ -46,9 +46,9 @@ class Header(NamedTuple):
 
     @property
     def widths(self) -> list[int]:
-        """Bytes a splat of position, opacity, colour, scales, turn and further harmonics, in the order of the file."""
-        position, turn = 6 if self.version == 1 else 9, 3 if self.version < 3 else 4
-        return [position, 1, 3, 3, turn, 3 * ((self.degree + 1) ** 2 - 1)]
+        """Bytes per splat of position, opacity, colour, scales, rotation and further harmonics, in file order."""
+        position, rotation = 6 if self.version == 1 else 9, 3 if self.version < 3 else 4
+        return [position, 1, 3, 3, rotation, 3 * ((self.degree + 1) ** 2 - 1)]
 
 
 def read_spz(path: Path, merge: bool) -> GaussianSplats:
@@ -57,36 +57,39 @@ def read_spz(path: Path, merge: bool) -> GaussianSplats:
 
 
 def spz_splats(data: bytes, path: Path) -> GaussianSplats:
-    """Bytes of a file -> splats."""
+    """The splats in the bytes of a file. Raises `InputError`, which names `path`, for damaged ones."""
     header, body = _unpacked(data, path)
     count, widths = header.splats, header.widths
     if len(body) < count * sum(widths):
         raise InputError(f"geometry {path}: expected {count * sum(widths)} bytes of {count} splats, got {len(body)}")
     cuts = np.cumsum([count * width for width in widths])
     parts = np.split(np.frombuffer(body, np.uint8)[: cuts[-1]], cuts[:-1])
-    points, alphas, colors, scales, turns, further = (
+    points, alphas, colors, scales, rotations, further = (
         part.reshape(count, width) for part, width in zip(parts, widths, strict=True)
     )
     harmonics = np.empty((count, (header.degree + 1) ** 2, 3), np.float32)
-    harmonics[:, 0] = (colors / 255.0 - 0.5) / CONSTANT
+    harmonics[:, 0] = (colors / 255.0 - 0.5) / COLOR_SCALE
     harmonics[:, 1:] = (further.reshape(count, widths[-1] // 3, 3) - 128.0) / 128.0
     notes = []
-    if header.degree > HIGHEST:
-        notes.append(f"colour beyond degree {HIGHEST} left out")
+    if header.degree > MAX_DEGREE:
+        notes.append(f"colour beyond degree {MAX_DEGREE} left out")
     if header.flags & EXTENDED:
-        notes.append("a vendor's extensions left out")
-    quaternions = _three_bytes(turns) if header.version < 3 else _smallest_three(turns)
+        notes.append("vendor extensions left out")
+    quaternions = _three_bytes(rotations) if header.version < 3 else _smallest_three(rotations)
     return GaussianSplats(
         (_positions(points, header) @ AXES).astype(np.float32),
         AXES @ covariances_from_axes(np.exp(scales / 16.0 - 10.0), quaternions) @ AXES,
-        rotated_harmonics(harmonics[:, : (HIGHEST + 1) ** 2], AXES),
+        rotated_harmonics(harmonics[:, : (MAX_DEGREE + 1) ** 2], AXES),
         alphas[:, 0] / 255.0,
         tuple(notes),
     )
 
 
 def spz_bytes(splats: GaussianSplats, fraction: int = 12) -> bytes:
-    """Splats of one colour each -> a file of version 3, places rounded to 2^-`fraction` of a unit."""
+    """Splats of one colour each -> a file of version 3, with positions rounded to 2^-`fraction` of a unit.
+
+    Raises `ValueError` for further harmonics.
+    """
     if splats.harmonics.shape[1] != 1:
         raise ValueError(f"expected the constant harmonic alone, got {splats.harmonics.shape[1]} coefficients")
     scales, quaternions = axes_from_covariances(AXES @ splats.covariances @ AXES)
@@ -94,28 +97,28 @@ def spz_bytes(splats: GaussianSplats, fraction: int = 12) -> bytes:
     parts = [
         np.rint((splats.points @ AXES) * 2.0**fraction).astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3],
         _byte(255.0 * splats.opacities),
-        _byte(255.0 * (0.5 + CONSTANT * splats.harmonics[:, 0])),
+        _byte(255.0 * (0.5 + COLOR_SCALE * splats.harmonics[:, 0])),
         _byte(16.0 * (np.log(np.maximum(scales, 1e-9)) + 10.0)),
-        _packed_turns(quaternions),
+        _packed_rotations(quaternions),
     ]
-    # without a time in it: the same splats are the same bytes
+    # no time stamp: equal splats give equal bytes
     return compress(header + b"".join(part.tobytes() for part in parts), mtime=0)
 
 
 def _unpacked(data: bytes, path: Path) -> tuple[Header, bytes]:
-    """The header, and the attributes one after the other."""
+    """The header and the decompressed attributes."""
     gzip = zlib.decompressobj(wbits=31) if data.startswith(b"\x1f\x8b") else None
     head = gzip.decompress(data, HEADER.size) if gzip else data[: HEADER.size]
     if len(head) < HEADER.size or not head.startswith(MAGIC):
         raise InputError(f"geometry {path}: expected a header that starts with NGSP, got {head[:4]!r}")
     header = Header(*HEADER.unpack(head))
     if not 1 <= header.version <= (3 if gzip else 4):
-        raise InputError(f"geometry {path}: expected version 1 to 4 of .spz, got {header.version}")
+        raise InputError(f"geometry {path}: expected .spz version 1 to 4, got {header.version}")
     if header.degree > 4 or header.fraction > 23:
         got = f"degree {header.degree} and {header.fraction} bits"
-        raise InputError(f"geometry {path}: expected harmonics to degree 4 and up to 23 bits of a fraction, got {got}")
+        raise InputError(f"geometry {path}: expected harmonics of degree 4 and 23 fractional bits at most, got {got}")
     size = header.splats * sum(header.widths)
-    if size > TIGHTEST * len(data):
+    if size > MAX_RATIO * len(data):
         raise InputError(f"geometry {path}: {len(data)} bytes cannot hold {header.splats} splats")
     if header.version == 4:
         return header, _streams(data, header, path)
@@ -123,13 +126,14 @@ def _unpacked(data: bytes, path: Path) -> tuple[Header, bytes]:
 
 
 def _streams(data: bytes, header: Header, path: Path) -> bytes:
+    """The decompressed attributes of version 4."""
     sizes = [header.splats * width for width in header.widths if header.splats * width]
     if header.streams != len(sizes) or len(data) < 32:
         raise InputError(f"geometry {path}: expected {len(sizes)} streams of .spz, got {header.streams}")
     (table,) = struct.unpack_from("<I", data, 16)
     start = table + 16 * len(sizes)
     if table < 32 or start > len(data):
-        raise InputError(f"geometry {path}: expected a table of streams within {len(data)} bytes, got it at {table}")
+        raise InputError(f"geometry {path}: expected a stream table within {len(data)} bytes, got one at {table}")
     parts = []
     for index, size in enumerate(sizes):
         packed, unpacked = struct.unpack_from("<QQ", data, table + 16 * index)
@@ -143,11 +147,11 @@ def _streams(data: bytes, header: Header, path: Path) -> bytes:
 
 
 def _positions(raw: Bytes, header: Header) -> Floats:
-    """(N, 9) bytes of three numbers of 24 bits, `fraction` of them behind the point; (N, 6) of half floats once."""
+    """(N, 3) from (N, 9) bytes of 24-bit fixed-point numbers, or in version 1 from (N, 6) bytes of half floats."""
     if header.version == 1:
         return np.ascontiguousarray(raw).view("<f2").astype(float)
     low, middle, high = np.moveaxis(raw.reshape(-1, 3, 3).astype(np.int32), -1, 0)
-    # the highest byte carries the sign
+    # the highest byte has the sign
     return (low + (middle << 8) + (high.astype(np.uint8).view(np.int8).astype(np.int32) << 16)) * 2.0**-header.fraction
 
 
@@ -157,7 +161,7 @@ def _three_bytes(raw: Bytes) -> Floats:
 
 
 def _smallest_three(raw: Bytes) -> Floats:
-    """(N, 4) bytes of a word: place of the largest of x, y, z, w, then a sign and 9 bits for each other -> w first."""
+    """(N, 4) bytes of a word: index of the largest of x, y, z, w, then a sign and 9 bits per other one -> w first."""
     word = np.ascontiguousarray(raw).view("<u4")[:, 0]
     fields = np.stack([word >> 20, word >> 10, word], axis=1)
     size = (fields & 511) / 511.0 * np.sqrt(0.5)
@@ -168,14 +172,14 @@ def _byte(values: Floats) -> Bytes:
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
-def _packed_turns(quaternions: Floats) -> Bytes:
-    """What `_smallest_three` reads."""
+def _packed_rotations(quaternions: Floats) -> Bytes:
+    """The inverse of `_smallest_three`."""
     xyzw = np.roll(quaternions, -1, axis=1)
-    place = np.abs(xyzw).argmax(axis=1)
+    largest = np.abs(xyzw).argmax(axis=1)
     rows = np.arange(len(xyzw))
-    xyzw = xyzw * np.where(xyzw[rows, place] < 0.0, -1.0, 1.0)[:, None]
-    others = xyzw[np.arange(4) != place[:, None]].reshape(-1, 3)
+    xyzw = xyzw * np.where(xyzw[rows, largest] < 0.0, -1.0, 1.0)[:, None]
+    others = xyzw[np.arange(4) != largest[:, None]].reshape(-1, 3)
     size = np.rint(np.minimum(np.abs(others) * np.sqrt(2.0), 1.0) * 511).astype(np.uint32)
     fields = size | (others < 0.0).astype(np.uint32) << 9
-    word = place.astype(np.uint32) << 30 | fields[:, 0] << 20 | fields[:, 1] << 10 | fields[:, 2]
+    word = largest.astype(np.uint32) << 30 | fields[:, 0] << 20 | fields[:, 1] << 10 | fields[:, 2]
     return word.astype("<u4").view(np.uint8).reshape(-1, 4)

@@ -1,13 +1,30 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from odeform.dataset import store
-from odeform.dataset.index import Dataset
+from odeform.dataset.folder import folder_reader, save_sequence, write_index
+from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.packed import pack
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
+from odeform.simulation.scenes.registry import get_scene
+from odeform.types import MotionSequence
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> Dataset:
+    """Three still tetrahedra in a folder."""
+    root, schema = tmp_path / "folder", get_scene("kick").schema
+    vertices = np.tile(np.eye(4, 3, dtype=np.float32), (5, 1, 1))
+    still = MotionSequence(np.arange(5) / 120.0, vertices, np.array([[0, 1, 2]]), np.full(4, 0.25))
+    names = [f"kick_{k:05d}" for k in range(3)]
+    entries = [Entry(name, "train", {"mass": 0.6}, save_sequence(root, name, still)) for name in names]
+    dataset = Dataset(root, schema, tuple(entries), folder_reader(root))
+    write_index(dataset)
+    return dataset
 
 
 @pytest.fixture
