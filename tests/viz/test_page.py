@@ -12,7 +12,7 @@ from odeform.models.base import Predictor
 from odeform_viz.columns import Column
 from odeform_viz.panels.parameters import ParameterPanel
 
-pytestmark = needs_chromium
+pytestmark = [pytest.mark.slow, needs_chromium]
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 # resolves to the milliseconds from when the sliders are there to when one has moved by itself

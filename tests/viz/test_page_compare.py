@@ -13,7 +13,7 @@ from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels.record import RecordPanel
 from odeform_viz.panels.truth import TruthPanel
 
-pytestmark = needs_chromium
+pytestmark = [pytest.mark.slow, needs_chromium]
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 import viser
 
 from odeform.geometry.region import Box, Sphere
+from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, PointCloud
@@ -111,58 +112,58 @@ def test_small_splats_keep_their_size_as_float16(
         )
 
 
+def _fit(app: App) -> FittedShape:
+    fit = app.columns.all[0].fit
+    assert fit is not None
+    return fit
+
+
 def test_a_sphere_is_chosen_counted_and_used(app: App, port: int) -> None:
     with LoopbackClient(port) as client:
         client.set("Change the region", True)
-        client.collect(2.0)
-        assert f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text()
-        assert app.columns.all[0].fit is not None
-        assert app.columns.all[0].fit.remainder is None  # the whole scene lies at rest while one chooses
+        assert client.until(lambda: f"**{BALL:,}** of {BALL + REST:,} points inside" in client.text())
+        assert _fit(app).remainder is None  # the whole scene lies at rest meanwhile
         client.set("radius (%)", 3.4)  # the ball is hollow: its top alone
-        client.collect(1.0)
-        smaller = int(client.text().split("**")[1].replace(",", ""))
-        assert 0 < smaller < BALL
+
+        def inside() -> int:
+            return int(client.text().split("** of ")[0].rsplit("**")[-1].replace(",", ""))
+
+        assert client.until(lambda: 0 < inside() < BALL)
+        smaller = inside()
         client.set("Use this part", True)
-        client.collect(1.0)
-    fit = app.columns.all[0].fit
-    assert fit is not None
+        assert client.until(lambda: _fit(app).remainder is not None)
+    fit = _fit(app)
     assert isinstance(fit.region, Sphere)
     assert len(fit.geometry.points) == smaller
     assert fit.remainder is not None
     assert len(fit.remainder.points) == BALL + REST - smaller
-    assert np.array_equal(fit.transform.rotation, UPRIGHT["-y"])  # as it lay while one chose
+    assert np.array_equal(fit.transform.rotation, UPRIGHT["-y"])  # as it lay meanwhile
 
 
-def test_a_region_that_holds_nothing_leaves_a_message_and_what_is_shown(app: App, port: int) -> None:
+def test_an_empty_region_leaves_the_shape_and_says_why(app: App, port: int) -> None:
     before = app.columns.all
     with LoopbackClient(port) as client:
         app.panel(ShapePanel)._use_region(Box(np.full(3, 50.0), np.ones(3)))
-        client.collect(0.5)
-        assert f"the region contains 0 of the {BALL + REST:,} points" in client.text()
+        assert client.until(lambda: f"the region holds 0 of the {BALL + REST:,} points" in client.text())
     assert app.columns.all is before
 
 
 def test_alignment_by_hand_and_back(app: App, port: int) -> None:
-    def place() -> Similarity:
-        fit = app.columns.all[0].fit
-        assert fit is not None
-        return fit.transform
-
-    guessed = place()
+    automatic = _fit(app).transform
     with LoopbackClient(port) as client:
         client.set("size (%)", 150.0)
-        client.collect(1.0)
-        assert place().factor == pytest.approx(1.5 * guessed.factor)
+        assert client.until(lambda: _fit(app).transform.factor == pytest.approx(1.5 * automatic.factor))
         assert app.columns.all[0].geometry.points[:, 2].min() == pytest.approx(0.0, abs=1e-5)
         client.set("up axis", "+y")
-        client.collect(1.0)
-        assert np.array_equal(place().rotation, UPRIGHT["+y"])
-    app.panel(ShapePanel)._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
-    assert np.allclose(place().rotation, UPRIGHT["-z"] @ UPRIGHT["+y"])
-    app.panel(ShapePanel)._rotate(None)
-    assert place().factor == guessed.factor
-    assert np.array_equal(place().rotation, guessed.rotation)
-    assert np.array_equal(place().shift, guessed.shift)
+        assert client.until(lambda: np.array_equal(_fit(app).transform.rotation, UPRIGHT["+y"]))
+    panel = app.panel(ShapePanel)
+    panel._alignment._dragged(Similarity(1.0, UPRIGHT["-z"], np.array([0.0, 0.3, 0.0])))
+    assert np.allclose(_fit(app).transform.rotation, UPRIGHT["-z"] @ UPRIGHT["+y"])
+    panel._rotate(None)
+    again = _fit(app).transform
+    assert again.factor == automatic.factor
+    assert np.array_equal(again.rotation, automatic.rotation)
+    assert np.array_equal(again.shift, automatic.shift)
 
 
 def test_a_region_as_it_is_dragged(server: viser.ViserServer) -> None:

@@ -45,7 +45,7 @@ def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Pre
     client.click("Pin these parameters")
     assert client.until(lambda: len(app.columns.all) == 2)
     assert _labels(app)[1].startswith("odeform at mass 0.6, bending")
-    client.collect(0.5)
+    assert client.until(lambda: app.presenter.settled and len(_frame(app).columns) == 2)
     client.set("mass (kg)", 0.9)
     moved = client.wait_vertices("/world/column_0/body/part_0")
     assert moved is not None
@@ -83,11 +83,10 @@ def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
     app, client = serve(Column("odeform", kick, kick.rest), Column("rival", rival, rival.rest))
     client.set("rival", False)
     assert client.until(lambda: not app.columns.all[1].visible)
-    client.collect(0.5)
+    assert client.until(lambda: app.presenter.settled and len(_frame(app).columns) == 1)
     asked.clear()
     client.set("mass (kg)", 0.9)
-    assert client.wait_vertices("/world/column_0/body/part_0") is not None
-    client.collect(0.5)
+    assert client.until(lambda: app.presenter.settled and _frame(app).request.parameters["mass"] == 0.9)
     assert asked == []
     client.set("rival", True)
     assert client.until(lambda: bool(asked))
@@ -106,9 +105,10 @@ def test_overlaid_columns_stand_in_one_place_by_box_and_by_key(serve: Serve, kic
 
 def test_too_many_columns_are_refused(kicked: Kicked) -> None:
     app, client = kicked
-    for _ in range(3):
+    for count in (6, 11):
         client.click("Sweep it in 5 columns")
-        client.collect(0.7)
+        assert client.until(lambda count=count: len(app.columns.all) == count)
+    client.click("Sweep it in 5 columns")
     assert client.until(lambda: any(f"at most {MOST}" in said for said in client.notifications))
     assert len(app.columns.all) == 11
     assert any(c.visible for c in app.columns.all)
@@ -116,12 +116,13 @@ def test_too_many_columns_are_refused(kicked: Kicked) -> None:
 
 def test_a_column_keeps_its_colour_and_shares_it_with_no_other(kicked: Kicked) -> None:
     app, client = kicked
-    for _ in range(2):
+    for count in (2, 3):
         client.click("Pin these parameters")
-        client.collect(0.3)
+        assert client.until(lambda count=count: len(app.columns.all) == count)
     _, second, third = app.columns.all
+    assert client.until(lambda: second.label in client.controls)
     client.set(second.label, False)
-    client.collect(0.3)
+    assert client.until(lambda: not app.columns.all[1].visible)
     client.click("Remove hidden columns")
     assert client.until(lambda: len(app.columns.all) == 2)
     assert color_of(app.columns.all[1]) == color_of(third) == MODELS[2]

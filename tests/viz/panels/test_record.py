@@ -2,6 +2,7 @@
 
 import io
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 import trimesh
 
 from odeform.dataset.store import open_dataset
+from odeform.formats.writing import shape_at, write_shape
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform_viz.app import App
@@ -35,10 +37,9 @@ def test_the_state_of_the_page_goes_round(serve: Callable[..., View], drop: Pred
     client.set("overlay", True)
     client.set("quality", "draft")
     assert client.until(lambda: len(app.columns.all) == 4 and not app.columns.all[1].visible)
-    client.collect(0.5)
+    assert client.until(lambda: app.page.options().overlay and app.request().quality == "draft")
     client.click("Save state")
-    assert client.until(lambda: STATE in client.downloads)
-    client.collect(0.3)
+    assert client.until(lambda: client.downloads.get(STATE, b"").endswith(b"}"))
     saved = client.downloads[STATE]
     labels = [(c.label, c.visible, c.pinned) for c in app.columns.all]
 
@@ -67,26 +68,26 @@ def test_a_broken_state_changes_nothing(dropped: View, content: bytes) -> None:
     assert app.clock.time() == 0.3
 
 
-def test_this_moment_and_the_whole_motion_as_files(dropped: View, drop: Predictor) -> None:
+def test_the_current_frame_and_the_whole_motion_as_files(dropped: View, drop: Predictor, tmp_path: Path) -> None:
     _, client = dropped
     motion = drop.solve(drop.rest)
     client.click("Download")
-    assert client.until(lambda: "motion_00000.ply" in client.downloads)
-    client.collect(0.5)
-    mesh = trimesh.load(io.BytesIO(client.downloads["motion_00000.ply"]), file_type="ply", process=False)
+    written = tmp_path / "motion.ply"
+    write_shape(shape_at(motion, 0.3), written)
+    assert client.until(lambda: client.downloads.get("motion_00000.ply") == written.read_bytes())
+    mesh = trimesh.load(written, process=False)
     np.testing.assert_allclose(mesh.vertices, motion.vertices(0.3), atol=1e-6)  # pyright: ignore
     client.set("format", "whole motion (.npz)")
     client.click("Download")
-    assert client.until(lambda: "motion.npz" in client.downloads)
-    client.collect(1.0)
+    assert client.until(lambda: zipfile.is_zipfile(io.BytesIO(client.downloads.get("motion.npz", b""))))
     arrays = np.load(io.BytesIO(client.downloads["motion.npz"]))
     assert arrays["vertices"].shape == (len(drop.schema.window.times), len(drop.rest.points), 3)
 
 
 def test_without_a_model_or_a_known_format_there_is_nothing_to_download(dropped: View) -> None:
-    _, client = dropped
+    app, client = dropped
     client.set("odeform", False)
-    client.collect(0.3)
+    assert client.until(lambda: not app.columns.all[0].visible)
     client.click("Download")
     assert client.until(lambda: "export: no model is visible" in client.notifications)
     client.set("format", "nonsense")
@@ -102,7 +103,7 @@ def test_a_recording_starts_and_ends(dropped: View, tmp_path: Path) -> None:
     client.click("Start recording")
     assert client.until(lambda: client.controls["Stop recording"].visible)
     client.set("mass (kg)", 0.9)
-    client.collect(0.7)
+    assert client.until(lambda: app.presenter.settled)
     client.click("Stop recording")
     assert client.until(lambda: client.controls["Start recording"].visible)
     assert path.stat().st_size > 0

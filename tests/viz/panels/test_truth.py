@@ -99,7 +99,7 @@ def test_simulate_this_shows_its_progress_and_then_the_truth(kicked: View, monke
     monkeypatch.setattr(truth, "simulate_motion", coarse)
     app, client = kicked
     client.set("mass (kg)", 0.6)
-    client.collect(0.5)
+    assert client.until(lambda: app.panel(ParameterPanel).parameters()["mass"] == 0.6)
     client.click("Simulate this")
     assert client.until(lambda: client.controls["Cancel"].visible and not client.controls["Simulate this"].visible)
     shares, end = [0.0], time.monotonic() + 60.0
@@ -122,8 +122,7 @@ def test_a_simulation_can_be_cancelled(kicked: View, monkeypatch: pytest.MonkeyP
     assert client.until(lambda: app.panel(TruthPanel)._bar.value > 0.0, 30.0)
     job = app.panel(TruthPanel)._job
     assert job is not None
-    client.click("Simulate this")  # from another tab, say: one at a time
-    client.collect(0.3)
+    app.panel(TruthPanel)._simulate()  # as from another tab: one at a time
     assert app.panel(TruthPanel)._job is job
     client.click("Cancel")
     assert client.until(lambda: not job.running and client.controls["Simulate this"].visible)
