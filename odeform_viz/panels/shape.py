@@ -97,8 +97,8 @@ class ShapePanel(Panel):
         self._fit = fit
         if fit is not None and automatic:
             self._automatic_scale = fit.transform.factor
-        self._page.columns.set_shape(fit)
         self._show()
+        self._page.columns.set_shape(fit)
         self._page.columns_changed()
 
     def _show(self) -> None:

@@ -1,4 +1,4 @@
-"""A part of a scene that moves while the rest stands still, seen through the protocol."""
+"""Loaded shapes: the moving part, the alignment, and what is sent to the page."""
 
 import socket
 from collections.abc import Iterator
@@ -53,7 +53,7 @@ def app(kick: Predictor, port: int, capfd: pytest.CaptureFixture[str]) -> Iterat
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_what_stands_still_is_sent_once_for_all_columns(
+def test_the_still_part_is_sent_once_for_all_columns(
     kick: Predictor, server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made: list[tuple[str, int]] = []
@@ -144,7 +144,7 @@ def test_an_empty_region_leaves_the_shape_and_says_why(app: App, port: int) -> N
     before = app.columns.all
     with LoopbackClient(port) as client:
         app.panel(ShapePanel)._use_region(Box(np.full(3, 50.0), np.ones(3)))
-        assert client.until(lambda: f"the region holds 0 of the {BALL + REST:,} points" in client.text())
+        assert client.until(lambda: f"the region contains 0 of the {BALL + REST:,} points" in client.text())
     assert app.columns.all is before
 
 
