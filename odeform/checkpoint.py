@@ -46,6 +46,7 @@ class Checkpoint:
 
 
 def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint atomically: `path` holds either the old file or the whole new one."""
     meta = {
         "format": FORMAT,
         "model": checkpoint.model,

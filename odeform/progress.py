@@ -16,6 +16,7 @@ class Progress:
         self._terminal = sys.stderr.isatty()
 
     def advance(self, count: int = 1, note: str = "") -> None:
+        """Count further units as finished; `note` is printed beside them."""
         self._done += count
         now = time.monotonic()
         every = 0.1 if self._terminal else 10.0
@@ -34,5 +35,6 @@ class Progress:
             print(f"{text} {note}".rstrip(), file=sys.stderr, flush=True)
 
     def close(self) -> None:
+        """End the line of the bar."""
         if self._terminal:
             print(file=sys.stderr)

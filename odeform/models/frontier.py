@@ -27,10 +27,12 @@ class FrontierPoint:
     deformation_error_mm: float
 
     def to_json(self) -> dict[str, Any]:
+        """Plain values, which `from_json` reads."""
         return {**self.quality.to_json(), **{name: getattr(self, name) for name in MEASURED}}
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "FrontierPoint":
+        """The inverse of `to_json`."""
         setting = dict(data)
         measured = [float(setting.pop(name)) for name in MEASURED]
         return cls(SolverSettings(**setting), *measured)

@@ -30,6 +30,7 @@ class DisplacementBasis:
 
     @property
     def modes(self) -> int:
+        """Number of modes K."""
         return self.weights.shape[1] // 3
 
     def first(self, count: int) -> "DisplacementBasis":

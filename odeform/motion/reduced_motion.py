@@ -27,7 +27,9 @@ class Trajectory(Protocol):
     """Reduced coordinates over time. What it says of a time never depends on what was asked before."""
 
     @property
-    def stats(self) -> SolveStats: ...
+    def stats(self) -> SolveStats:
+        """How the trajectory was computed."""
+        ...
 
     @property
     def last_good(self) -> float:

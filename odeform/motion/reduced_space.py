@@ -67,6 +67,7 @@ class ReducedSpace:
         return y
 
     def to_json(self) -> dict[str, object]:
+        """The values that are no arrays, for the metadata of a checkpoint."""
         return {
             "anchor": [float(x) for x in self.anchor],
             "arm": self.gyration_radius,
@@ -76,6 +77,7 @@ class ReducedSpace:
         }
 
     def arrays(self) -> Arrays:
+        """The arrays of a checkpoint, by name; `from_parts` reads them."""
         return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
 
     @classmethod

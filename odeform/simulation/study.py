@@ -88,6 +88,7 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
 
 
 def main() -> None:
+    """Run the study from the command line."""
     parser = argparse.ArgumentParser(prog="python -m odeform.simulation.study", description=__doc__)
     parser.add_argument("scene")
     parser.add_argument("--count", type=int, default=10, metavar="N")

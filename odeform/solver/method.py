@@ -34,10 +34,14 @@ class Method(Protocol):
     """A one-step method. Between its nodes a solution is the cubic Hermite interpolant of states and slopes."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name of the method."""
+        ...
 
     @property
-    def order(self) -> int: ...
+    def order(self) -> int:
+        """Order of convergence of the global error."""
+        ...
 
     @property
     def controls_step(self) -> bool:

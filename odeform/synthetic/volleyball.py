@@ -65,6 +65,7 @@ def _panels(directions: Points) -> tuple[Ints, Perpoint]:
 
 
 def main() -> None:
+    """Write the splats and their region from the command line."""
     parser = argparse.ArgumentParser(prog="python -m odeform.synthetic.volleyball", description=__doc__)
     parser.add_argument("--out", required=True, metavar="FILE.spz")
     path = Path(parser.parse_args().out)

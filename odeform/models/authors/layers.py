@@ -81,10 +81,12 @@ class Chain:
 
     @property
     def inputs(self) -> int:
+        """Number of inputs."""
         return self.layers[0].weight.shape[0]
 
     @property
     def outputs(self) -> int:
+        """Number of outputs."""
         return self.layers[-1].weight.shape[1]
 
     def __call__(self, x: Rows) -> Rows:
@@ -121,6 +123,7 @@ class PointNet:
 
     @classmethod
     def read(cls, arrays: Arrays, prefix: str) -> "PointNet":
+        """Take the layers of an encoder from the weights of a file; KeyError where one is missing."""
         normed = f"{prefix}bn1.weight" in arrays
 
         def chain(layers: str, norms: str) -> Chain:
@@ -140,10 +143,12 @@ class PointNet:
 
     @property
     def inputs(self) -> int:
+        """Number of inputs per point."""
         return self.encode.inputs
 
     @property
     def outputs(self) -> int:
+        """Number of features."""
         return self.encode.outputs
 
     def turn(self, points: Points) -> Float[np.ndarray, "3 3"]:

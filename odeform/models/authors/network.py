@@ -86,10 +86,12 @@ class Networks:
 
     @property
     def offsets(self) -> int:
+        """Size of the initial offset: 1 or 3."""
         return self.decoders[0].outputs
 
     @property
     def parameters(self) -> int:
+        """Number of parameters of the scene."""
         return self.encoders[0].inputs - self.offsets
 
     @property

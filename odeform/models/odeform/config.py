@@ -31,6 +31,7 @@ class ModelConfig:
 
     @property
     def state(self) -> int:
+        """Size of the ODE's state: the latent states of all branches."""
         return self.rigid_latent * self.rigid + self.local_latent
 
     @property

@@ -69,6 +69,7 @@ class LatentTrajectory:
 
     @property
     def last_good(self) -> float:
+        """Seconds up to which the integration succeeded."""
         return float("inf") if self._last.status is Status.OK else self._last.end
 
     def reduced(self, times: Floats) -> Floats:
