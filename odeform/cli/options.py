@@ -92,7 +92,7 @@ def parse_window(text: str | None) -> tuple[int, int] | None:
     return begin, end
 
 
-def positive(option: str, value: float) -> None:
+def positive(option: str, value: int | float) -> None:
     """`InputError` for a value that is not positive and finite."""
     if not 0.0 < value < float("inf"):
         raise InputError(f"{option}: expected a positive number, got {value:g}")
