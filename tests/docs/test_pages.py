@@ -10,6 +10,7 @@ import pytest
 from blocks import ROOT, blocks_of, pages, prose
 from commands import parser_of
 
+import odeform
 from odeform.cli.entry import COMMANDS, Command
 from odeform.models.names import TRAINABLE
 
@@ -101,6 +102,11 @@ def test_the_page_of_architecture_has_every_package(package: str):
     }
     named = set(re.findall(r"`([a-z_]+)/?`", (ROOT / "docs" / "architecture.md").read_text()))
     assert modules <= named
+
+
+def test_the_reference_has_every_public_name():
+    named = re.findall(r"^::: odeform\.(\w+)$", (ROOT / "docs" / "reference.md").read_text(), re.MULTILINE)
+    assert {*named, "__version__"} == set(odeform.__all__)
 
 
 def test_the_page_of_baselines_has_every_model():
