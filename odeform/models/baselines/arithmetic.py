@@ -20,7 +20,7 @@ class Arithmetic(Protocol):
     """The operations that numpy and torch name differently, on arrays (..., features)."""
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any:
-        """x @ weight + bias for x (..., inputs): (..., outputs)."""
+        """x @ weight.T + bias for x (..., inputs): (..., outputs)."""
         ...
 
     def join(self, parts: list[Any]) -> Any:
