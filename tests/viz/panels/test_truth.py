@@ -137,7 +137,7 @@ def test_a_failing_simulation_says_why_until_the_next(kicked: View, monkeypatch:
     monkeypatch.setattr(truth, "simulate_motion", endless)
     client.click("Simulate this")
     assert client.until(lambda: "the ball burst" not in client.text())
-    app.panel(TruthPanel).cancel()
+    app.panel(TruthPanel).close()
 
 
 def test_the_simulation_of_a_closed_tab_completes(kicked: View, monkeypatch: pytest.MonkeyPatch, port: int) -> None:
