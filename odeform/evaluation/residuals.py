@@ -1,4 +1,4 @@
-"""The errors of a model on the validation split, from which its error elsewhere is expected."""
+"""The errors of a model on the validation split, from which its error band is estimated."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "v
     """Arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and `val.rmse_mm` (S, T),
     the RMSE over all coordinates of each frame of each sequence."""
     window = predictor.schema.window
-    # frames that were given tell nothing of the error between them
+    # the error at given frames says nothing about the frames between them
     rate = dataset.schema.window.rate if predictor.schema.needs_observations else window.rate
     times = np.linspace(window.start, window.stop, round((window.stop - window.start) * rate) + 1)
     theta, errors = [], []

@@ -1,7 +1,7 @@
-"""What simple methods reach that are given the truth: the last frame held, ballistic flight, a spline through frames.
+"""Simple predictors that are given true frames: hold the last frame, ballistic flight, a spline through frames.
 
-They tell what a table of extrapolation or interpolation is worth: a model that is given parameters alone has to beat
-what anybody could say who had seen the frames.
+They are the reference for tables of extrapolation and interpolation: a model that is given only parameters should beat
+what the frames themselves suggest.
 """
 
 from collections.abc import Callable
@@ -18,36 +18,36 @@ from odeform.types import Frames, MotionSequence
 
 __all__ = ["ballistic", "evaluate_simple", "hold_last", "spline_through"]
 
-Guess = Callable[[MotionSequence, int], Frames]
-"""From a true sequence, the i-th of its split, to frames at its times, (T, N, 3) metres."""
+SimplePredictor = Callable[[MotionSequence, int], Frames]
+"""Predicts frames (T, N, 3) m from a true sequence and its index in the split."""
 
 
-def hold_last(known: int) -> Guess:
-    """The last of the first `known` frames, held."""
-    return lambda truth, _: truth.vertices[np.minimum(np.arange(len(truth.times)), known - 1)]
+def hold_last(observed: int) -> SimplePredictor:
+    """Hold the last of the first `observed` frames."""
+    return lambda truth, _: truth.vertices[np.minimum(np.arange(len(truth.times)), observed - 1)]
 
 
-def ballistic(known: int, gravity: float = GRAVITY) -> Guess:
-    """From the last of the first `known` frames on, its shape flies on with the centre's velocity under `gravity`.
+def ballistic(observed: int, gravity: float = GRAVITY) -> SimplePredictor:
+    """Ballistic flight of the shape of the last of the first `observed` frames, from the velocity of its centre.
 
     `gravity` is in m/s^2, along -z.
     """
 
     def fly(truth: MotionSequence, index: int) -> Frames:
         step = float(truth.times[1] - truth.times[0])
-        before, last = truth.vertices[known - 2 : known].astype(float)
+        before, last = truth.vertices[observed - 2 : observed].astype(float)
         down = np.array([0.0, 0.0, -gravity])
-        # the centre's mean velocity over the last interval, and what gravity adds in its second half
+        # the mean velocity of the centre over the last interval, plus the effect of gravity in its second half
         velocity = truth.weights @ (last - before) / step + 0.5 * down * step
-        ahead = np.maximum(truth.times - truth.times[known - 1], 0.0)[:, None]
+        ahead = np.maximum(truth.times - truth.times[observed - 1], 0.0)[:, None]
         shift = ahead * velocity + 0.5 * ahead**2 * down
-        return hold_last(known)(truth, index) + shift[:, None]
+        return hold_last(observed)(truth, index) + shift[:, None]
 
     return fly
 
 
-def spline_through(subsampling: FrameSubsampling) -> Guess:
-    """The cubic spline through the frames that are kept."""
+def spline_through(subsampling: FrameSubsampling) -> SimplePredictor:
+    """Cubic spline through the frames that `subsampling` keeps."""
 
     def join(truth: MotionSequence, index: int) -> Frames:
         count = len(truth.times)
@@ -56,8 +56,8 @@ def spline_through(subsampling: FrameSubsampling) -> Guess:
     return join
 
 
-def evaluate_simple(guess: Guess, dataset: Dataset, split: str, window: tuple[int, int]) -> dict[str, Any]:
-    """Scores over the frames `window` (half-open), as `evaluate` gives them for a model."""
+def evaluate_simple(predict: SimplePredictor, dataset: Dataset, split: str, window: tuple[int, int]) -> dict[str, Any]:
+    """Scores over the frames `window` (half-open), as `evaluate` computes them for a model."""
     schema, scores = dataset.schema, Scores()
     for index, recorded in enumerate(dataset.sequences(split)):
         truth = recorded.frames(schema.window.stop, schema.window.rate)
@@ -65,5 +65,5 @@ def evaluate_simple(guess: Guess, dataset: Dataset, split: str, window: tuple[in
         inside[[0, *range(*window)]] = True
         part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
         counted = np.ones(len(part.times), dtype=bool)
-        scores.add(guess(truth, index)[inside], part, counted, np.zeros_like(counted))
+        scores.add(predict(truth, index)[inside], part, counted, np.zeros_like(counted))
     return scores.result()

@@ -1,4 +1,4 @@
-"""What a shell is made of."""
+"""Materials of shells."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ class Material:
 
     young: float  # Pa
     poisson: float
-    viscosity: float  # N s/m, of the wall against stretching, whatever its thickness
+    viscosity: float  # N s/m, of the wall against stretching, for any thickness
     friction: float  # Coulomb coefficient against the floor
     contact_time: float  # s, MuJoCo's solref time constant
 
@@ -24,7 +24,7 @@ def wall_thickness(bending: float, material: Material) -> float:
 def damping_time(thickness: float, material: Material) -> float:
     """Ratio of damping to stiffness in seconds of a wall of `thickness` metres: viscosity / (E h).
 
-    The loss sits in a lining that is the same for all walls. Were it a fixed share of the stiffness, every force would
-    be proportional to mass or to stiffness, only their ratio would move the body, and nobody could tell both apart.
+    Energy is lost in a lining that is the same for all walls. If damping were a fixed share of the stiffness, every force
+    would be proportional to mass or to stiffness, and only their ratio could be recovered from a motion.
     """
     return material.viscosity / (material.young * thickness)

@@ -1,4 +1,4 @@
-"""Many motions of one scene: in parallel, resumable, the same data whatever the number of workers."""
+"""Many motions of one scene: in parallel, resumable, with the same data for any number of workers."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from odeform.types import MotionSequence
 __all__ = ["simulate"]
 
 
-TEST_RATE = 4  # test sequences have so many times the frames: people look between those that were learned
+TEST_RATE = 4  # factor on the frame rate of test sequences, to score between the trained frames
 
 
 def _one(entry: Entry, simulate: Callable[..., MotionSequence], root: Path, rate: float, step: float) -> Entry:
@@ -37,11 +37,13 @@ def _finished(root: Path, plan: list[Entry], new: Dataset) -> dict[str, Entry]:
         return {}
     old = open_folder(root)
     for part in ("provenance", "fixed", "schema"):
-        was, wanted = getattr(old, part), getattr(new, part)
-        if was != wanted:
-            raise InputError(f"{root}: holds another data set, of {part} {was}; expected {wanted} or an empty folder")
-    wanted = {entry.name: entry for entry in plan}
-    return {e.name: e for e in old.entries if e.name in wanted and e.parameters == wanted[e.name].parameters}
+        was, expected = getattr(old, part), getattr(new, part)
+        if was != expected:
+            raise InputError(
+                f"{root}: holds another data set, with {part} {was}; expected {expected} or an empty folder"
+            )
+    expected = {entry.name: entry for entry in plan}
+    return {e.name: e for e in old.entries if e.name in expected and e.parameters == expected[e.name].parameters}
 
 
 def simulate(

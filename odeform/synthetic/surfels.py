@@ -1,4 +1,4 @@
-"""Flat splats that tile surfaces: what scenes are made of whose splats come from a formula, not from photographs."""
+"""Flat splats that tile surfaces, for procedural scenes."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Surfels:
 
 
 def grid(one: Floats, other: Floats) -> tuple[Floats, Floats]:
-    """(N,) and (N,): every one with every other."""
+    """The (N,) coordinates of all pairs."""
     first, second = np.meshgrid(one, other)
     return first.ravel(), second.ravel()
 
@@ -34,7 +34,7 @@ def grid(one: Floats, other: Floats) -> tuple[Floats, Floats]:
 def tiles(
     corner: Vector, along: Vector, across: Vector, at: Floats, pitch: Floats, colors: Points, cover: float = COVER
 ) -> Surfels:
-    """In the plane through `corner`: at (N, 2) m along two unit vectors, for tiles of `pitch` (N, 2) or (2,) m."""
+    """Tiles in a plane: at (N, 2) m from `corner` along two unit vectors, with a pitch of (N, 2) or (2,) m."""
     count = len(at)
     points = corner + at[:, :1] * along + at[:, 1:] * across
     sizes = np.broadcast_to(cover * pitch, (count, 2))
@@ -42,7 +42,7 @@ def tiles(
 
 
 def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
-    """White round ones along a Fibonacci spiral, each of the same share of a sphere."""
+    """`count` white round surfels on a sphere of `radius` m, evenly spread along a Fibonacci spiral."""
     index = np.arange(count) + 0.5
     z, angle = 1.0 - 2.0 * index / count, index * np.pi * (3.0 - np.sqrt(5.0))
     flat = np.sqrt(1.0 - z**2)
@@ -53,10 +53,12 @@ def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
 
 
 def joined_surfels(parts: list[Surfels]) -> Surfels:
+    """All parts as one."""
     return Surfels(*(np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])))
 
 
 def splats_of(surfels: Surfels) -> GaussianSplats:
+    """The surfels as flat Gaussian splats."""
     normals = np.cross(surfels.along, surfels.across)
     axes = [surfels.along * surfels.sizes[:, :1], surfels.across * surfels.sizes[:, 1:], THICKNESS * normals]
     half = np.stack(axes, axis=2)

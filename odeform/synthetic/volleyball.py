@@ -1,6 +1,6 @@
 """A volleyball in a small room, as Gaussian splats: `python -m odeform.synthetic.volleyball --out volleyball.spz`.
 
-The ball is as large as those that models are trained on.
+The ball has the size of the bundled models' body.
 """
 
 import argparse
@@ -29,13 +29,13 @@ PANELS = np.array([[0.96, 0.76, 0.10], [0.93, 0.92, 0.88], [0.11, 0.27, 0.60]]) 
 SEAM = 1.3e-3  # m, half the width of a groove
 
 REGION = Sphere(np.array([0.0, 0.0, 0.105]), 0.1052)
-"""Round the ball, in metres with z up; it touches the floor from above, of which it holds nothing."""
+"""The ball, in metres with z up. It touches the floor from above and contains none of it."""
 FILE = Similarity(rotation=UPRIGHT["-y"].T)
 """From z up to the axes of captures: y down, z forward."""
 
 
 def volleyball_in_room() -> GaussianSplats:
-    """The scene in metres, z up, the ball on the floor at the origin, its splats first. The same whenever made."""
+    """The scene in metres, z up, with the ball on the floor at the origin and its splats first. Deterministic."""
     return splats_of(joined_surfels([_ball(), room(RADIUS, np.random.default_rng(7))]))
 
 
@@ -44,20 +44,20 @@ def _ball() -> Surfels:
     ball = sphere_surfels(centre, radius, BALL)
     normals = (ball.points - centre) / radius
     panel, away = _panels(normals @ rotation_from_vector(np.array([0.33, -0.09, 0.49])).T)
-    puffed = 1.0 - 0.10 * np.exp(-((away / 6e-3) ** 2))  # panels fall off towards their seams
+    puffed = 1.0 - 0.10 * np.exp(-((away / 6e-3) ** 2))  # panels curve down towards their seams
     groove = np.clip((away - SEAM) / 8e-4 + 0.5, 0.0, 1.0)
     light = 0.88 + 0.12 * normals @ np.array([0.05, 0.45, 0.89])
     return replace(ball, colors=PANELS[panel] * (puffed * (0.42 + 0.58 * groove) * light)[:, None])
 
 
 def _panels(directions: Points) -> tuple[Ints, Perpoint]:
-    """For unit vectors (N, 3), which of three panels of one of six groups, and the metres to the nearest seam.
+    """The panel (0 to 2) of each direction (N, 3), and its distance to the nearest seam in m.
 
-    The groups lie as the faces of a cube, the panels of each across those of its neighbours.
+    Six groups of three panels lie on the faces of a cube, each perpendicular to its neighbours.
     """
     axis, rows = np.abs(directions).argmax(axis=1), np.arange(len(directions))
     depth = np.abs(directions[rows, axis])
-    # in quarters of a right angle from the middle of the group: equal steps are equal angles
+    # angles from the middle of the group, scaled to [-1, 1]
     across, along = (np.arctan2(directions[rows, (axis + k) % 3], depth) * 4.0 / np.pi for k in (1, 2))
     panel = np.clip((1.5 * (across + 1.0)).astype(int), 0, 2)
     away = np.minimum(np.abs(np.abs(across) - 1.0 / 3.0), 1.0 - np.maximum(np.abs(across), np.abs(along)))

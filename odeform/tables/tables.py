@@ -63,16 +63,16 @@ def _shipped() -> Found:
 
 
 def _simple() -> Found:
-    guesses, gravity = {}, get_scene(DROP).gravity
+    predictors, gravity = {}, get_scene(DROP).gravity
     for until in UNTIL:
         window = until, until + AHEAD
-        guesses[f"hold-last {until}:{until + AHEAD}"] = hold_last(until), window
-        guesses[f"ballistic {until}:{until + AHEAD}"] = ballistic(until, gravity), window
+        predictors[f"hold-last {until}:{until + AHEAD}"] = hold_last(until), window
+        predictors[f"ballistic {until}:{until + AHEAD}"] = ballistic(until, gravity), window
     for k in INTERVALS:
-        guesses[f"spline {k}"] = spline_through(FrameSubsampling(every=k)), IMPACT
-        guesses[f"spline {k} staggered"] = spline_through(FrameSubsampling(every=k, stagger=True)), IMPACT
+        predictors[f"spline {k}"] = spline_through(FrameSubsampling(every=k)), IMPACT
+        predictors[f"spline {k} staggered"] = spline_through(FrameSubsampling(every=k, stagger=True)), IMPACT
     dataset = open_dataset(DROP)
-    scores = {name: evaluate_simple(guess, dataset, "test", window) for name, (guess, window) in guesses.items()}
+    scores = {name: evaluate_simple(predict, dataset, "test", window) for name, (predict, window) in predictors.items()}
     return {name: {metric: one[metric] for metric in KEPT} for name, one in scores.items()}
 
 

@@ -8,6 +8,8 @@ from odeform.cli import main
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
 
+pytestmark = pytest.mark.slow
+
 full_ladder, full_load = precision.ladder, comparisons.load
 
 

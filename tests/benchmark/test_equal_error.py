@@ -9,6 +9,8 @@ from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
 from odeform.simulation.scenes.registry import get_scene
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def model(predictors: dict[str, Predictor]) -> ODeform:

@@ -40,6 +40,7 @@ def units(found: Identification) -> np.ndarray:
 CASES = {"kick": (0.4, -0.7, 0.3, 0.8), "mass-elastic": (-0.35, 0.6)}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("scene", CASES)
 def test_recovers_the_parameters_of_a_prediction(scene: str) -> None:

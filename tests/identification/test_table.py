@@ -21,6 +21,7 @@ def few() -> Dataset:
     return replace(whole, entries=(*whole.select("val")[:8], *whole.select("test")[:2]))
 
 
+@pytest.mark.slow
 def test_correlated_errors_carry_less_information(few: Dataset) -> None:
     predictor = load("mass-elastic")
     shares: list[float] = []
@@ -34,6 +35,7 @@ def test_correlated_errors_carry_less_information(few: Dataset) -> None:
     assert np.median(discrepancy.at(np.array([0.2]))) < np.median(discrepancy.at(np.array([1.0])))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("unchecked")
 def test_the_command(
     few: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture

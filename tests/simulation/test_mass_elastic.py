@@ -7,6 +7,8 @@ from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.mass_elastic import HEIGHT, REST_SPEED, REST_TIME, SCENE, SCHEMA, simulate
 from odeform.types import Floats, MotionSequence
 
+pytestmark = pytest.mark.slow
+
 LIGHT_AND_SOFT = {"mass": 0.2, "bending": 0.3}
 CONTACT_BEGINS = np.sqrt(2.0 * (HEIGHT - RADIUS) / GRAVITY)
 

@@ -113,6 +113,7 @@ def test_a_new_scene_brings_its_arrows(toy: Scene) -> None:
     assert get_scene("mass-elastic").glyphs({"mass": 1.0, "bending": 1.0}, BODY.points) == ()
 
 
+@pytest.mark.slow
 def test_scenes_need_no_simulator_to_be_looked_at() -> None:
     code = (
         "import sys; from odeform.simulation.scenes.registry import get_scene, known_scenes;"

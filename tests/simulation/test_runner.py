@@ -17,6 +17,7 @@ from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path: Path) -> None:
     """Two workers made the data set; one makes again what an interruption lost, bit for bit."""
@@ -37,6 +38,7 @@ def test_resumes_to_the_same_data_with_other_workers(dataset: Dataset, tmp_path:
     assert (root / "dataset.json").read_text() == (dataset.root / "dataset.json").read_text()
 
 
+@pytest.mark.slow
 def test_another_process_makes_the_same_data(tmp_path: Path) -> None:
     """With all vertices: what this process makes coarser, others do not."""
     made = simulate("kick", tmp_path, count=1, workers=2, rate=30.0, step=4e-3)
@@ -54,6 +56,7 @@ def test_test_sequences_have_four_times_the_frames(dataset: Dataset) -> None:
             assert len(sequence.vertices) == len(sequence.times)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_corners_are_for_training(tmp_path: Path) -> None:
     """Besides what is drawn, which stays as it was."""
@@ -65,6 +68,7 @@ def test_corners_are_for_training(tmp_path: Path) -> None:
     assert {entry.split for entry in with_corners.entries[1:]} == {"train"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_frames_of_a_rate_asked_for(tmp_path: Path) -> None:
     """The schema says it: what is learned and scored are frames of this rate."""

@@ -78,6 +78,7 @@ def test_bounds() -> None:
     assert not Check(math.inf, 1.0, at_least=True).holds
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("_short", "unchecked")
 @pytest.mark.parametrize("name", ["odeform", "pod-rbf"])
 def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,6 +103,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
     assert [check for check in sure if not result["checks"][check]["holds"]] == []
 
 
+@pytest.mark.slow
 def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "SAMPLES", 1)
     monkeypatch.setattr(convergence, "REFINED", REFINED)
@@ -120,6 +122,7 @@ def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyP
     assert not solvers.check_sensitivities(model)["sensitivity_relative"].holds
 
 
+@pytest.mark.slow
 def test_refining_that_increases_the_error_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "METHODS", {"rk4": registry.METHODS["rk4"]})
     model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
@@ -140,6 +143,7 @@ def _outcomes(model: ODeform) -> Iterator[stress.Outcome]:
     return (stress.run_case(model, case, shapes(model.rest)) for case in some)
 
 
+@pytest.mark.slow
 def test_non_finite_frames_are_counted(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(outcome.non_finite == 0 for outcome in _outcomes(model))
     sound = LatentTrajectory.reduced

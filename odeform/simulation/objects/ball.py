@@ -69,13 +69,15 @@ def bending(high: float) -> Parameter:
 
 
 def sphere(segments: int = SEGMENTS) -> Mesh:
-    """The ball's mesh about the origin, standing on the middle of a triangle and mirrored across the plane y = 0.
+    """The mesh of the ball about the origin, resting on the middle of a triangle and symmetric about the plane y = 0.
 
-    On a vertex it would stand as on a needle and roll off in a direction that rounding decides; with three of them
-    on the floor it rests, and a drop stays within 0.2 mm of its line.
+    On a single vertex it would be unstable and roll in a direction that rounding decides. On three of them it rests,
+    and a drop stays within 0.2 mm of its line. Raises `ValueError` for a multiple of 3 segments.
     """
     if segments % 3 == 0:
-        raise ValueError(f"{segments} segments: expected no multiple of 3, which puts a vertex in the middle")
+        raise ValueError(
+            f"{segments} segments: expected no multiple of 3, which would put a vertex at the lowest point"
+        )
     ball = octasphere(RADIUS, segments)
     up, side = np.array([1.0, 1.0, 1.0]) / math.sqrt(3.0), np.array([1.0, -1.0, 0.0]) / math.sqrt(2.0)
     return Mesh(ball.points @ np.stack([np.cross(side, up), side, up], axis=1), ball.faces)
