@@ -25,12 +25,12 @@ __all__ = [
 ]
 
 FORMAT = 1
-LIMIT = 1 << 30  # bytes; a larger file is not one of ours
+LIMIT = 1 << 30  # bytes; no checkpoint is larger
 
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """`model` names the class that reads `arrays` and `config`; `provenance` says where they come from.
+    """What a model is read from. `model` is its name in `odeform.models.names`; `provenance` says how it was trained.
 
     `scores` are those on the test split, as `odeform evaluate` prints them.
     """
@@ -61,7 +61,7 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
 
 
 def checkpoint_bytes(path: Path) -> bytes:
-    """The whole file, unread; `InputError` where it cannot be had or is too large to be one."""
+    """The content of the file; `InputError` where it cannot be read or is too large for a checkpoint."""
     try:
         if path.stat().st_size > LIMIT:
             raise InputError(f"{path}: expected a checkpoint of at most {LIMIT >> 20} MiB")
@@ -71,7 +71,7 @@ def checkpoint_bytes(path: Path) -> bytes:
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:
-    """Read and validate a checkpoint file; `InputError` in one line for anything that is not one."""
+    """Read and validate a checkpoint file; `InputError` in one line for anything else."""
     path = Path(path)
     data = checkpoint_bytes(path)
     try:
@@ -80,7 +80,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     except (SafetensorError, KeyError, ValueError):
         raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
     if "odeform" not in metadata:
-        raise InputError(f"checkpoint {path}: a safetensors file, but not of ODeform")
+        raise InputError(f"checkpoint {path}: expected an ODeform checkpoint, got another safetensors file")
     try:
         meta = json.loads(metadata["odeform"])
         if meta["format"] != FORMAT:
@@ -102,16 +102,16 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
 
 
 def bundled_checkpoints() -> dict[str, Path]:
-    """The checkpoints that travel with the package, by name SCENE/MODEL."""
+    """The checkpoints that come with the package, by name SCENE/MODEL."""
     return {f"{path.parent.name}/{path.stem}": path for path in sorted(bundled("checkpoints").glob("*/*.safetensors"))}
 
 
 def resolve_checkpoint(name: str) -> Path:
-    """A path as it is; SCENE or SCENE/MODEL as the bundled checkpoint of that name."""
+    """The bundled checkpoint of the name SCENE or SCENE/MODEL, or else the path; `InputError` if there is neither."""
     known = bundled_checkpoints()
     for key in (name, f"{name}/odeform"):
         if key in known:
             return known[key]
     if not Path(name).exists():
-        raise InputError(f"checkpoint {name!r}: neither a file nor bundled; bundled are {', '.join(known) or 'none'}")
+        raise InputError(f"checkpoint {name!r}: expected a file or one of the bundled {', '.join(known) or 'none'}")
     return Path(name)

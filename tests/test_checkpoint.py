@@ -156,7 +156,7 @@ def test_names(tmp_path: Path) -> None:
     path = tmp_path / "a.safetensors"
     write_checkpoint(path, small())
     assert resolve_checkpoint(str(path)) == path
-    with pytest.raises(InputError, match="neither a file nor bundled"):
+    with pytest.raises(InputError, match="expected a file or one of the bundled"):
         resolve_checkpoint("throw/odeform")
     with pytest.raises(InputError):
         load(tmp_path)

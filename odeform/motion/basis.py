@@ -2,8 +2,8 @@
 
 A deformation is d(x, t) = sum_k c_k(t) phi_k(x). Each phi_k is a radial-basis network over the training surface,
 sum_j w_jk |x - x_j|^3 + a_k + B_k x: exact at the training vertices, the smoothest field between them (it minimises
-bending energy; Duchon 1977), with a closed-form gradient. Points farther from the anchor than six times the trained
-body reaches are taken for points below them, at most nine times as far: far off, the sum would be all rounding.
+bending energy; Duchon 1977), with a closed-form gradient. Points farther from the anchor than six times the extent of
+the trained body are pulled in along their ray, to at most nine times: far away, the sum would be all rounding.
 """
 
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ class DisplacementBasis:
         return self.weights.shape[1] // 3
 
     def first(self, count: int) -> "DisplacementBasis":
-        """Of the first so many modes."""
+        """The basis of the first `count` modes."""
         return replace(self, weights=self.weights[:, : 3 * count])
 
     @cached_property
@@ -42,7 +42,7 @@ class DisplacementBasis:
         return 6.0 * float(np.linalg.norm(self.centers, axis=1).max())
 
     def _near(self, points: Points) -> tuple[Points, Perpoint, Perpoint]:
-        """Points in units of `scale`, their distances from the anchor, and those of the points they are taken for."""
+        """Points in units of `scale`, their distances from the anchor, and the soft-clipped distances."""
         scaled = np.asarray(points, dtype=float) / self.scale
         away = np.maximum(np.linalg.norm(scaled, axis=1), np.finfo(float).tiny)
         return scaled, away, soft_clip(away, self._far, 0.5 * self._far)
@@ -50,8 +50,8 @@ class DisplacementBasis:
     def values(self, points: Points, out: Float[np.ndarray, "modes points 3"] | None = None) -> Basis:
         """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32.
 
-        A view of an array whose modes come first, so that frames are c @ values at the speed of memory or arithmetic:
-        of `out`, if given, which is filled.
+        A view of an array with the modes first (`out`, if given), so that frames are c @ values at the speed of memory
+        or arithmetic.
         """
         out = np.empty((self.modes, len(points), 3), dtype=np.float32) if out is None else out
         count = len(self.centers)
@@ -59,10 +59,10 @@ class DisplacementBasis:
         for at in range(0, len(points), CHUNK):
             chunk, away, near = self._near(points[at : at + CHUNK])
             chunk *= (near / away)[:, None]
-            squares, seen = _squares(chunk, self.centers), features[: len(chunk)]
-            np.multiply(squares, np.sqrt(squares), out=seen[:, :count])
-            seen[:, count + 1 :] = chunk
-            out[:, at : at + CHUNK] = (seen @ self.weights).reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
+            squares, kernel = _squares(chunk, self.centers), features[: len(chunk)]
+            np.multiply(squares, np.sqrt(squares), out=kernel[:, :count])
+            kernel[:, count + 1 :] = chunk
+            out[:, at : at + CHUNK] = (kernel @ self.weights).reshape(len(chunk), self.modes, 3).swapaxes(0, 1)
         return out.transpose(1, 2, 0)
 
     def slopes(
@@ -102,7 +102,7 @@ def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
 
 
 def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
-    """The basis that takes the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
+    """The basis with the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
     system = np.block([[_squares(centers, centers) ** 1.5, tail], [tail.T, np.zeros((4, 4))]])

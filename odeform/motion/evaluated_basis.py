@@ -1,4 +1,4 @@
-"""A geometry seen through a basis: what is computed once per geometry and heading."""
+"""The basis on a geometry: what is computed once per geometry and azimuth."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,15 +14,15 @@ from odeform.types import GaussianSplats, Geometry, Perpoint, Points
 
 __all__ = ["STILL", "EvaluatedBasis", "evaluate_basis"]
 
-STILL = 4  # rows of `EvaluatedBasis` that are no modes
+STILL = 4  # rows of `EvaluatedBasis` that are not modes
 CHUNK = 1 << 14  # points, or their coordinates, that are worked on at once: they stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedBasis:
-    """A geometry, as it lies in the scene at rest, and the basis on it; float32.
+    """A geometry, where it lies in the scene at rest, and the basis on it; float32.
 
-    `points` (N, 3) are as given, `rest` canonical. What only some need is computed when first asked for.
+    `points` (N, 3) are as given, `rest` canonical. Properties that not all motions need are computed on demand.
     """
 
     geometry: Geometry
@@ -31,7 +31,7 @@ class EvaluatedBasis:
     points: Points
     rest: Points
     rows: Float[np.ndarray, "rows entries"]
-    """(4 + K, 3 N): shifts along the three axes, `rest`, and the modes. Bodies deformed and shifted are one product."""
+    """(4 + K, 3 N): shifts along the three axes, `rest`, and the modes. One product deforms and shifts a body."""
     reach: Float[np.ndarray, " modes"]
     """Largest displacement of any point by each mode."""
     shares: Perpoint
@@ -39,7 +39,7 @@ class EvaluatedBasis:
 
     @property
     def values(self) -> Float[np.ndarray, "modes entries"]:
-        """(K, 3 N), of the basis."""
+        """(K, 3 N): the modes."""
         return self.rows[STILL:]
 
     @cached_property
@@ -59,7 +59,7 @@ class EvaluatedBasis:
 
     @cached_property
     def covariances(self) -> Axes:
-        """(3, 3, N) covariances of splats in the axes of their local_frames, m^2."""
+        """(3, 3, N) covariances of splats in the axes of their local frames, m^2."""
         assert isinstance(self.geometry, GaussianSplats)
         axes = rotation_z(self.azimuth) @ self.local_frames.rest
         half = np.einsum("nik,lkn->iln", self.geometry.covariances, axes)
@@ -67,7 +67,7 @@ class EvaluatedBasis:
 
 
 def evaluate_basis(geometry: Geometry, space: ReducedSpace, azimuth: float) -> EvaluatedBasis:
-    """Evaluate the basis on a geometry, which lies in the scene as at rest. Once per geometry and azimuth."""
+    """Evaluate the basis on a geometry at rest in the scene, at an azimuth in radians."""
     rest = to_canonical(geometry.points, space.anchor, azimuth)
     points, (count, modes) = np.asarray(geometry.points, dtype=np.float32), (len(rest), space.basis.modes)
     rows = np.empty((STILL + modes, 3 * count), dtype=np.float32)

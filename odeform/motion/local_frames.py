@@ -1,10 +1,10 @@
-"""How the neighbourhood of each point deforms: local_frames of axes, carried along by the deformation gradient.
+"""How the neighbourhood of each point deforms: a local frame of axes, carried along by the deformation gradient.
 
-A triad Q = [q1 q2 q3] stands at each point of the body at rest. D(x) = x + sum_k c_k phi_k(x) carries an axis q to
+A frame Q = [q1 q2 q3] stands at each point of the body at rest. D(x) = x + sum_k c_k phi_k(x) carries an axis q to
 f = q + sum_k c_k (grad phi_k) q, so that the gradient is F = P Q^T with P = [f1 f2 f3], and a covariance S becomes
 F S F^T = P (Q^T S Q) P^T.
 
-Data on a surface say how its tangents move and nothing of its normal. There q3 is the unit normal of the trained
+Data on a surface determine how its tangents move, but not its normal. There q3 is the unit normal of the trained
 surface nearest to the point, and f3 the unit normal of the deformed one, along cof(F) q3: the thickness is kept, as in
 the shell theory of Kirchhoff and Love. Data with interior points give all three axes.
 """
@@ -23,8 +23,8 @@ __all__ = ["BOUND", "Axes", "LocalFrames", "evaluate_local_frames", "gradients",
 BOUND = 4.0
 """No length at a point grows or shrinks by more than this factor.
 
-Far above what soft bodies do (the bundled models stretch by less than a tenth), so that what has been learned stays as
-it is; and no prediction, however far outside the trained range, spreads a splat over the scene.
+This is far above what soft bodies do (the bundled models stretch by less than a tenth), so that trained motions are
+unchanged; and no prediction, however far outside the trained range, spreads a splat over the scene.
 """
 
 Axes = Float[np.ndarray, "3 3 points"]
@@ -42,7 +42,7 @@ class LocalFrames:
     slopes: Float[np.ndarray, "modes followed 3 points"]
 
     def carried(self, coefficients: Float[np.ndarray, " modes"]) -> Axes:
-        """The axes P under the deformation of `coefficients` (K,). Finite, and within `BOUND`, whatever these are."""
+        """The axes P under the deformation of `coefficients` (K,): finite and within `BOUND` for any values."""
         modes, followed, _, count = self.slopes.shape
         out = np.empty((3, 3, count), dtype=np.float32)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -59,7 +59,7 @@ class LocalFrames:
 
 
 def evaluate_local_frames(rest: Points, space: ReducedSpace) -> LocalFrames:
-    """LocalFrames at the canonical points `rest` (N, 3)."""
+    """Local frames at the canonical points `rest` (N, 3) metres."""
     if space.surface is None:
         axes = np.broadcast_to(np.eye(3)[..., None], (3, 3, len(rest)))
     else:
@@ -74,7 +74,7 @@ def gradients(rest: Axes, carried: Axes) -> Matrices:
 
 
 def moved_covariances(local: Axes, carried: Axes) -> Matrices:
-    """P (Q^T S Q) P^T, (N, 3, 3), from `local` (3, 3, N), the covariances in the axes of their local_frames."""
+    """P (Q^T S Q) P^T, (N, 3, 3), from `local` (3, 3, N), the covariances in the axes of their local frames."""
     half = np.einsum("jkn,kin->jin", local, carried)
     return np.einsum("jin,jln->nil", carried, half)
 
@@ -95,7 +95,7 @@ def _dot(one: Rows, other: Rows) -> Perpoint:
 
 
 def _bounded(axes: Followed, area: Rows) -> np.ndarray:
-    """(N,) bool: where all singular values are surely within `BOUND`; False for what is not finite.
+    """(N,) bool: where all singular values are certainly within `BOUND`; False where they are not finite.
 
     With the sum of their squares q, the largest is at most sqrt(q). The smallest is the area over the largest for two
     axes, and for three the volume over the product of the others, which is at most q / 2.

@@ -1,11 +1,11 @@
-"""The motion of a model that predicts where each point goes: pose and deformation are read off its points.
+"""The motion of a model that predicts where each point goes: pose and deformation follow from its points.
 
 In the scene's canonical frame (turned by minus the azimuth about the vertical axis through the anchor) a motion is
 
     P(t) = P0 + Rz(a) [ m(t) + u(x, t) ],   x = Rz(-a) (P0 - anchor),   m(0) = u(x, 0) = 0,
 
-with the mean motion m (3) of the training data, and what a model adds to it. The pose is the best rigid motion of some
-points of the trained body, the same whatever shape is moved.
+with the mean motion m (3) of the training data, and a model's displacements u from it. The pose is the best rigid
+motion of some points of the trained body, and is the same for any shape.
 """
 
 from dataclasses import dataclass
@@ -27,15 +27,15 @@ from odeform.types import Frames, Geometry, Matrices, Mesh, Points, Pose, Times,
 __all__ = ["MeanMotion", "PointFrame", "PointMotion", "PointTrajectory", "Probes", "evaluate_probes"]
 
 PROBES = 96
-MARGIN = 1.25  # times the largest displacement that was trained, up to which displacements are as predicted
+MARGIN = 1.25  # times the largest trained displacement, up to which predictions are unchanged
 
 
 @runtime_checkable
 class PointTrajectory(Protocol):
-    """Displacements of some points from the mean motion. What it says of a time never depends on what was asked."""
+    """Displacements of some points from the mean motion. The result for a time never depends on earlier requests."""
 
     def stats(self) -> SolveStats:
-        """Of the whole roll-out, which takes place if it has not yet."""
+        """How the trajectory was computed; it is computed first if it has not been."""
         ...
 
     def displacements(self, times: Times) -> Frames:
@@ -45,7 +45,7 @@ class PointTrajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class MeanMotion:
-    """How bodies move on average: `shifts` (T, 3) metres, canonical, at `times` (T,) s, cubic between, held after."""
+    """The average motion: `shifts` (T, 3) metres, canonical, at `times` (T,) s; cubic in between, held afterwards."""
 
     times: Times
     shifts: Float[np.ndarray, "times 3"]
@@ -61,9 +61,9 @@ class MeanMotion:
 
 @dataclass(frozen=True)
 class PointFrame:
-    """Where a model of points sees them: about the `anchor`, in units of `arm`, the body's radius of gyration.
+    """The units of a point model: points relative to the `anchor`, in units of the body's radius of gyration.
 
-    `reach` is the farthest point of the trained body from the anchor, `largest` the largest displacement in the
+    `reach` is the largest distance of the trained body from the anchor, `largest` the largest displacement in the
     training data; `scale` is the root mean square over coordinates of displacements from the mean motion, `part_scale`
     that of displacements less their mean over the body. All metres.
     """
@@ -76,17 +76,17 @@ class PointFrame:
     part_scale: float
 
     def inputs(self, rest: Vectors) -> Points:
-        """(N, 3) metres about the anchor -> units of `arm`, float32.
+        """(N, 3) metres relative to the anchor -> units of the radius of gyration, float32.
 
-        Points farther than one and a half times the trained body reaches are taken for points below them, at most
-        twice as far: what networks are asked for is bounded.
+        Points farther away than one and a half times `reach` are pulled in along their ray, to at most twice `reach`,
+        so that inputs of networks are bounded.
         """
         away = np.maximum(np.linalg.norm(rest, axis=-1, keepdims=True), np.finfo(float).tiny)
         near = soft_clip(away, 1.5 * self.reach, 0.5 * self.reach)
         return (rest * (near / away) / self.gyration_radius).astype(np.float32)
 
     def bounded(self, displacements: Frames) -> Frames:
-        """To the last bit as they are up to a quarter above the largest trained; beyond, ever less."""
+        """Bit-exact up to a quarter above the largest trained displacement; soft-clipped beyond."""
         limit = MARGIN * self.largest
         size = np.linalg.norm(displacements, axis=-1, keepdims=True)
         if not (size > limit).any():
@@ -105,7 +105,7 @@ class Probes:
 
 
 def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
-    """Vertices spread over the body, each the farthest from those before (Gonzalez 1985)."""
+    """Vertices spread over the body, each the farthest from the ones before (Gonzalez 1985)."""
     points = to_canonical(rest.points, anchor, 0.0)
     chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)
     nearest = np.zeros(len(points), dtype=int)
@@ -118,7 +118,7 @@ def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
 
 
 class PointMotion(Motion):
-    """P0 + m + u: `shape` moves the points of the geometry, `body` the probes that the pose is read off."""
+    """P0 + m + u: `shape` moves the points of the geometry, `body` the probes that determine the pose."""
 
     def __init__(
         self,
@@ -135,7 +135,7 @@ class PointMotion(Motion):
         self._frame, self._mean, self._probes, self._shape, self._body = frame, mean, probes, shape, body
         self._points = np.asarray(geometry.points, dtype=np.float32)
         self._turn = rotation_z(schema.azimuth(parameters))
-        self._known: tuple[float, Points] | None = None
+        self._last: tuple[float, Points] | None = None
 
     @property
     def stats(self) -> SolveStats:
@@ -146,12 +146,12 @@ class PointMotion(Motion):
         return float("inf")
 
     def vertices(self, t: float | Times) -> Points | Frames:
-        if np.ndim(t) == 0 and self._known is not None and self._known[0] == t:
-            return self._known[1].copy()
+        if np.ndim(t) == 0 and self._last is not None and self._last[0] == t:
+            return self._last[1].copy()
         moved = self._displaced(self._shape, t)
         out = self._points + moved @ self._turn.T.astype(np.float32)
         if np.ndim(t) == 0:
-            self._known = (float(np.asarray(t)), out[0])
+            self._last = (float(np.asarray(t)), out[0])
             return out[0].copy()
         return out
 
@@ -178,7 +178,7 @@ class PointMotion(Motion):
         return self._points + self.local(t)
 
     def covariances(self, t: float) -> Matrices:
-        raise InputError("a model of points has no gradient to take splats along: expected a mesh or points")
+        raise InputError("point models cannot deform splats; expected a mesh or points")
 
     def deformed_covariances(self, t: float) -> Matrices:
         return self.covariances(t)

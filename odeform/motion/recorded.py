@@ -1,4 +1,4 @@
-"""A motion that was simulated or measured, shown as models' motions are."""
+"""A simulated or measured motion, with the interface that viewers use for predicted ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,12 +18,12 @@ __all__ = ["RecordedMotion"]
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """A sequence at any time: cubic between its frames, as it was left after the last one."""
+    """A sequence at any time: cubic between its frames, held after the last one."""
 
     schema: Schema
     sequence: MotionSequence
     fixed: Mapping[str, float] = field(default_factory=dict)
-    """What its data set leaves fixed: it may be a parameter of a model."""
+    """Physical quantities that are constant in its data set; they may be parameters of a model."""
 
     @cached_property
     def geometry(self) -> Mesh:
@@ -35,12 +35,12 @@ class RecordedMotion:
 
     @property
     def setting(self) -> Parameters:
-        """What was varied, and what was not."""
+        """Varied and fixed quantities together."""
         return {**self.fixed, **self.parameters}
 
     @property
     def rate(self) -> float:
-        """Frames a second."""
+        """Frames per second."""
         return 1.0 / float(self.sequence.times[1] - self.sequence.times[0])
 
     @property
@@ -50,14 +50,14 @@ class RecordedMotion:
 
     @property
     def stats(self) -> SolveStats:
-        return SolveStats(f"simulated, {self.rate:g} frames a second", 0, 0, 0, "ok", 0.0, lambda: 0.0)
+        return SolveStats(f"simulated, {self.rate:g} frames per second", 0, 0, 0, "ok", 0.0, lambda: 0.0)
 
     @property
     def outside(self) -> tuple[str, ...]:
         return ()
 
     def extrapolates(self, time: float) -> bool:
-        """Whether the record had ended before."""
+        """Whether the recording ended before `time`."""
         return time > self.end + 1e-9
 
     def vertices(self, t: float | Times) -> Points | Frames:
@@ -74,7 +74,7 @@ class RecordedMotion:
         return out[0] if np.ndim(t) == 0 else out
 
     def deformed(self, t: float) -> Points:
-        """The deformation alone where the body rests: (N, 3) float32 metres. `pose(t)` takes it on."""
+        """The deformation without the pose: (N, 3) float32 metres; `pose(t)` moves it to `vertices(t)`."""
         pose = self.pose(t)
         return ((self.vertices(t) - pose[:3, 3]) @ pose[:3, :3]).astype(np.float32)
 
@@ -89,7 +89,7 @@ class RecordedMotion:
         return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_weights(self.geometry))
 
     def of(self, parameters: Mapping[str, float]) -> bool:
-        """Whether this is the motion under those parameters, to the resolution of a slider."""
+        """Whether this is the motion under these parameters, to the resolution of a slider."""
         return all(
             abs(p.normalise(parameters[p.name]) - p.normalise(self.parameters[p.name])) < 2e-3
             for p in self.schema.parameters
@@ -102,9 +102,9 @@ class RecordedMotion:
 
     @cached_property
     def _splines(self) -> tuple[CubicSpline, CubicSpline]:
-        """Of the vertices (N, 3), and of rotation vector and shift of the centre (6,).
+        """Splines of the vertices (N, 3), and of rotation vector and shift of the centre (6,).
 
-        Straight lines would cut 1 mm off an impact at 120 frames a second, more than good models err.
+        Linear interpolation would cut 1 mm off an impact at 120 frames per second, more than the error of good models.
         """
         times, vertices = self.sequence.times, self.sequence.vertices
         rotations, shifts = best_rigid(vertices[0], vertices, self.sequence.weights)

@@ -17,14 +17,14 @@ from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Po
 
 __all__ = ["ReducedMotion", "Trajectory", "as_reduced"]
 
-SEVERAL = 4  # points that are turned as one: products with three rows leave most of a processor's width unused
-BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are turned
-MANY = 16  # such blocks are shared among the cores
+SEVERAL = 4  # points that are rotated as one: products with three rows leave most vector lanes unused
+BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are rotated
+MANY = 16  # from this number on, blocks are shared among the cores
 
 
 @runtime_checkable
 class Trajectory(Protocol):
-    """Reduced coordinates over time. What it says of a time never depends on what was asked before."""
+    """Reduced coordinates over time. The result for a time never depends on earlier requests."""
 
     @property
     def stats(self) -> SolveStats:
@@ -33,7 +33,7 @@ class Trajectory(Protocol):
 
     @property
     def last_good(self) -> float:
-        """Seconds up to which the trajectory is sound; later times show the state of that moment."""
+        """Seconds up to which the trajectory is valid; later times show the state at that time."""
         ...
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
@@ -43,7 +43,7 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ReducedMotion(Motion):
-    """T(t) and D(t) apart: a pose, and coefficients of a basis. `placed` is the geometry on its way into the basis."""
+    """T(t) and D(t) separately: a pose, and coefficients of a basis. `evaluated` is the basis on the geometry."""
 
     schema: Schema
     parameters: Parameters
@@ -67,17 +67,17 @@ class ReducedMotion(Motion):
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)
         rotation, shift = self._rotation_shift(y)
-        # deformed and shifted in the body's own axes, which is one product for all times, then turned
+        # deformed and shifted in the body's own axes, which is one product for all times, then rotated
         ahead = np.einsum("ti,tij->tj", shift + self.space.anchor, rotation)
         weights = np.concatenate([ahead, np.ones((len(y), 1)), y[:, 6:]], axis=1).astype(np.float32)
-        turned = rotation.swapaxes(-1, -2).astype(np.float32)
+        rotations = rotation.swapaxes(-1, -2).astype(np.float32)
         count = len(self.evaluated.points)
         out = np.empty((len(y), 3 * count), dtype=np.float32)
         size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
 
         def fill(begin: int) -> None:
-            place = slice(3 * begin, 3 * (begin + size))
-            _turn(weights @ self.evaluated.rows[:, place], turned, out[:, place])
+            columns = slice(3 * begin, 3 * (begin + size))
+            _rotate(weights @ self.evaluated.rows[:, columns], rotations, out[:, columns])
 
         begins = range(0, count, size)
         if len(begins) >= MANY:
@@ -86,7 +86,7 @@ class ReducedMotion(Motion):
             for begin in begins:
                 fill(begin)
         out = out.reshape(len(y), count, 3)
-        # P(0) is P0 to the last bit
+        # P(0) is bit-exactly P0
         out[~y.any(axis=1)] = self.evaluated.points
         return out[0] if np.ndim(t) == 0 else out
 
@@ -109,15 +109,15 @@ class ReducedMotion(Motion):
     def gradients(self, t: float) -> Matrices:
         """F(t) = dP/dP0 at each point: (N, 3, 3), float32, with singular values within `local_frames.BOUND`.
 
-        From data on a surface the tangential part alone: the unit normal there goes to that of the deformed surface,
-        a point off the surface takes the normal of the nearest one on it.
+        Data on a surface determine the tangential part alone: the unit normal there is mapped to that of the deformed
+        surface, and a point off the surface has the normal of the nearest point on it.
         """
         y = self._reduced(t)
         carried = self._carried_axes(y, self._rotation_shift(y)[0][0])
         return gradients(_turned(self.evaluated.local_frames.rest, self._to_scene_axes), carried)
 
     def rotations(self, t: float) -> Matrices:
-        """(N, 3, 3) the rotation nearest to F(t) at each point, its polar factor."""
+        """(N, 3, 3) the rotation nearest to F(t) at each point: its polar factor."""
         u, _, vt = np.linalg.svd(self.gradients(t))
         u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
         return u @ vt
@@ -149,18 +149,18 @@ class ReducedMotion(Motion):
         return rotation_of(y[:, :6], self.schema.azimuth(self.parameters))
 
     def _deformation(self, y: Floats) -> Frames:
-        """(T, N, 3) canonical displacements: one product for all times."""
+        """(T, N, 3) canonical displacements, by one product for all times."""
         return (y[:, 6:].astype(np.float32) @ self.evaluated.values).reshape(len(y), -1, 3)
 
     def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
-        """The local_frames under the deformation of `y` (1, 6 + K), turned from canonical axes by `turn` (3, 3)."""
+        """The local frames under the deformation of `y` (1, 6 + K), rotated from canonical axes by `turn` (3, 3)."""
         return _turned(self.evaluated.local_frames.carried(y[0, 6:]), turn)
 
     def _moved_covariances(self, y: Floats, turn: Rotations) -> Matrices:
         assert isinstance(self.geometry, GaussianSplats)
         if y[0, 6:].any():
             return moved_covariances(self.evaluated.covariances, self._carried_axes(y, turn))
-        # a rigid motion turns the numbers as they were given: those of P(0) are what they were
+        # a rigid motion rotates the given covariances: at rest they are unchanged
         rotation = turn @ self._to_canonical_axes
         flat = self.geometry.covariances.reshape(-1, 9) @ np.kron(rotation, rotation).T
         return flat.reshape(-1, 3, 3).astype(np.float32)
@@ -177,11 +177,11 @@ def _turned(axes: Axes, rotation: Rotations) -> Axes:
     return rotation.astype(np.float32) @ axes
 
 
-def _turn(bodies: Floats, turned: Rotations, out: Floats) -> None:
-    """`out` (T, 3 N): each row of `bodies` (T, 3 N) times its matrix of `turned` (T, 3, 3), point by point."""
+def _rotate(bodies: Floats, rotations: Rotations, out: Floats) -> None:
+    """`out` (T, 3 N): each row of `bodies` (T, 3 N) times its matrix of `rotations` (T, 3, 3), point by point."""
     rows, size = len(bodies), 3 * SEVERAL
     whole = bodies.shape[1] // size * size
-    together = np.einsum("ab,tij->taibj", np.eye(SEVERAL, dtype=np.float32), turned).reshape(rows, size, size)
+    together = np.einsum("ab,tij->taibj", np.eye(SEVERAL, dtype=np.float32), rotations).reshape(rows, size, size)
     np.matmul(bodies[:, :whole].reshape(rows, -1, size), together, out=out[:, :whole].reshape(rows, -1, size))
     if whole < bodies.shape[1]:
-        np.matmul(bodies[:, whole:].reshape(rows, -1, 3), turned, out=out[:, whole:].reshape(rows, -1, 3))
+        np.matmul(bodies[:, whole:].reshape(rows, -1, 3), rotations, out=out[:, whole:].reshape(rows, -1, 3))

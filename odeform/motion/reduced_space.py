@@ -30,19 +30,18 @@ __all__ = [
     "to_canonical",
 ]
 
-POSE = 6  # numbers of the rigid part of y
-MARGIN = 1.15  # times the largest that was trained, up to which shifts and deformations are as predicted
+POSE = 6  # size of the rigid part of y
+MARGIN = 1.15  # times the largest trained shift or deformation, up to which predictions are unchanged
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedSpace:
-    """Where y lives: the `anchor` (3,) that rotations turn about, in metres, and the basis of deformations.
+    """The space of y: the `anchor` (3,) of rotations, in metres, and the basis of deformations.
 
     The basis is orthonormal under the mass weights of the training mesh, in metres: |c| is the root-mean-square
-    displacement of the body, so that errors in c read in metres. `arm` is the radius of gyration of the body, which
-    does the same for small rotation errors. `surface`, canonical, is where the training data lie; None where they
-    fill a volume, so that their derivatives are known in every direction. `largest` are those of |p| and |c| in
-    the training data.
+    displacement of the body, so that errors in c are in metres. The body's radius of gyration, in metres, does the same
+    for small rotation errors. `surface`, canonical, is where the training data lie; None where they fill a volume, so
+    that their derivatives are known in every direction. `largest` are the largest |p| and |c| of the training data.
     """
 
     anchor: Vector
@@ -52,10 +51,10 @@ class ReducedSpace:
     largest: tuple[float, float] = (float("inf"), float("inf"))
 
     def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
-        """(T, 6 + K), to the last bit as they are up to shifts and deformations 15 % larger than any trained.
+        """(T, 6 + K), bit-exact up to shifts and deformations 15 % larger than any trained.
 
-        Beyond, by parameters or times far from those trained or by a solver too coarse, they grow ever less, and never
-        to 30 % more: a body keeps its shape and its place whatever is asked.
+        Larger ones, from parameters or times far outside the trained range or from a coarse solver, are soft-clipped
+        below 30 %, so that a body keeps its shape and stays nearby for any input.
         """
         for part, largest in zip((slice(0, 3), slice(POSE, None)), self.largest, strict=True):
             limit = MARGIN * largest
@@ -82,7 +81,7 @@ class ReducedSpace:
 
     @classmethod
     def from_parts(cls, data: dict[str, object], arrays: Arrays, rest: Mesh) -> "ReducedSpace":
-        """`rest` is the trained body as it rests in the scene."""
+        """From `to_json` and `arrays` of a checkpoint; `rest` is the trained body at rest in the scene."""
         basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
         anchor = np.array(data["anchor"], dtype=float)
         # older checkpoints do not say: all of them are of surfaces
@@ -92,7 +91,7 @@ class ReducedSpace:
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:
-    """(..., 3) points in the scene -> about the anchor, turned by minus the azimuth."""
+    """(..., 3) metres in the scene -> relative to the anchor, rotated by minus the azimuth in radians."""
     return (np.asarray(points, dtype=float) - anchor) @ rotation_z(azimuth)
 
 
@@ -123,12 +122,12 @@ def fit_modes(locals_: list[Float[np.ndarray, "_ points 3"]], weights: Perpoint,
     return vectors[:, ::-1][:, :modes].reshape(len(weights), 3, -1) / root[..., None]
 
 
-def make_space(rest: Mesh, shapes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
-    """The space of the modes `shapes` (N, 3, K) at the vertices of `rest`, canonical. One without a face is inside."""
+def make_space(rest: Mesh, modes: Basis, weights: Perpoint, anchor: Vector) -> ReducedSpace:
+    """The space of the modes (N, 3, K) at the vertices of `rest`, canonical; vertices without a face are interior."""
     gyration_radius = float(np.sqrt((weights[:, None] * rest.points**2).sum()))
     surface = rest if len(np.unique(rest.faces)) == len(rest.points) else None
     return ReducedSpace(
-        np.asarray(anchor, dtype=float), gyration_radius, fit_basis(rest.points, shapes, gyration_radius), surface
+        np.asarray(anchor, dtype=float), gyration_radius, fit_basis(rest.points, modes, gyration_radius), surface
     )
 
 
@@ -141,7 +140,7 @@ def rotation_of(pose: Float[np.ndarray, "*batch 6"], azimuth: float) -> tuple[Ro
 def small_motion(y: Float[np.ndarray, "*batch y"], gyration_radius: float) -> Float[np.ndarray, "*batch"]:
     """Root mean square displacement in metres, over the body, by a small y (..., 6 + K).
 
-    A small turn |w| moves a round body of radius of gyration `arm` by sqrt(2/3) arm |w|.
+    A small rotation |w| moves a round body with radius of gyration r by sqrt(2/3) r |w|.
     """
     scale = np.ones(y.shape[-1])
     scale[3:POSE] = gyration_radius * np.sqrt(2.0 / 3.0)
@@ -151,5 +150,5 @@ def small_motion(y: Float[np.ndarray, "*batch y"], gyration_radius: float) -> Fl
 def motion_rmse(
     one: Float[np.ndarray, "*batch y"], other: Float[np.ndarray, "*batch y"], gyration_radius: float
 ) -> float:
-    """Root mean square difference in metres between motions y (..., 6 + K), over coordinates, points and the rest."""
+    """Root mean square difference in metres between motions y (..., 6 + K), over coordinates, points and all axes."""
     return float(np.sqrt((small_motion(one - other, gyration_radius) ** 2).mean() / 3.0))

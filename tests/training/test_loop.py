@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,12 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
 from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.odeform.network import ODeformNet
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.training import odeform as odeform_training
 from odeform.training.config import TrainConfig
 from odeform.training.loop import network_weights, train_network
+from odeform.training.request import TrainRequest
 from odeform.training.start import build_network
 from odeform.training.train import train
 from odeform.training.trainer import Trainer
@@ -173,12 +176,39 @@ def test_resume_without_a_trace(dataset: Dataset, tmp_path: Path) -> None:
         train(dataset, tmp_path / "a", resume=True)
 
 
-def test_training_does_not_look_at_val(data: TrainingData) -> None:
-    """With validation data of pure noise, whitening and network stay the same."""
+def test_descent_does_not_depend_on_validation_data(data: TrainingData) -> None:
+    """Whitening, steps of descent and readouts are the same when the validation motions are noise."""
     noise = np.random.default_rng(0).normal(size=data.reduced["val"].shape)
-    blind = TrainingData(**{**vars(data), "reduced": {"train": data.reduced["train"], "val": noise}})
-    one, two = (network_weights(build_network(d, 0)) for d in (data, blind))
+    noisy = replace(data, reduced={**data.reduced, "val": noise})
+    config = TrainConfig(steps=3, batch=8, random_features=0)
+    trained = []
+    for some in (data, noisy):
+        net = build_network(some, 0)
+        fresh = network_weights(net)
+        errors = train_network(net, some, config, silent)
+        trained.append((network_weights(net), errors["val_deformation_rmse_mm"]))
+    (one, error), (two, noisy_error) = trained
     assert all(np.array_equal(one[name], two[name]) for name in one)
+    name = "local_field.0.weight"
+    assert not np.array_equal(one[name], fresh[name])
+    assert error != noisy_error
+
+
+def test_a_checkpoint_records_the_settings_that_were_used(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[TrainConfig] = []
+
+    def spy(net: ODeformNet, data: TrainingData, config: TrainConfig, *rest: object) -> dict[str, float]:
+        used.append(config)
+        return train_network(net, data, replace(config, random_features=0), silent)
+
+    monkeypatch.setattr(odeform_training, "train_network", spy)
+    data = prepare(dataset, modes=2)
+    _, settings = odeform_training.fit_odeform(data, TrainRequest(steps=1, seed=4), silent, tmp_path / "a.part")
+    assert settings["training"] == asdict(used[0])
+    assert (settings["training"]["steps"], settings["training"]["seed"]) == (1, 4)
+    assert settings["val"]["batch"] == used[0].batch
 
 
 def test_scores_are_those_of_the_file(dataset: Dataset, predictors: dict[str, Predictor]) -> None:

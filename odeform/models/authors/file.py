@@ -1,6 +1,6 @@
-"""The authors' checkpoints: a `torch.save`d dict of two state dicts, read without running anything that is in it.
+"""The authors' checkpoints: a `torch.save`d dict of two state dicts, read without executing anything in the file.
 
-What a network is, is read off the shapes of its weights; `args` only says which frames it was trained on.
+The kind of network follows from the shapes of its weights; `args` only says which frames it was trained on.
 """
 
 import hashlib
@@ -25,20 +25,20 @@ ENDING = ".pth"
 MODEL = "released"
 PARTS = {"global": "model1_state_dict", "local": "model2_state_dict"}
 MOST_FRAMES = 10_000
-RADIUS, SEGMENTS = 0.1, 8  # of the ball that stands in: metres, and edges of an octant's side
+RADIUS, SEGMENTS = 0.1, 8  # of the ball that serves as body: metres, and edges per side of an octant
 
 SCENES = {1: AUTHORS_MASS_ELASTIC, 3: AUTHORS_CONTACT_FORCE}
-"""By the numbers of an offset: height alone, or all three axes."""
+"""By the components of an offset: height alone, or all three axes."""
 FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), AUTHORS_CONTACT_FORCE: (0, 10, 10)}
-"""First frame, frames, and frames a second where `args` does not say."""
+"""First frame, number of frames, and frames per second where `args` does not say."""
 NOTES = (
-    "A network of the paper's authors: one latent a point, its answer tied to the frames that it was trained on.",
-    "The file holds no body: without a geometry a ball of radius 0.1 m, made here, stands in.",
+    "A network of the paper's authors: one latent state per point, valid on its training frames only.",
+    "The file contains no body: a ball of radius 0.1 m stands in unless a geometry is given.",
 )
 
 
 def read_authors_checkpoint(path: str | Path) -> Checkpoint:
-    """Read and validate a `.pth`; `InputError` in one line for anything that is not one of the authors'."""
+    """Read and validate a `.pth`; `InputError` in one line for anything that is not a checkpoint of the authors."""
     path = Path(path)
     data = checkpoint_bytes(path)
     content = _loaded(data, path)
@@ -52,7 +52,7 @@ def read_authors_checkpoint(path: str | Path) -> Checkpoint:
         scene = SCENES[networks.offsets]
         first, count, rate = _frames(content.get("args"), scene)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"checkpoint {path}: no network of the released ones: missing or wrong {error}") from None
+        raise InputError(f"checkpoint {path}: not one of the released networks: missing or wrong {error}") from None
     ball = octasphere(RADIUS, SEGMENTS)
     return Checkpoint(
         model=MODEL,
@@ -93,12 +93,12 @@ def _arrays(state: Any, path: Path, key: str) -> Arrays:
         if value.is_floating_point():
             arrays[str(name)] = value.detach().to(torch.float32).numpy()
             if not np.isfinite(arrays[str(name)]).all():
-                raise InputError(f"checkpoint {path}: {key}: {name!r} has numbers that are not finite")
+                raise InputError(f"checkpoint {path}: {key}: {name!r} contains numbers that are not finite")
     return arrays
 
 
 def _frames(args: Any, scene: str) -> tuple[int, int, float]:
-    """First frame, number of frames, frames a second."""
+    """First frame, number of frames, frames per second."""
     given = args if isinstance(args, Mapping) else {}
     first, count, rate = (
         given.get(name, default)
@@ -106,12 +106,12 @@ def _frames(args: Any, scene: str) -> tuple[int, int, float]:
     )
     first, count, rate = int(first), int(count), float(rate)
     if not (0 <= first <= MOST_FRAMES and 2 <= count <= MOST_FRAMES and 0.0 < rate <= MOST_FRAMES):
-        raise ValueError(f"args: {count} frames from {first} on at {rate:g} a second")
+        raise ValueError(f"args: {count} frames from {first} on at {rate:g} per second")
     return first, count, rate
 
 
 def _plain(content: Mapping[str, Any]) -> dict[str, Any]:
-    """What else the file says of itself, as far as JSON can hold it."""
+    """Other metadata of the file, as far as JSON can hold it."""
     plain = {name: content[name] for name in ("epoch", "loss") if isinstance(content.get(name), int | float)}
     args = content.get("args")
     if isinstance(args, Mapping):
@@ -124,19 +124,19 @@ def _schema(scene: str, window: Window) -> Schema:
         parameters = (
             Parameter("mass", "kg", 0.1, 3.0, 1.0, description="mass of the body"),
             Parameter("bending", "N m", 0.1, 3.0, 1.0, description="bending stiffness of its springs"),
-            Parameter("initial_offset", "m", 0.0, 1.0, 0.5, description="height at which it is dropped"),
+            Parameter("initial_offset", "m", 0.0, 1.0, 0.5, description="drop height"),
         )
     else:
         parameters = (
-            *_vector("contact", "m", 1.0, 0.5, "where it is pushed"),
-            *_vector("force", "N", 1.0, 0.5, "the push"),
-            *_vector("initial_offset", "m", 0.5, 0.0, "where it lies at first"),
+            *_vector("contact", "m", 1.0, 0.5, "point of contact"),
+            *_vector("force", "N", 1.0, 0.5, "applied force"),
+            *_vector("initial_offset", "m", 0.5, 0.0, "initial position"),
         )
     return Schema(scene, parameters, window, notes=NOTES)
 
 
 def _vector(name: str, unit: str, reach: float, first: float, text: str) -> tuple[Parameter, ...]:
-    """Three parameters, NAME_x to NAME_z, each from -reach to reach; `Schema.complete` takes them as one, too."""
+    """Three parameters, NAME_x to NAME_z, each from -reach to reach; `Schema.complete` also accepts them as one."""
     return tuple(
         Parameter(f"{name}_{axis}", unit, -reach, reach, first if axis == "x" else 0.0, description=f"{text}, {axis}")
         for axis in "xyz"

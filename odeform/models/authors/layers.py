@@ -1,4 +1,4 @@
-"""Layers of the authors' networks, in NumPy and float32: chains of products, and PointNet's look at a whole shape."""
+"""Layers of the authors' networks, in NumPy and float32: chains of linear layers, and PointNet."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ def chunks(count: int) -> Iterator[slice]:
 
 
 def waves(points: Points) -> Rows:
-    """(N, 3) -> (N, 39): the coordinates, then sines and cosines of them at six frequencies, three axes together."""
+    """(N, 3) -> (N, 39): the coordinates, then their sines and cosines at six frequencies, three axes together."""
     phases = [np.float32(2.0**k * np.pi) * points for k in range(FREQUENCIES)]
     return np.concatenate([points, *(f(phase) for phase in phases for f in (np.sin, np.cos))], axis=1)
 
@@ -39,7 +39,7 @@ def tanh(x: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Affine:
-    """x -> x W + b. A 1x1 convolution is one, and so is one with its batch norm."""
+    """x -> x W + b. A 1x1 convolution is affine, and so is one followed by batch norm."""
 
     weight: Float[np.ndarray, "inputs outputs"]
     bias: Float[np.ndarray, " outputs"]
@@ -48,7 +48,7 @@ class Affine:
     def read(cls, arrays: Arrays, name: str, norm: str | None = None) -> "Affine":
         """The layer of that name, followed by the batch norm `norm` with its stored statistics.
 
-        KeyError for what is missing, ValueError for sizes that do not fit.
+        KeyError for missing arrays, ValueError for wrong sizes.
         """
         weight, bias = arrays[f"{name}.weight"], arrays[f"{name}.bias"]
         if weight.ndim not in (2, 3) or weight.shape[2:] not in ((), (1,)) or bias.shape != weight.shape[:1]:
@@ -69,15 +69,15 @@ class Affine:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Affine layers, with a bend after all but the last."""
+    """Affine layers, with an activation after all but the last."""
 
     layers: tuple[Affine, ...]
-    bend: Callable[[Floats], Floats] = relu
+    activation: Callable[[Floats], Floats] = relu
 
     def __post_init__(self) -> None:
         for one, other in pairwise(self.layers):
             if one.weight.shape[1] != other.weight.shape[0]:
-                raise ValueError(f"sizes: {one.weight.shape[1]} numbers into a layer of {other.weight.shape[0]}")
+                raise ValueError(f"sizes: {one.weight.shape[1]} outputs into {other.weight.shape[0]} inputs")
 
     @property
     def inputs(self) -> int:
@@ -93,27 +93,27 @@ class Chain:
         return self.after(self.layers[0](x))
 
     def after(self, x: Rows) -> Rows:
-        """The rest of the chain from what its first layer gave, which is overwritten."""
+        """The rest of the chain, from the output of its first layer, which is overwritten."""
         for layer in self.layers[1:]:
-            x = layer(self.bend(x))
+            x = layer(self.activation(x))
         return x
 
 
-def read_chain(arrays: Arrays, prefix: str, bend: Callable[[Floats], Floats] = relu) -> Chain:
+def read_chain(arrays: Arrays, prefix: str, activation: Callable[[Floats], Floats] = relu) -> Chain:
     """The layers `prefix`N in order of N."""
     found = (re.fullmatch(re.escape(prefix) + r"(\d+)\.weight", name) for name in arrays)
     numbers = sorted(int(match[1]) for match in found if match)
     if not numbers:
         raise KeyError(f"{prefix}0.weight")
-    return Chain(tuple(Affine.read(arrays, f"{prefix}{number}") for number in numbers), bend)
+    return Chain(tuple(Affine.read(arrays, f"{prefix}{number}") for number in numbers), activation)
 
 
 @dataclass(frozen=True, eq=False)
 class PointNet:
-    """A turn of the shape by a matrix that the whole shape decides, then the same chain for each point.
+    """The shape times a matrix that depends on the whole shape, then the same chain for each point.
 
-    Qi, Su, Mo and Guibas (CVPR 2017). Batch norms, where there are any, use their stored statistics: what is said of a
-    shape then does not depend on the others of a batch.
+    Qi, Su, Mo and Guibas (CVPR 2017). Batch norms, where there are any, use their stored statistics, so that the output
+    for a shape does not depend on the others of a batch.
     """
 
     features: Chain
@@ -151,7 +151,7 @@ class PointNet:
         """Number of features."""
         return self.encode.outputs
 
-    def turn(self, points: Points) -> Float[np.ndarray, "3 3"]:
-        """The matrix that the points (N, 3) are multiplied by from the right."""
+    def transform(self, points: Points) -> Float[np.ndarray, "3 3"]:
+        """The matrix by which the points (N, 3) are multiplied from the right."""
         pooled = np.max([relu(self.features(points[part])).max(axis=0) for part in chunks(len(points))], axis=0)
         return self.matrix(relu(pooled)[None]).reshape(3, 3) + np.eye(3, dtype=np.float32)

@@ -1,7 +1,7 @@
-"""The authors' two networks: one latent for the motion as a whole, one for each point, on a grid of times.
+"""The authors' two networks: one latent state for the whole motion, one for each point, on a grid of times.
 
-Their local field is conditioned on the global latent *at the second time of the query*, held constant, and both are
-carried by one step a query interval. What comes out therefore belongs to that grid: it is reproduced on it, not off it.
+Their local field is conditioned on the global latent state *at the second time of the query*, held constant, and both
+are integrated by one step per query interval. Results are therefore tied to that grid, and valid on it alone.
 """
 
 from collections.abc import Callable
@@ -19,13 +19,13 @@ from odeform.types import Arrays, Floats, Frames, Points, Times
 __all__ = ["Networks", "normalisation"]
 
 Field = Callable[[Floats, np.float32], Floats]
-PLAIN, ENCODED = 3, 39  # numbers of a point's coordinates, bare and with their waves
+PLAIN, ENCODED = 3, 39  # inputs of a point: its coordinates, and with their positional encoding
 
 
 def normalisation(reference: Points) -> tuple[Float[np.ndarray, " 3"], float]:
-    """Middle (3,) and half of a size in metres: the network sees (x - middle) / half.
+    """Middle (3,) and half of a size in metres: the network is given (x - middle) / half.
 
-    From the mean vertex m and the smallest and largest coordinate a, b of the rest, over all three axes.
+    From the mean vertex and the smallest and largest coordinate relative to it, over all three axes.
     """
     reference = np.asarray(reference, dtype=float)
     mean = reference.mean(axis=0)
@@ -33,8 +33,8 @@ def normalisation(reference: Points) -> tuple[Float[np.ndarray, " 3"], float]:
     return mean + 0.5 * (low + high), 0.5 * (high - low)
 
 
-def _carried(field: Field, z: Floats, times: Times) -> list[Floats]:
-    """States at the (T,) times, by one step an interval."""
+def _integrated(field: Field, z: Floats, times: Times) -> list[Floats]:
+    """States at the (T,) times, by one step per interval."""
     states = [z]
     for begin, end in pairwise(times):
         check_cancelled()
@@ -51,7 +51,7 @@ def _field(net: Chain, condition: Floats) -> Field:
 
 @dataclass(frozen=True, eq=False)
 class Networks:
-    """Both networks. `offsets` is 1 where the motion as a whole is a height, 3 where it is a shift."""
+    """Both networks. `offsets` is 1 where the global motion is a height, 3 where it is a shift."""
 
     encoders: tuple[Chain, Chain | PointNet]
     fields: tuple[Chain, Chain]
@@ -59,7 +59,7 @@ class Networks:
 
     @classmethod
     def read(cls, arrays: Arrays) -> "Networks":
-        """From arrays named `global.…` and `local.…`. KeyError for what is missing, ValueError for other sizes."""
+        """From arrays named `global.…` and `local.…`. KeyError for missing arrays, ValueError for wrong sizes."""
         local: Chain | PointNet
         if "local.encoder.stn.conv1.weight" in arrays:
             local = PointNet.read(arrays, "local.encoder.")
@@ -96,12 +96,12 @@ class Networks:
 
     @property
     def encoded(self) -> bool:
-        """Whether a point is seen with the waves of its coordinates."""
+        """Whether points are given with a positional encoding."""
         return self.encoders[1].inputs - self.parameters == ENCODED
 
     @property
     def kind(self) -> str:
-        """Of the local encoder, as the authors call it."""
+        """The local encoder, by the authors' name."""
         if isinstance(self.encoders[1], PointNet):
             return "pointnet_bn" if self.encoders[1].normed else "pointnet"
         return "pemlp" if self.encoded else "mlp"
@@ -113,24 +113,24 @@ class Networks:
         offset: Float[np.ndarray, " offsets"],
         times: Times,
     ) -> tuple[Float[np.ndarray, "times offsets"], Frames]:
-        """Offsets (T, 1 or 3) and shapes (T, N, 3) at the (T,) times, all as the networks see them.
+        """Offsets (T, 1 or 3) and shapes (T, N, 3) at the (T,) times, all in the units of the networks.
 
-        `points` (N, 3), parameters `theta` and the first `offset` are normalised. Points are worked on in chunks.
+        `points` (N, 3), parameters `theta` and the first `offset` are normalised. Points are processed in chunks.
         """
         theta, points, times = (np.asarray(x, dtype=np.float32) for x in (theta, points, times))
         start = self.encoders[0](np.concatenate([np.asarray(offset, dtype=np.float32), theta])[None])
-        whole = _carried(_field(self.fields[0], np.zeros(0, np.float32)), start, times)
+        whole = _integrated(_field(self.fields[0], np.zeros(0, np.float32)), start, times)
         field = _field(self.fields[1], whole[1][0])
         shapes = np.empty((len(times), len(points), 3), dtype=np.float32)
-        turn = self.encoders[1].turn(points) if isinstance(self.encoders[1], PointNet) else None
+        transform = self.encoders[1].transform(points) if isinstance(self.encoders[1], PointNet) else None
         for part in chunks(len(points)):
-            for frame, z in enumerate(_carried(field, self._latents(points[part], theta, turn), times)):
+            for frame, z in enumerate(_integrated(field, self._latents(points[part], theta, transform), times)):
                 shapes[frame, part] = self.decoders[1](z)
         return np.stack([self.decoders[0](z)[0] for z in whole]), shapes
 
-    def _latents(self, points: Points, theta: Floats, turn: Floats | None) -> Floats:
-        """(N, latent) of the points at the start."""
-        seen = waves(points) if self.encoded else points if turn is None else points @ turn
-        rows = np.concatenate([seen, np.tile(theta, (len(points), 1))], axis=1)
+    def _latents(self, points: Points, theta: Floats, transform: Floats | None) -> Floats:
+        """(N, latent) states of the points at the start."""
+        inputs = waves(points) if self.encoded else points if transform is None else points @ transform
+        rows = np.concatenate([inputs, np.tile(theta, (len(points), 1))], axis=1)
         encoder = self.encoders[1]
         return encoder.encode(rows) if isinstance(encoder, PointNet) else encoder(rows)
