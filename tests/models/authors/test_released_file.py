@@ -65,7 +65,7 @@ def test_layers_that_do_not_follow_each_other_are_refused(tmp_path: Path) -> Non
     authors = Authors("pointnet_bn", 3)
     state = dict(authors.local.state_dict())
     state["encoder.conv2.weight"] = torch.zeros(128, 63, 1)
-    with pytest.raises(InputError, match="sizes: 64 numbers into a layer of 63"):
+    with pytest.raises(InputError, match="sizes: 64 outputs into 63 inputs"):
         read_authors_checkpoint(authors.save(tmp_path / "a.pth", model2_state_dict=state))
     state = dict(authors.local.state_dict())
     state["encoder.bn2.running_var"] = -torch.ones(128)
