@@ -77,5 +77,5 @@ def test_evaluate_scores_the_trained_window(
     scores = json.loads(out.read_text())["models"]["released"]
     assert len(scores["per_frame_rmse_mm"]) == 20
     assert main(["evaluate", checkpoint, "--data", str(drops), "--window", "0:30"]) == 2
-    assert "2 to 2.95 s alone" in capsys.readouterr().err
+    assert "covers only 2 to 2.95 s" in capsys.readouterr().err
     assert main(["stress", checkpoint]) == main(["bench", checkpoint]) == 2
