@@ -35,7 +35,7 @@ class ViewRequest:
     parameters: Mapping[str, float]
     time: float
     quality: str
-    """Of all integrations: a name such as "balanced", or `SolverSettings` as JSON."""
+    """Settings of all integrations: a name such as "balanced", or `SolverSettings` as JSON."""
     columns: tuple[Column, ...]
 
 

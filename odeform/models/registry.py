@@ -77,7 +77,7 @@ def load(name: str | Path) -> Predictor:
 
 
 def load_continuous(name: str | Path) -> Predictor:
-    """As `load`; `InputError` for a network that only knows its training frames."""
+    """Like `load`, with `InputError` for a network that only knows its training frames."""
     predictor = load(name)
     if not predictor.extrapolates:
         raise InputError(
@@ -87,7 +87,7 @@ def load_continuous(name: str | Path) -> Predictor:
 
 
 def load_reduced(name: str | Path) -> ReducedModel:
-    """As `load`; `InputError` for a model that is not of reduced coordinates."""
+    """Like `load`, with `InputError` for a model that is not of reduced coordinates."""
     predictor = load(name)
     if not isinstance(predictor, ReducedModel):
         raise InputError(f"checkpoint {name}: expected a model of reduced coordinates, got {predictor.model}")

@@ -23,7 +23,7 @@ STYLE = (
     "overflow:visible;font:10px sans-serif}.at path{stroke:#222}"
     ".at text{text-anchor:end;stroke:#fff;stroke-width:2.5px;paint-order:stroke}"
 )
-"""Of the cursor; it is sent with every frame, so its attributes are sent once, with the curves."""
+"""Style of the cursor, which is sent with every frame, so its attributes are sent once, with the curves."""
 
 QUANTITIES = (
     ("height", "height of the centre, m"),

@@ -53,7 +53,7 @@ def test_a_parabola_is_filled_in_exactly() -> None:
 
 
 def test_too_few_frames(dataset: Dataset) -> None:
-    with pytest.raises(InputError, match="at least 4 frames"):
+    with pytest.raises(InputError, match="at least 4 training frames"):
         prepare(dataset, 8, FrameSubsampling(every=60))
     with pytest.raises(InputError, match="start at frame 0"):
         prepare(dataset, 8, FrameSubsampling((3, 60)))

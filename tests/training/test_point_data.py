@@ -38,5 +38,5 @@ def test_given_frames_have_their_rate_and_end_the_window(dataset: Dataset) -> No
 
 
 def test_too_few_frames(dataset: Dataset) -> None:
-    with pytest.raises(InputError, match="at least 4 frames"):
+    with pytest.raises(InputError, match="at least 4 training frames"):
         prepare_points(dataset, given=60)

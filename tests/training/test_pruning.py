@@ -46,8 +46,8 @@ def test_as_few_as_miss_hardly_more(
     large = deformed > LARGE * deformed.max(axis=1)[:, None]
 
     def missed(first: int) -> float:
-        told = np.concatenate([motions[..., : POSE + first], np.zeros((*truth.shape[:2], modes - first))], axis=-1)
-        return float(np.linalg.norm((told - truth)[large][:, POSE:]))
+        kept = np.concatenate([motions[..., : POSE + first], np.zeros((*truth.shape[:2], modes - first))], axis=-1)
+        return float(np.linalg.norm((kept - truth)[large][:, POSE:]))
 
     assert missed(count) <= worse * missed(modes) * (1.0 + 1e-12)
     assert count == 1 or missed(count - 1) > worse * missed(modes)

@@ -20,7 +20,7 @@ from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
 
 @dataclass
 class Loop:
-    """A presenter with its collaborators: what they were told, and what they say."""
+    """A presenter with its collaborators: what they received, and what they show."""
 
     request: ViewRequest
     session: Session

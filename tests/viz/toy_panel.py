@@ -8,7 +8,7 @@ __all__ = ["ToyPanel", "UnneededPanel"]
 
 
 class ToyPanel(Panel):
-    """Says how fast the first body is, and keeps count of what it was told."""
+    """Says how fast the first body is, and counts its calls."""
 
     def __init__(self, page: Page) -> None:
         self.calls: list[str] = []

@@ -33,7 +33,7 @@ FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), AUTHORS_CONTACT_FORCE: (0, 10, 10)
 """First frame, number of frames, and frames per second where `args` does not say."""
 NOTES = (
     "A network of the paper's authors: one latent state per point, valid on its training frames only.",
-    "The file contains no body: a ball of radius 0.1 m stands in unless a geometry is given.",
+    "The file contains no body: a ball of radius 0.1 m is used unless a geometry is given.",
 )
 
 
@@ -71,7 +71,7 @@ def _loaded(data: bytes, path: Path) -> Mapping[str, Any]:
     try:
         content = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     except Exception:
-        # whatever a broken file makes the parser trip over; its own messages advise to load it unsafely
+        # a broken file raises any of these; the messages of the parser itself advise to load it unsafely
         raise InputError(
             f"checkpoint {path}: not a file of weights alone that PyTorch can read, or truncated"
         ) from None

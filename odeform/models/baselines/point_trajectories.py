@@ -66,7 +66,7 @@ class FramedPoints:
     def __init__(
         self, net: Net, network: PointNet, frame: PointFrame, window: Window, x: Points, theta: Floats
     ) -> None:
-        """As of `MomentaryPoints`."""
+        """See `MomentaryPoints`."""
         self._net, self._network, self._frame, self._window = net, network, frame, window
         self._x, self._theta, self._wall_ms = x, theta, 0.0
         self._frames = np.empty((0, len(x), 3), dtype=np.float32)

@@ -23,7 +23,7 @@ class TrajectoryPod:
     mean: Float[np.ndarray, " entries"]
     modes: Float[np.ndarray, "modes entries"]
     coefficients: Float[np.ndarray, "sequences modes"]
-    """Of the training motions; the modes are orthonormal."""
+    """Coefficients of the training motions; the modes are orthonormal."""
 
     def error(self, coefficients: Floats, reduced: Floats) -> float:
         """RMS distance in m between (S, modes) `coefficients` and trajectories (S, T, 6 + K), over the sequences."""
@@ -40,7 +40,7 @@ class TrajectoryPod:
 
 
 def fit_trajectory_pod(data: TrainingData) -> TrajectoryPod:
-    """As many modes of the training motions as hold `ENERGY` of their variance."""
+    """The leading modes of the training motions, which hold `ENERGY` of their variance."""
     train = data.reduced["train"]
     weight = np.ones(train.shape[-1])
     weight[3:POSE] = data.space.gyration_radius * np.sqrt(2.0 / 3.0)  # radians to metres

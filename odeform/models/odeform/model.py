@@ -24,7 +24,7 @@ from odeform.types import Floats, Times
 __all__ = ["PREFIX", "ODeform"]
 
 PREFIX = "net."
-"""Of the network's arrays in a checkpoint."""
+"""Prefix of the network's arrays in a checkpoint."""
 
 
 class ODeform(ReducedModel):

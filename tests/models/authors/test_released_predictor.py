@@ -71,10 +71,10 @@ def test_cubic_between_frames_whatever_is_asked(drop: Predictor) -> None:
     assert np.array_equal(drop.solve(quality="reference", until=2.1).vertices(2.7), motion.vertices(2.7))
 
 
-def test_without_a_geometry_a_ball_stands_in(drop: Predictor) -> None:
+def test_without_a_geometry_a_ball_is_used(drop: Predictor) -> None:
     assert np.allclose(np.linalg.norm(drop.rest.points, axis=1), 0.1)
     assert np.array_equal(drop.solve().vertices(2.5), drop.solve(drop.rest).vertices(2.5))
-    assert any("stands in" in note for note in drop.schema.notes)
+    assert any("is used unless a geometry is given" in note for note in drop.schema.notes)
 
 
 def test_size_and_place_are_taken_as_they_are(drop: Predictor) -> None:

@@ -69,7 +69,7 @@ def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App,
 
 
 def test_after_many_moments_the_numbers_are_of_the_last(dropped: tuple[App, LoopbackClient]) -> None:
-    """They are told ten times a second, however often the moment changes."""
+    """They are sent ten times a second, however often the moment changes."""
     app, client = dropped
     for moment in np.linspace(0.3, 0.45, 31):
         client.set("time (s)", round(float(moment), 3))

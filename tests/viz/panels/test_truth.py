@@ -166,8 +166,8 @@ def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve:
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
     _, client = serve(Column("odeform", ODeform(other), kick.rest))
     assert "young_pa 1.3e+05 (trained on 1.7e+05)" in client.text()
-    taught = load("mass-elastic").checkpoint.provenance["fixed"]
-    assert physics_difference(taught, open_dataset("mass-elastic").fixed) == ""
+    trained_with = load("mass-elastic").checkpoint.provenance["fixed"]
+    assert physics_difference(trained_with, open_dataset("mass-elastic").fixed) == ""
     assert physics_difference({"a": 1.0}, {"b": 2.0}) == "a none (trained on 1), b 2 (trained on none)"
 
 

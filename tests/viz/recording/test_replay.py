@@ -116,7 +116,7 @@ def test_a_changed_or_missing_checkpoint_is_found(
     assert "SHA-256" in capsys.readouterr().out
     file.unlink()
     assert main(["--replay", str(path)]) == 1
-    assert "neither a file" in capsys.readouterr().out
+    assert "expected a file or one of the bundled" in capsys.readouterr().out
 
 
 def test_a_truth_is_loaded_again_and_a_simulated_one_is_skipped(
