@@ -28,7 +28,7 @@ REACH = 0.5
 
 
 def soft_clip(values: Floats, limit: float, margin: float) -> Floats:
-    """Clip magnitudes smoothly: bit-exact up to `limit`, and never above `limit + margin`; any shape.
+    """Clip magnitudes smoothly: bit-exact up to `limit`, and never above `limit + margin`; any shape (...).
 
     Inputs of models pass through this function. Models are therefore continuous functions of a bounded set, and their
     motions stay bounded for any input.

@@ -79,6 +79,7 @@ class App:
 
     @property
     def url(self) -> str:
+        """Address of the page, for a browser on this machine."""
         host = self.server.get_host()
         return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{self.server.get_port()}"
 

@@ -43,10 +43,12 @@ class Column:
 
     @property
     def truth(self) -> RecordedMotion | None:
+        """The recorded motion; None for a model's column."""
         return self.source if isinstance(self.source, RecordedMotion) else None
 
     @property
     def predictor(self) -> Predictor | None:
+        """The model; None for a recorded motion."""
         return None if isinstance(self.source, RecordedMotion) else self.source
 
 
@@ -61,6 +63,7 @@ class Columns:
 
     @property
     def all(self) -> tuple[Column, ...]:
+        """A snapshot of all columns, hidden ones included, in display order."""
         return self._columns
 
     @property
@@ -100,6 +103,7 @@ class Columns:
         return [p.name for p in self._schema.parameters if p.name not in own]
 
     def remove(self, key: int) -> None:
+        """Remove a column, if it still exists."""
         with self._lock:
             self._columns = tuple(c for c in self._columns if c.key != key)
 
@@ -112,6 +116,7 @@ class Columns:
             self._columns = fresh._columns
 
     def set_visible(self, key: int, visible: bool) -> None:
+        """Show or hide a column, if it still exists."""
         with self._lock:
             self._columns = tuple(replace(c, visible=visible) if c.key == key else c for c in self._columns)
 

@@ -33,6 +33,7 @@ class Layout:
         return self._made[place]
 
     def set_bottom_width(self, pixels: int) -> None:
+        """Set the width of the bottom panel in pixels, if there is one."""
         if self._bottom is not None:
             self._bottom.set_width(pixels)
 

@@ -84,6 +84,7 @@ class Page:
 
     @property
     def schema(self) -> Schema:
+        """Parameters of the scene."""
         return self.session.schema
 
     @property
@@ -132,6 +133,7 @@ class Page:
         self.wake()
 
     def add_hotkey(self, key: str, label: str, action: Callable[[], None]) -> None:
+        """Register `action` under a key and in the command palette, labelled `label`."""
         command = self.server.gui.add_command(label.capitalize(), hotkey=key)  # pyright: ignore[reportArgumentType]
         command.on_trigger(lambda _: action())
         self.hotkeys[key] = label

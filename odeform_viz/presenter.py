@@ -47,7 +47,9 @@ class Recording(Protocol):
         """Start or stop as requested; whether a recording has just started."""
         ...
 
-    def log(self, frame: Frame) -> None: ...
+    def log(self, frame: Frame) -> None:
+        """Add a frame, if a recording is in progress."""
+        ...
 
 
 class Presenter:

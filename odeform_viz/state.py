@@ -82,6 +82,7 @@ def _column(raw: Mapping[str, Any], models: Mapping[str, Predictor], schema: Sch
 
 
 def state_to_json(state: PageState) -> bytes:
+    """The content of a state file, in UTF-8; `state_from_json` reads it."""
     display = state.display
     raw = {
         "odeform_state": FORMAT,

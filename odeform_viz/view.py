@@ -62,6 +62,7 @@ class Error:
 
     @property
     def worst_mm(self) -> float:
+        """The largest distance, in millimetres."""
         return 1e3 * float(self.distances[self.worst_vertex])
 
 
@@ -84,10 +85,12 @@ class ColumnFrame:
 
     @property
     def stats(self) -> SolveStats:
+        """Those of the motion."""
         return self.motion.stats
 
     @property
     def below_floor(self) -> bool:
+        """Whether the body is visibly below the floor: deeper than `FLOOR_TOLERANCE`."""
         return self.depth > FLOOR_TOLERANCE
 
 
@@ -109,6 +112,7 @@ class Frame:
 
     @cached_property
     def truth(self) -> ColumnFrame | None:
+        """The column of the recorded sequence; None if it is not among them."""
         return next((c for c in self.columns if c.column.truth), None)
 
     @cached_property

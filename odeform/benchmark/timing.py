@@ -12,7 +12,7 @@ __all__ = ["as_viewed", "milliseconds", "quantiles", "typical"]
 
 
 def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> Floats:
-    """(repeats,) ms that `work(index)` takes, after `warm` warm-up runs."""
+    """(R,) milliseconds that `work(index)` takes for each of R = `repeats` indices, after `warm` warm-up runs."""
     for index in range(warm):
         work(index)
     out = np.empty(repeats)
@@ -24,7 +24,7 @@ def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> 
 
 
 def quantiles(samples: Floats) -> dict[str, float]:
-    """Median and 95th percentile."""
+    """Median `p50` and 95th percentile `p95` of samples (R,), in their unit."""
     return {"p50": float(np.percentile(samples, 50)), "p95": float(np.percentile(samples, 95))}
 
 

@@ -37,7 +37,7 @@ class FrameSubsampling:
         return count if self.stagger else count - (count - 1) % self.every
 
     def kept(self, count: int, sequence: int) -> Ints:
-        """Observed frames, among `count`, of the sequence with that index."""
+        """(F,) increasing indices of the observed frames, out of `count`, of the sequence with that index."""
         if not self.stagger:
             return np.arange(0, count, self.every)
         return np.unique([0, *range(sequence % self.every, count, self.every), count - 1])

@@ -74,7 +74,7 @@ def _layouts(lines: list[list[str]], order: str) -> Iterator[tuple[str, int, np.
 
 
 def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
-    """(rows, len(names)) float32. Raises `InputError` if a column is missing."""
+    """(N, C) float32 for N rows and C names. Raises `InputError` if a column is missing."""
     missing = [name for name in names if name not in (table.dtype.names or ())]
     if missing:
         raise InputError(f"geometry {path}: splats without {', '.join(missing)}")

@@ -83,6 +83,7 @@ class Dynamics:
         return self.flight(before, now) + kernel(self.features(before, now, theta), self.centers) @ self.weights
 
     def arrays(self) -> Arrays:
+        """The float32 arrays of a checkpoint, by name; `from_arrays` reads them."""
         named = {"gravity": self.gravity, "ground": np.array([self.touch, self.width])}
         named |= {"gains": self.gains, "centers": self.centers, "weights": self.weights}
         return {PREFIX + name: value.astype(np.float32) for name, value in named.items()}
@@ -118,10 +119,12 @@ class ContinuedTrajectory:
 
     @property
     def stats(self) -> SolveStats:
+        """Those of the trajectory within the trained window."""
         return self._solved.stats
 
     @property
     def last_good(self) -> float:
+        """Seconds up to which the integration within the trained window succeeded."""
         return self._solved.last_good
 
     def reduced(self, times: Floats) -> Floats:

@@ -24,7 +24,10 @@ def layer_shapes(sizes: Sizes) -> Iterable[tuple[str, tuple[int, ...]]]:
 
 
 def read_layers(weights: Arrays, part: str, dtype: type) -> Layers:
-    """The layers of a part, column-major: the faster order for matrix-vector products."""
+    """Weights (M, N) and biases (M,) of a part's layers, N inputs to M outputs, in order; empty if there are none.
+
+    Weights are column-major: the faster order for matrix-vector products.
+    """
     out = []
     index = 0
     while f"{part}.{index}.weight" in weights:

@@ -27,10 +27,12 @@ class RecordedMotion:
 
     @cached_property
     def geometry(self) -> Mesh:
+        """The mesh at rest."""
         return self.sequence.rest
 
     @property
     def parameters(self) -> Parameters:
+        """The quantities that vary in the data set, by name."""
         return self.sequence.parameters
 
     @property
@@ -50,10 +52,12 @@ class RecordedMotion:
 
     @property
     def stats(self) -> SolveStats:
+        """The frame rate in place of a solver; its error counts as zero."""
         return SolveStats(f"simulated, {self.rate:g} frames per second", 0, 0, 0, "ok", 0.0, lambda: 0.0)
 
     @property
     def outside(self) -> tuple[str, ...]:
+        """Empty: a recording has no trained range."""
         return ()
 
     def extrapolates(self, time: float) -> bool:

@@ -86,10 +86,12 @@ class ExplicitRungeKutta:
 
     @property
     def name(self) -> str:
+        """Name of the method."""
         return self.tableau.name
 
     @property
     def order(self) -> int:
+        """Order of convergence."""
         return self.tableau.order
 
     @property

@@ -33,7 +33,7 @@ class Tableau:
 
 
 def rounded(weights: Row, dtype: np.dtype) -> Floats:
-    """The fractions in a precision, each correctly rounded to double precision at least."""
+    """The fractions (S,) in a precision, each correctly rounded to double precision at least."""
     if dtype.char in "fd":
         return np.array([float(weight) for weight in weights], dtype)
     return np.array([dtype.type(weight.numerator) / dtype.type(weight.denominator) for weight in weights], dtype)

@@ -39,6 +39,7 @@ class Run:
     report: Callable[[str], None]
 
     def reduced_data(self) -> TrainingData:
+        """The data set in reduced coordinates, with the frames that the request asks for; reports its size."""
         request = self.request
         data = prepare(self.dataset, None, FrameSubsampling(request.window, request.every, request.stagger))
         self.report(

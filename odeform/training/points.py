@@ -43,6 +43,7 @@ class Budget:
     steps: int | None = None
 
     def part(self, share: float) -> "Budget":
+        """A share in (0, 1] of this budget, at least one step."""
         return Budget(share * self.seconds, None if self.steps is None else max(round(share * self.steps), 1))
 
 

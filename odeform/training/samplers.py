@@ -75,6 +75,7 @@ class Sampler(ABC):
     def inputs(
         self, sequence: torch.Tensor, point: torch.Tensor, frames: torch.Tensor, truth: torch.Tensor
     ) -> PointBatch:
+        """Network inputs for `frames` (F, B) of points (B,) of sequences (B,); `truth` (F, B, 3) are displacements."""
         times = frames.float() / self.last
         return PointBatch(self.x[point], self.theta[sequence], times, truth[0], self.finer)
 

@@ -77,7 +77,7 @@ def play_free_flight(model: Predictor) -> dict[str, float]:
 
 
 def largest_deformation_times(model: Predictor, count: int) -> Floats:
-    """(count,) s: times around the largest deformation of a bundled scene."""
+    """(T,) seconds, T = `count`, around the largest deformation of a bundled scene."""
     return (0.288 if model.schema.impact else 0.005) + np.linspace(0.0, 0.025, count)
 
 

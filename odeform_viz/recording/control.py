@@ -45,6 +45,7 @@ class RecordingControl:
 
     @property
     def active(self) -> bool:
+        """Whether a recording is in progress."""
         return self._recorder is not None
 
     def sync(self) -> bool:

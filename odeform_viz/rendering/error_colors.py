@@ -58,9 +58,10 @@ def split_into_bands(values: Perpoint, faces: Faces, top: float) -> list[tuple[I
 
 
 def scale_for(errors_mm: Floats) -> float:
-    """A round upper end of the color scale, in mm, for RMS errors over time: 1, 2 or 5 times a power of ten.
+    """A round upper end of the color scale, in mm, for RMS errors (T,) over time: 1, 2 or 5 times a power of ten.
 
     It is at least three times the largest error, so that nearly all points stay below it even at the worst time.
+    NaN is ignored.
     """
     largest = 3.0 * float(np.nanmax(errors_mm, initial=0.0))
     if largest <= 0.0:

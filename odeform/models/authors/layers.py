@@ -20,6 +20,7 @@ Rows = Float[np.ndarray, "rows _"]
 
 
 def chunks(count: int) -> Iterator[slice]:
+    """Slices that split `count` points into chunks of at most `CHUNK`."""
     return (slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK))
 
 
@@ -100,7 +101,7 @@ class Chain:
 
 
 def read_chain(arrays: Arrays, prefix: str, activation: Callable[[Floats], Floats] = relu) -> Chain:
-    """The layers `prefix`N in order of N."""
+    """The layers `prefix`N in order of N: weights (M, N) and biases (M,). `KeyError` if there is none."""
     found = (re.fullmatch(re.escape(prefix) + r"(\d+)\.weight", name) for name in arrays)
     numbers = sorted(int(match[1]) for match in found if match)
     if not numbers:

@@ -57,15 +57,19 @@ class Numpy:
     }
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any:
+        """x @ weight.T + bias for x (..., inputs): (..., outputs)."""
         return x @ weight.T + bias
 
     def join(self, parts: list[Any]) -> Any:
+        """Join arrays (..., n) along their last axis."""
         return np.concatenate(parts, axis=-1)
 
     def stack(self, parts: list[Any]) -> Any:
+        """Stack arrays (...) of one shape along a new first axis."""
         return np.stack(parts)
 
     def act(self, name: str, x: Any) -> Any:
+        """The activation function `name`, elementwise; any shape (...). `KeyError` for an unknown name."""
         return self.acts[name](x)
 
 

@@ -25,6 +25,7 @@ class FrameTrajectory:
 
     @property
     def last_good(self) -> float:
+        """Infinite: nothing is integrated, so nothing can fail."""
         return float("inf")
 
     def reduced(self, times: Floats) -> Floats:
@@ -33,4 +34,5 @@ class FrameTrajectory:
 
     @property
     def stats(self) -> SolveStats:
+        """The model's name and the time of its prediction; no steps, and no estimate of the error."""
         return SolveStats(self._name, 0, 0, 0, "ok", self._wall_ms, lambda: None)

@@ -31,6 +31,7 @@ class MomentaryPoints:
         self._x, self._theta = x, np.asarray(theta, dtype=np.float32)
 
     def stats(self) -> SolveStats:
+        """No solver: the network is evaluated at each time directly."""
         return SolveStats("none: a network of the time", 0, 0, 0, "ok", 0.0, lambda: None)
 
     def displacements(self, times: Times) -> Frames:
@@ -87,6 +88,7 @@ class FramedPoints:
         return self._frames
 
     def stats(self) -> SolveStats:
+        """Solver, steps and elapsed time, once all frames are computed; the solver error where it is known."""
         steps = len(self._computed(LATER)) - 1
         solver = f"{self.solver}, {1e3 / self._window.rate:.3g} ms, {self.between} between frames"
         return SolveStats(solver, steps, steps * self.stages, 0, "ok", self._wall_ms, self._error_mm)

@@ -36,6 +36,7 @@ class ModelConfig:
 
     @property
     def branches(self) -> tuple[str, ...]:
+        """Names of the branches, in the order of the latent state."""
         return ("rigid", "local") if self.rigid else ("local",)
 
     @property
@@ -45,6 +46,7 @@ class ModelConfig:
         return [slice(0, split), slice(split, None)] if self.rigid else [slice(0, None)]
 
     def latent(self, branch: str) -> int:
+        """Size of the latent state of a branch."""
         return self.rigid_latent if branch == "rigid" else self.local_latent
 
     def sizes(self, branch: str) -> dict[str, list[int]]:

@@ -57,7 +57,7 @@ def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, shares: Flo
 
 
 def make_encoder(weights: Arrays, config: ModelConfig) -> Encoder:
-    """The encoder of both branches."""
+    """The encoder of all branches: features (C,) of each branch and theta (P,) -> the state (L,) at time 0."""
     statistics = encoder_statistics(weights, config)
     heads = [read_layers(weights, f"{branch}_encoder.head", np.float64) for branch in config.branches]
 

@@ -111,6 +111,7 @@ class LatentTrajectory:
 
     @property
     def stats(self) -> SolveStats:
+        """Solver, steps and elapsed time; if the solver failed, where, and the fixed steps computed instead."""
         first, rest = self._solution, self._rest
         solver, status = _describe(self._quality), self._last.status.value
         steps, evaluations = first.steps, first.evaluations

@@ -132,10 +132,12 @@ class ODeformNet(nn.Module):
 
     @property
     def encoders(self) -> list[ShapeEncoder]:
+        """Shape encoders, in the order of `ModelConfig.branches`."""
         return ([self.rigid_encoder] if self.config.rigid else []) + [self.local_encoder]
 
     @property
     def decoders(self) -> list[Decoder]:
+        """Decoders, in the order of `ModelConfig.branches`."""
         return ([self.rigid_decoder] if self.config.rigid else []) + [self.local_decoder]
 
     def encode(self, shape: tuple[torch.Tensor, torch.Tensor], theta: torch.Tensor) -> torch.Tensor:

@@ -31,6 +31,7 @@ class Branch(NamedTuple):
 
     @property
     def weights(self) -> tuple[torch.Tensor, ...]:
+        """(w1, b1, w2, b2, w3, b3)."""
         return self[2:]
 
 
