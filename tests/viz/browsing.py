@@ -51,7 +51,7 @@ class Tab:
         self.row(label, "input").click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
-    def says(self, text: str, seconds: float = 15.0) -> bool:
+    def says(self, text: str, seconds: float = 60.0) -> bool:
         return until(lambda: self.page.get_by_text(re.compile(text)).count() > 0, seconds)
 
     def picture(self) -> np.ndarray:
@@ -70,12 +70,12 @@ class Tab:
             last = now
         return last
 
-    def changes(self, before: np.ndarray, seconds: float = 10.0) -> bool:
+    def changes(self, before: np.ndarray, seconds: float = 60.0) -> bool:
         """Whether the picture becomes another than before."""
         return until(lambda: (np.abs(self.picture() - before).max(axis=2) > 24).mean() > 1e-3, seconds)
 
 
-def until(holds: Callable[[], bool], seconds: float = 10.0) -> bool:
+def until(holds: Callable[[], bool], seconds: float = 60.0) -> bool:
     """Wait for what a click brings about, however busy the machine is."""
     end = time.monotonic() + seconds
     while not holds() and time.monotonic() < end:
@@ -94,7 +94,7 @@ def open_tab(*columns: Column) -> Iterator[Tab]:
             tab.page.on("pageerror", lambda error: tab.errors.append(str(error)))
             tab.page.goto(app.url)
             tab.page.wait_for_selector("canvas", timeout=60_000)
-            tab.page.get_by_text("mass (kg)").wait_for(timeout=30_000)
+            tab.page.get_by_text("mass (kg)").wait_for(timeout=60_000)
             yield tab
             browser.close()
     finally:

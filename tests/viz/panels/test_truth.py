@@ -119,7 +119,7 @@ def test_a_simulation_can_be_cancelled(kicked: View, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(truth, "simulate_motion", endless)
     app, client = kicked
     client.click("Simulate this")
-    assert client.until(lambda: app.panel(TruthPanel)._bar.value > 0.0, 30.0)
+    assert client.until(lambda: app.panel(TruthPanel)._bar.value > 0.0)
     job = app.panel(TruthPanel)._job
     assert job is not None
     app.panel(TruthPanel)._simulate()  # as from another tab: one at a time
@@ -133,7 +133,7 @@ def test_a_failing_simulation_says_why_until_the_next(kicked: View, monkeypatch:
     monkeypatch.setattr(truth, "simulate_motion", failing)
     app, client = kicked
     client.click("Simulate this")
-    assert client.until(lambda: "**The simulation failed**: the ball burst" in client.text(), 30.0)
+    assert client.until(lambda: "**The simulation failed**: the ball burst" in client.text())
     monkeypatch.setattr(truth, "simulate_motion", endless)
     client.click("Simulate this")
     assert client.until(lambda: "the ball burst" not in client.text())
@@ -146,7 +146,7 @@ def test_the_simulation_of_a_closed_tab_completes(kicked: View, monkeypatch: pyt
     with LoopbackClient(port) as other:
         other.click("Simulate this")
         assert client.until(lambda: client.controls["Cancel"].visible)
-    assert client.until(lambda: len(app.columns.all) == 2, 60.0)
+    assert client.until(lambda: len(app.columns.all) == 2)
     assert client.until(lambda: not client.controls["Cancel"].visible)
 
 
