@@ -2,7 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import get_blas_funcs
@@ -29,17 +31,15 @@ class Stages:
     """
 
     def __init__(self, tableau: Tableau, start: Any) -> None:
-        dtype = start.dtype
-        rows: tuple[Row, ...] = (*tableau.a[1:], *(() if tableau.fsal else (tableau.b,)))
-        nodes = [float(node) for node in (*tableau.c[1:], *(() if tableau.fsal else (1,)))]
-        self.evaluations = len(rows)
+        weights = _weights(tableau, start.dtype)
+        self.evaluations = len(weights.stages)
         """Evaluations of the field per step."""
-        self._slopes = np.empty((len(start), self.evaluations + 1), dtype, order="F")
-        self._product = gemv(dtype)
-        weighted = [self._weighted(rounded(row, dtype)) for row in rows]
-        self._stages = list(zip(range(1, len(rows) + 1), weighted, nodes, strict=True))
-        self._error = self._weighted(_error_weights(tableau, dtype))
-        self._middle = self._weighted(rounded(tableau.middle or (), dtype))
+        self._slopes = np.empty((len(start), self.evaluations + 1), start.dtype, order="F")
+        self._product = gemv(start.dtype)
+        stages = [self._weighted(row) for row in weights.stages]
+        self._stages = list(zip(range(1, len(stages) + 1), stages, weights.nodes, strict=True))
+        self._error = self._weighted(weights.error)
+        self._middle = self._weighted(weights.middle)
 
     def _weighted(self, weights: Floats) -> tuple[Floats, Floats]:
         """The slopes that weights belong to, and the weights."""
@@ -70,12 +70,30 @@ class Stages:
         return self._advanced(state, self._middle, step)
 
 
-def _error_weights(tableau: Tableau, dtype: np.dtype) -> Floats:
-    """(s,) b - embedded; each is rounded first, which step control has always been computed with."""
-    if tableau.embedded is None:
-        return np.empty(0, dtype)
-    wide = np.promote_types(dtype, np.float64)
-    return (rounded(tableau.b, wide) - rounded(tableau.embedded, wide)).astype(dtype)
+class _Weights(NamedTuple):
+    """A tableau in one precision."""
+
+    stages: list[Floats]
+    nodes: list[float]
+    error: Floats
+    middle: Floats
+
+
+@cache  # rounding fractions takes longer than a few steps
+def _weights(tableau: Tableau, dtype: np.dtype) -> _Weights:
+    last: tuple[Row, ...] = () if tableau.fsal else (tableau.b,)
+    nodes = (*tableau.c[1:], *(Fraction(1) for _ in last))
+    error = np.empty(0, dtype)
+    if tableau.embedded is not None:
+        # both are rounded before they are subtracted, which step control has always been computed with
+        wide = np.promote_types(dtype, np.float64)
+        error = (rounded(tableau.b, wide) - rounded(tableau.embedded, wide)).astype(dtype)
+    return _Weights(
+        [rounded(row, dtype) for row in (*tableau.a[1:], *last)],
+        [float(node) for node in nodes],
+        error,
+        rounded(tableau.middle or (), dtype),
+    )
 
 
 @dataclass(frozen=True)

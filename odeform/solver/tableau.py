@@ -12,9 +12,9 @@ __all__ = ["BOSH3", "DOPRI5", "EULER", "MIDPOINT", "RK4", "Row", "Tableau", "rou
 Row = tuple[Fraction, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tableau:
-    """Coefficients of a method with s stages."""
+    """Coefficients of a method with s stages. Compared by identity, so that it is a cheap key."""
 
     name: str
     order: int
