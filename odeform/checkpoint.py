@@ -46,7 +46,10 @@ class Checkpoint:
 
 
 def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint atomically: `path` holds either the old file or the whole new one."""
+    """Write a checkpoint atomically: `path` holds either the old file or the whole new one.
+
+    All but the arrays are plain JSON values; numpy scalars become such.
+    """
     meta = {
         "format": FORMAT,
         "model": checkpoint.model,
@@ -55,9 +58,16 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
         "provenance": checkpoint.provenance,
         "scores": checkpoint.scores,
     }
-    metadata = {"odeform": json.dumps(meta)}  # one key: safetensors writes several in no fixed order
+    metadata = {"odeform": json.dumps(meta, default=_plain)}  # one key: safetensors writes several in no fixed order
     data = save({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}, metadata)
     atomic_write(Path(path), data)
+
+
+def _plain(value: Any) -> Any:
+    """A numpy scalar as JSON holds it."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"checkpoint: expected plain JSON values besides the arrays, got {type(value).__name__}")
 
 
 def checkpoint_bytes(path: Path) -> bytes:

@@ -53,6 +53,9 @@ class Parameter:
         description: One line for people.
         shape: Of its value; () for a number.
 
+    Raises:
+        InputError: `low` is not below `high`, `default` is outside of them, or `low` is not positive for scale "log".
+
     Examples:
         >>> import odeform
         >>> mass = odeform.load("kick").schema.parameters[0]
@@ -75,6 +78,16 @@ class Parameter:
     description: str = ""
     shape: tuple[int, ...] = ()
     """Always () for a number; vectors are three parameters NAME_x, NAME_y and NAME_z."""
+
+    def __post_init__(self) -> None:
+        if not -math.inf < self.low < self.high < math.inf:
+            raise InputError(f"parameter {self.name}: expected finite low < high, got {self.low:g} and {self.high:g}")
+        if not self.inside(self.default):
+            raise InputError(
+                f"parameter {self.name}: expected a default from {self.low:g} to {self.high:g}, got {self.default:g}"
+            )
+        if self.scale == "log" and self.low <= 0.0:
+            raise InputError(f"parameter {self.name}: expected a positive low for scale 'log', got {self.low:g}")
 
     def normalise(self, value: float) -> float:
         """Map a value in `unit` so that the trained range becomes [-1, 1]; values outside map outside."""

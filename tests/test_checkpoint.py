@@ -171,6 +171,14 @@ def test_a_network_with_a_gap_is_refused(trained: dict[str, Path], tmp_path: Pat
         load(tmp_path / "gap.safetensors")
 
 
+def test_numpy_scalars_become_plain_values(tmp_path: Path) -> None:
+    path, settings = tmp_path / "a.safetensors", {"ridge": np.float32(0.5), "counts": [np.int64(3)], "used": np.True_}
+    write_checkpoint(path, replace(small(), config=settings))
+    assert read_checkpoint(path).config == {"ridge": 0.5, "counts": [3], "used": True}
+    with pytest.raises(TypeError, match="plain JSON values besides the arrays, got ndarray"):
+        write_checkpoint(path, replace(small(), config={"ridge": np.ones(2)}))
+
+
 def test_the_same_content_is_the_same_file(trained: dict[str, Path], tmp_path: Path) -> None:
     for name in ("one", "two"):
         write_checkpoint(tmp_path / name, read_checkpoint(trained["pod-rbf"]))

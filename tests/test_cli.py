@@ -9,6 +9,8 @@ import trimesh
 
 from odeform.cli import main, run_guarded
 from odeform.cli.entry import COMMANDS
+from odeform.cli.evaluate import COLUMNS
+from odeform.cli.evaluate import _table as scores_table
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.formats.reading import read_geometry
@@ -125,6 +127,17 @@ def test_evaluate(
     for model, scores in result["models"].items():
         said = load(trained[model]).checkpoint.scores
         assert scores["rmse_pooled_mm"] == pytest.approx(said["rmse_pooled_mm"], rel=1e-6)
+
+
+def test_evaluate_on_another_scene_says_only_that(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("evaluate", "mass-elastic/nearest", "--data", "kick") != 0
+    assert capsys.readouterr().err.splitlines() == ["error: nearest was trained on scene mass-elastic, not kick"]
+
+
+def test_a_dash_in_the_scores_is_explained() -> None:
+    scores = dict.fromkeys(COLUMNS, 1.0)
+    assert scores_table({"odeform": scores}).splitlines()[-1].startswith("odeform")
+    assert scores_table({"odeform": {**scores, COLUMNS[-1]: None}}).splitlines()[-1] == "-: not measured"
 
 
 def test_train(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
-from odeform.schema import Schema, Window, soft_clip
+from odeform.schema import Parameter, Schema, Window, soft_clip
 from odeform.simulation.scenes.registry import get_scene
 
 SCHEMA = get_scene("kick").schema
@@ -86,6 +86,21 @@ def test_clocks_stop_after_the_trained_window() -> None:
 def test_impossible_parameters(given: dict) -> None:
     with pytest.raises(InputError, match=next(iter(given))):
         SCHEMA.complete(given)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "default", "scale", "reason"),
+    [
+        (1.0, 0.5, 0.7, "linear", "low < high"),
+        (1.0, 1.0, 1.0, "linear", "low < high"),
+        (math.nan, 1.0, 0.5, "linear", "low < high"),
+        (0.5, 1.0, 2.0, "linear", "default from 0.5 to 1, got 2"),
+        (0.0, 1.0, 0.5, "log", "positive low"),
+    ],
+)
+def test_impossible_ranges(low: float, high: float, default: float, scale: str, reason: str) -> None:
+    with pytest.raises(InputError, match=f"parameter mass: .*{reason}"):
+        Parameter("mass", "kg", low, high, default, scale)
 
 
 @pytest.mark.parametrize("reach", [1.0, 3.0])

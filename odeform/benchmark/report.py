@@ -15,6 +15,8 @@ def report(result: Mapping[str, Any]) -> str:
     ]
     for part in (_latency, _solver, _speed, _comparisons):
         lines += part(result)
+    if any("-" in line.split() for line in lines):
+        lines += ["", "-: not measured"]
     return "\n".join(lines)
 
 

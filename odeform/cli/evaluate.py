@@ -32,13 +32,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
-    from odeform.evaluation.metrics import evaluate
+    from odeform.evaluation.metrics import check_scene, evaluate
     from odeform.models.registry import load
 
     dataset, window = open_dataset(args.data), parse_window(args.window)
     models: dict[str, dict[str, Any]] = {}
     for name in args.checkpoints:
         predictor = load(name)
+        check_scene(predictor, dataset)
         fixed = predictor.checkpoint.provenance.get("fixed")
         if fixed is not None and fixed != dataset.fixed:
             print(f"note: {name} was trained with {fixed}, the data set has {dataset.fixed}", file=sys.stderr)
@@ -54,4 +55,6 @@ def _table(models: dict[str, dict[str, Any]]) -> str:
     for key, scores in rows.items():
         cells = ("-" if scores[column] is None else f"{scores[column]:.4g}" for column in COLUMNS)
         lines.append(f"{key:<24}" + "".join(f"{cell:>22}" for cell in cells))
+    if any(scores[column] is None for scores in rows.values() for column in COLUMNS):
+        lines.append("-: not measured")
     return "\n".join(lines)

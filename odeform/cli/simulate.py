@@ -33,5 +33,7 @@ def run(args: argparse.Namespace) -> None:
     from odeform.simulation.runner import simulate
 
     dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, args.rate, corners=args.corners)
-    failed = [entry.name for entry in dataset.entries if entry.status != "ok"]
-    print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {', '.join(failed) or 'none'}")
+    failed = [entry for entry in dataset.entries if entry.status != "ok"]
+    print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {len(failed) or 'none'}")
+    for entry in failed:
+        print(f"{entry.name} failed: {entry.status}")

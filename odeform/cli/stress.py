@@ -14,7 +14,7 @@ HELP = "Run a model far outside its trained range and check what it returns"
 def add_options(parser: argparse.ArgumentParser) -> None:
     add_checkpoint(parser, default="kick")
     parser.add_argument(
-        "--cases", type=int, default=20_000, metavar="N", help="least number of distinct cases (default: 20000)"
+        "--cases", type=int, default=20_000, metavar="N", help="minimum number of distinct cases (default: 20000)"
     )
     parser.add_argument(
         "--map", metavar="FILE.png", help="also write a picture of where it is stable, over two parameters and time"

@@ -15,7 +15,14 @@ from odeform.schema import Schema, Window
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, MotionSequence
 
-__all__ = ["evaluate"]
+__all__ = ["check_scene", "evaluate"]
+
+
+def check_scene(predictor: Predictor, dataset: Dataset) -> None:
+    """`InputError` for a model that was trained on another scene than that of the data."""
+    trained, scene = predictor.schema.scene, dataset.schema.scene
+    if trained != scene:
+        raise InputError(f"{predictor.model} was trained on scene {trained}, not {scene}")
 
 
 def evaluate(
@@ -52,8 +59,7 @@ def evaluate(
         (50, True)
     """
     schema = dataset.schema
-    if predictor.schema.scene != schema.scene:
-        raise InputError(f"{predictor.model} was trained on scene {predictor.schema.scene}, not {schema.scene}")
+    check_scene(predictor, dataset)
     behind = not predictor.extrapolates and predictor.schema.window.start > schema.window.stop
     clock = predictor.schema.window.start if behind else 0.0
     spans = _spans(predictor, schema, window, clock)

@@ -1,10 +1,12 @@
 """Many motions of one scene: in parallel, resumable, with the same data for any number of workers."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+
+import numpy as np
 
 from odeform.dataset.folder import INDEX, folder_reader, open_folder, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry, assign_splits
@@ -20,6 +22,7 @@ __all__ = ["simulate"]
 
 
 TEST_RATE = 4  # factor on the frame rate of test sequences, to score between the trained frames
+TIME_SLACK, WEIGHT_SLACK = 1e-3, 1e-4  # of a frame; of the sum of float32 weights
 
 
 def _one(entry: Entry, simulate: Callable[..., MotionSequence], root: Path, rate: float, step: float) -> Entry:
@@ -28,7 +31,30 @@ def _one(entry: Entry, simulate: Callable[..., MotionSequence], root: Path, rate
         sequence = simulate(entry.parameters, rate=rate, step=step)
     except SimulationError as error:
         return replace(entry, status=str(error))
-    return replace(entry, sha256=save_sequence(root, entry.name, sequence))
+    fault = next(_faults(sequence, rate), None)
+    return replace(entry, status=fault) if fault else replace(entry, sha256=save_sequence(root, entry.name, sequence))
+
+
+def _faults(sequence: MotionSequence, rate: float) -> Iterator[str]:
+    """What is wrong with a sequence simulated at `rate` Hz. Each check assumes that those before it passed."""
+    times, vertices, faces, weights = sequence.times, sequence.vertices, sequence.faces, sequence.weights
+    if times.ndim != 1 or len(times) < 2:
+        yield f"times: expected (T,) with at least 2 frames, got shape {times.shape}"
+    elif not np.allclose(times, np.arange(len(times)) / rate, rtol=0.0, atol=TIME_SLACK / rate):
+        yield f"times: expected 0, 1, 2, ... / {rate:g} Hz, got {times[0]:g}, {times[1]:g}, ..., {times[-1]:g} s"
+    if vertices.ndim != 3 or len(vertices) != len(times) or vertices.shape[2] != 3:
+        yield f"vertices: expected shape (T, N, 3) with {len(times)} frames, got {vertices.shape}"
+    if not (finite := np.isfinite(vertices)).all():
+        yield f"vertices: not finite in {(~finite).any(axis=(1, 2)).sum()} of {len(times)} frames"
+    count = vertices.shape[1]
+    if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+        yield f"faces: expected integers of shape (F, 3), got {faces.dtype} of shape {faces.shape}"
+    if faces.size and not 0 <= faces.min() <= faces.max() < count:
+        yield f"faces: expected indices of {count} vertices, got {faces.min()} to {faces.max()}"
+    if weights.shape != (count,):
+        yield f"weights: expected shape ({count},), one per vertex, got {weights.shape}"
+    if not (weights >= 0.0).all() or abs(weights.sum() - 1.0) > WEIGHT_SLACK:
+        yield f"weights: expected no negative ones and a sum of 1, got {weights.min():g} or more, sum {weights.sum():g}"
 
 
 def _finished(root: Path, plan: list[Entry], new: Dataset) -> dict[str, Entry]:

@@ -20,7 +20,7 @@ from odeform.io import atomic_write
 from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters
 from odeform.simulation.scene import Scene
-from odeform.simulation.scenes.registry import get_scene
+from odeform.simulation.scenes.registry import SCENES, get_scene
 from odeform.types import MotionSequence
 
 __all__ = ["main", "study"]
@@ -90,14 +90,18 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
 def main() -> None:
     """Run the study from the command line."""
     parser = argparse.ArgumentParser(prog="python -m odeform.simulation.study", description=__doc__)
-    parser.add_argument("scene")
-    parser.add_argument("--count", type=int, default=10, metavar="N")
-    parser.add_argument("--seed", type=int, default=0, metavar="S")
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W")
-    parser.add_argument("--json", metavar="FILE")
+    cores = os.cpu_count() or 1
+    parser.add_argument("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
+    parser.add_argument("--count", type=int, default=10, metavar="N", help="number of sequences (default: 10)")
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="random seed of the parameters (default: 0)")
+    parser.add_argument(
+        "--workers", type=int, default=cores, metavar="W", help=f"number of processes (default: {cores}, one per core)"
+    )
+    parser.add_argument("--json", metavar="FILE", help="write the result to this file instead of printing it")
     args = parser.parse_args()
-    if args.count < 1:
-        parser.error("expected at least one sequence")
+    for option in ("count", "workers"):
+        if (value := getattr(args, option)) < 1:
+            parser.error(f"--{option}: expected at least 1, got {value}")
     try:
         text = json.dumps(study(args.scene, args.count, args.seed, args.workers), indent=1)
     except InputError as error:

@@ -84,12 +84,14 @@ def map_image(plot: StabilityMap) -> Image.Image:
         reach = plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0])
         low, high = (0.5 * side * (1.0 + end / reach) for end in (-1.0, 1.0))
         case.rectangle((left + low, GAP + low, left + high, GAP + high), outline=(0, 0, 0))
-        case.text((left, 6), f"{time:.3g} s = {time / plot.window:g} windows", fill=(0, 0, 0))
+        windows = time / plot.window
+        caption = f"{time:.3g} s ({windows:g} trained window{'' if windows == 1.0 else 's'})"
+        case.text((left, 6), caption, fill=(0, 0, 0))
         case.text((left, side + GAP + 4), f"x: {plot.names[0]}, y: {plot.names[1]}", fill=(0, 0, 0))
     text = (
         "RMS deformation over the largest trained: 0 (pale), 1 (orange), 2 or more (dark red). Frame: the trained box"
     )
-    case.text((GAP, side + 2 * GAP), f"{text}; the edge is {plot.units[-1]:g} times as far", fill=(0, 0, 0))
+    case.text((GAP, side + 2 * GAP), f"{text}; map spans {plot.units[-1]:g}x the trained range", fill=(0, 0, 0))
     return image
 
 

@@ -42,9 +42,11 @@ class Run:
         """The data set in reduced coordinates, with the frames that the request asks for; reports its size."""
         request = self.request
         data = prepare(self.dataset, None, FrameSubsampling(request.window, request.every, request.stagger))
+        modes = data.space.basis.modes
         self.report(
             f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
-            f"{data.space.basis.modes} modes leave {data.truncation_mm['val']:.3f} mm of the deformation (val)"
+            f"{modes} POD mode{'s' if modes > 1 else ''}; "
+            f"the rest of the deformation is {data.truncation_mm['val']:.3f} mm RMS on validation"
         )
         return data
 

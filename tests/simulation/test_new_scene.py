@@ -76,6 +76,12 @@ def test_an_unknown_scene_is_an_error_that_names_the_known_ones() -> None:
         get_scene("throw")
 
 
+def test_a_scene_of_another_name_than_its_own_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SCENES, "glide", f"{__name__}:SCENE")
+    with pytest.raises(InputError, match="scene 'glide': expected the same name in its schema, got 'slide'"):
+        find_scene("glide")
+
+
 @pytest.mark.usefixtures("toy")
 def test_a_new_scene_makes_a_data_set(tmp_path: Path) -> None:
     made = simulate("slide", tmp_path, count=8, seed=1)

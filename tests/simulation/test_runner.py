@@ -2,10 +2,13 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import jaxtyping
 import numpy as np
 import pytest
 
+from odeform.cli import main
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
@@ -94,6 +97,38 @@ def test_what_failed_is_listed_and_left_alone(tmp_path: Path, monkeypatch: pytes
     assert sorted(path.name for path in tmp_path.glob("*.npz")) == ["kick_00000.npz", "kick_00002.npz"]
     assert simulate("kick", tmp_path, count=3) == made
     assert len(tried) == 3
+
+
+def test_output_that_is_not_a_motion_fails_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nan = np.full((3, 4, 3), np.nan)
+    defects = {
+        "times: expected 0, 1, 2": {"times": np.array([0.0, 0.1, 0.1])},
+        "times: expected (T,)": {"times": np.zeros(1), "vertices": np.zeros((1, 4, 3))},
+        "vertices: expected shape": {"vertices": np.zeros((2, 4, 3))},
+        "vertices: not finite in 3 of 3": {"vertices": nan},
+        "faces: expected integers": {"faces": np.zeros((1, 4), int)},
+        "faces: expected indices of 4 vertices, got 0 to 4": {"faces": np.array([[0, 1, 4]])},
+        "weights: expected shape (4,)": {"weights": np.full(5, 0.2)},
+        "weights: expected no negative": {"weights": np.full(4, 1.0)},
+        "weights: expected no negative ones": {"weights": np.array([1.5, -0.5, 0.0, 0.0])},
+    }
+    left = list(defects.values())
+
+    def faulty(parameters: Parameters, rate: float, step: float) -> SimpleNamespace:
+        sound = {"times": np.arange(3) / rate, "vertices": np.zeros((3, 4, 3)), "faces": np.array([[0, 1, 2]])}
+        return SimpleNamespace(**{**sound, "weights": np.full(4, 0.25), **left.pop(0)})
+
+    monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=faulty))
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)  # as outside of tests
+    assert main(["simulate", "kick", "--out", str(tmp_path), "--count", str(len(defects)), "--workers", "1"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == f"0 sequences in {tmp_path}; failed: {len(defects)}"
+    for entry, reason, line in zip(open_dataset(tmp_path).entries, defects, said[1:], strict=True):
+        assert entry.status.startswith(reason)
+        assert line == f"{entry.name} failed: {entry.status}"
+    assert not list(tmp_path.glob("*.npz"))
 
 
 def test_refuses_a_folder_with_another_data_set(dataset: Dataset) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from odeform.simulation.measurements import contacts, rebound
-from odeform.simulation.study import RATE, _condition, _rmse
+from odeform.simulation.study import RATE, _condition, _rmse, main
 from odeform.types import Floats, MotionSequence
 
 
@@ -18,6 +18,14 @@ def bobbing(*heights: float, weights: tuple[float, ...] = (0.5, 0.5), above: flo
 def moved(vertices: Floats) -> MotionSequence:
     count = vertices.shape[1]
     return MotionSequence(np.arange(len(vertices)) / RATE, vertices, np.array([[0, 0, 0]]), np.full(count, 1.0 / count))
+
+
+def test_a_command_that_cannot_be_run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    for option in ("--count", "--workers"):
+        monkeypatch.setattr("sys.argv", ["study", "kick", option, "0"])
+        with pytest.raises(SystemExit):
+            main()
+        assert f"{option}: expected at least 1, got 0" in capsys.readouterr().err
 
 
 def test_contacts_are_those_of_the_lowest_vertex() -> None:

@@ -20,11 +20,17 @@ def known_scenes() -> tuple[str, ...]:
 
 
 def find_scene(name: str) -> Scene | None:
-    """The scene of that name, or None. Imported data may belong to a scene that cannot be simulated."""
+    """The scene of that name, or None: imported data may belong to a scene that cannot be simulated.
+
+    Raises `InputError` for a scene whose schema has another name than the registry.
+    """
     if name not in SCENES:
         return None
     module, attribute = SCENES[name].split(":")
-    return getattr(import_module(module), attribute)
+    scene: Scene = getattr(import_module(module), attribute)
+    if scene.schema.scene != name:
+        raise InputError(f"scene {name!r}: expected the same name in its schema, got {scene.schema.scene!r}")
+    return scene
 
 
 def get_scene(name: str) -> Scene:

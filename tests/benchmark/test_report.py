@@ -1,0 +1,18 @@
+from odeform.benchmark.report import report
+
+
+def test_a_dash_is_explained() -> None:
+    result = {
+        "model": "nearest",
+        "scene": "kick",
+        "data": None,
+        "machine": {"cores": 2, "processor": "x", "load": 0.5},
+        "latency": {"points": 10},
+        "knobs": [],
+        "limits": {},
+        "startup": {"import_s": 1.0},
+        "scaling": [],
+        "peers": {},
+    }
+    assert "not measured" not in report(result)
+    assert report({**result, "startup": {"import_s": None}}).splitlines()[-1] == "-: not measured"
