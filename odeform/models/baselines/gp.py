@@ -74,12 +74,9 @@ class GaussianProcess(FittedModel):
         limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
         found = [minimize(error, start, method="Nelder-Mead", bounds=bounds, options=limits) for start in starts]
         best = min(found, key=lambda trial: trial.fun)
-        trials = [
-            {"length_scales": np.exp(t.x[:-1]).tolist(), "ridge": float(np.exp(t.x[-1])), "val": t.fun} for t in found
-        ]
         arrays = {"times": data.times, "theta": train, "gp.weights": weights(best.x), **pod.arrays()}
-        settings = {"length_scales": np.exp(best.x[:-1]).tolist(), "ridge": float(np.exp(best.x[-1]))}
-        return arrays, {**settings, "modes": len(pod.modes), "trials": trials}
+        trials = [{**_named(trial.x), "val": trial.fun} for trial in found]
+        return arrays, {**_named(best.x), "modes": len(pod.modes), "trials": trials}
 
     def _trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -92,5 +89,5 @@ class GaussianProcess(FittedModel):
 
 
 def _named(settings: Floats) -> dict[str, Any]:
-    """Logarithms of length scales and ridge, as a checkpoint holds them."""
+    """Length scales and ridge from their logarithms, as a checkpoint holds them."""
     return {"length_scales": np.exp(settings[:-1]).tolist(), "ridge": float(np.exp(settings[-1]))}
