@@ -100,6 +100,7 @@ class ParameterPanel(Panel):
             self._preset = self._gui.add_dropdown(
                 "preset", (NO_PRESET, *self._presets), hint="corners of the trained range"
             )
+            self._handled_preset = self._preset.value
             self._preset.on_update(self._choose)
             reset = self._gui.add_button_group("reset", ("all", *(p.name for p in self._schema.parameters)))
             reset.on_click(self._reset)
@@ -149,7 +150,8 @@ class ParameterPanel(Panel):
         return {name: slider.value for name, slider in self._sliders.items()}
 
     async def _choose(self, event: viser.GuiEvent) -> None:
-        # a coroutine runs at once where the message arrives, before a drag that follows it
+        # a coroutine runs soon where the message arrives, before a drag that follows it
+        self._handled_preset = self._preset.value
         if event.client_id is not None and self._preset.value in self._presets:
             self.set(self._presets[self._preset.value])
         else:
@@ -169,7 +171,9 @@ class ParameterPanel(Panel):
             set_content(strip, samples_svg(parameter, self._samples.get(name), values[name]))
 
     def _refresh_preset(self) -> None:
+        if self._preset.value != self._handled_preset:
+            return  # a choice has arrived, and its callback has yet to read it
         values = self._values()
         preset = next((name for name, preset in self._presets.items() if preset == values), NO_PRESET)
         if self._preset.value != preset:
-            self._preset.value = preset
+            self._preset.value = self._handled_preset = preset
