@@ -10,13 +10,15 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from odeform.budget import read_limited
 from odeform.errors import InputError
-from odeform.io import atomic_write, bundled, safetensors_metadata
+from odeform.io import atomic_write, bundled, parse_json, safetensors_metadata
 from odeform.schema import Schema
 from odeform.types import Arrays
 
 __all__ = [
     "Checkpoint",
+    "arrays_of_object",
     "bundled_checkpoints",
     "checkpoint_bytes",
     "read_checkpoint",
@@ -25,7 +27,7 @@ __all__ = [
 ]
 
 FORMAT = 1
-LIMIT = 1 << 30  # bytes; no checkpoint is larger
+LIMIT = 1 << 29  # bytes; no checkpoint is larger
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,12 @@ class Checkpoint:
     scores: dict[str, Any] = field(default_factory=dict)
     sha256: str = ""
     size_bytes: int = 0
+
+
+def arrays_of_object(arrays: Arrays, name: str) -> Arrays:
+    """Those that belong to one object of a scene with several, without its name: they are stored as OBJECT/ARRAY."""
+    prefix = f"{name}/"
+    return {key.removeprefix(prefix): array for key, array in arrays.items() if key.startswith(prefix)}
 
 
 def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
@@ -73,9 +81,7 @@ def _plain(value: Any) -> Any:
 def checkpoint_bytes(path: Path) -> bytes:
     """The content of the file; `InputError` where it cannot be read or is too large for a checkpoint."""
     try:
-        if path.stat().st_size > LIMIT:
-            raise InputError(f"{path}: expected a checkpoint of at most {LIMIT >> 20} MiB")
-        return path.read_bytes()
+        return read_limited(path, f"checkpoint {path}", LIMIT)
     except OSError as error:
         raise InputError(f"checkpoint {path}: {error.strerror}") from None
 
@@ -87,21 +93,24 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     try:
         arrays = load(data)
         metadata = safetensors_metadata(data)
-    except (SafetensorError, KeyError, ValueError):
+    except (SafetensorError, KeyError, ValueError, TypeError, AttributeError):
         raise InputError(f"checkpoint {path}: not a safetensors file, or truncated") from None
     if "odeform" not in metadata:
         raise InputError(f"checkpoint {path}: expected an ODeform checkpoint, got another safetensors file")
+    broken = [n for n, a in arrays.items() if a.dtype.kind == "f" and not np.isfinite(a).all()]
+    if broken:
+        raise InputError(f"checkpoint {path}: {broken[0]} contains numbers that are not finite")
     try:
-        meta = json.loads(metadata["odeform"])
+        meta = parse_json(metadata["odeform"], f"checkpoint {path}: metadata")
         if meta["format"] != FORMAT:
             raise InputError(f"checkpoint {path}: expected format {FORMAT}, got {meta['format']!r}")
         return Checkpoint(
-            model=meta["model"],
+            model=str(meta["model"]),
             schema=Schema.from_json(meta["schema"]),
-            config=meta["config"],
+            config=dict(meta["config"]),
             arrays=arrays,
-            provenance=meta["provenance"],
-            scores=meta["scores"],
+            provenance=dict(meta["provenance"]),
+            scores=dict(meta["scores"]),
             sha256=hashlib.sha256(data).hexdigest(),
             size_bytes=len(data),
         )

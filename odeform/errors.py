@@ -1,6 +1,8 @@
-"""The error for faulty input."""
+"""The errors that commands turn into exit codes."""
 
-__all__ = ["InputError"]
+__all__ = ["FailedCheck", "InputError", "one_line"]
+
+WORD, LINE = 300, 1000  # characters
 
 
 class InputError(ValueError):
@@ -16,3 +18,21 @@ class InputError(ValueError):
         ...     print(error)
         mass: expected a positive number in kg, got -1
     """
+
+    def __init__(self, message: object = "") -> None:
+        """The message is printed as it is given, up to `one_line`."""
+        super().__init__(one_line(message))
+
+
+def one_line(text: object) -> str:
+    """A text in one line without control characters; the middle of a very long word, and of the whole, is left out."""
+    words = [_shortened("".join(filter(str.isprintable, word)), WORD) for word in str(text).split()]
+    return _shortened(" ".join(words), LINE)
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: most - 60]}…{text[-59:]}"
+
+
+class FailedCheck(Exception):
+    """The work was done and its result printed, but a measured figure misses its bound. Commands exit with code 1."""

@@ -1,9 +1,16 @@
-"""Independent work in parallel, on joblib: processes by default, or any backend that the caller selects.
+"""Independent work in parallel: in processes of this machine, by joblib, or in another engine.
 
-`with joblib.parallel_config(backend="dask")` around a call sends its work to a cluster.
+`odeform.cluster` is an engine that sends the work to several machines.
 """
 
+import os
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cache
 from typing import Any, TypeVar
 
 from joblib import Parallel, cpu_count, delayed
@@ -11,10 +18,33 @@ from threadpoolctl import threadpool_limits
 
 from odeform.progress import Progress
 
-__all__ = ["as_completed", "parallel_map"]
+__all__ = ["Engine", "as_completed", "parallel_map", "use_engine", "workers_lost"]
+
+WATCH = 1.0  # s
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+Engine = Callable[[Callable[[Any], Any], Sequence[Any], int], Iterator[tuple[int, Any]]]
+"""(function, items, batch size) -> what `as_completed` yields."""
+
+_engine: ContextVar[Engine | None] = ContextVar("odeform_engine", default=None)
+
+
+@contextmanager
+def use_engine(engine: Engine) -> Iterator[None]:
+    """Meanwhile `engine` does all parallel work of this context, whatever number of workers is asked for."""
+    token = _engine.set(engine)
+    try:
+        yield
+    finally:
+        _engine.reset(token)
+
+
+def workers_lost(error: BaseException) -> ChildProcessError:
+    """The error of work that cannot be completed, because of `error`."""
+    reason = f"{type(error).__name__}: {error}"
+    return ChildProcessError(f"a worker or the connection to it was lost; finished work is kept ({reason})")
 
 
 def as_completed(
@@ -24,10 +54,17 @@ def as_completed(
 
     `workers` processes (default: one a core) run `function`, which must be importable, with one BLAS thread each:
     several on one core wait for each other. A worker takes `batch_size` items at a time. With one worker everything
-    runs in this process, in order. What `function` raises is raised here.
+    runs in this process, in order. What `function` raises is raised here. Another backend of joblib may be chosen if
+    its workers are threads or children of this process.
+
+    Raises:
+        ChildProcessError: A worker process ended, or several in turn on the same item of a cluster.
     """
     batches = -(-len(items) // batch_size)
     if not batches:
+        return
+    if engine := _engine.get():
+        yield from engine(function, items, batch_size)
         return
     options: Any = {"batch_size": batch_size}  # its stub declares the default's type, a string
     jobs: Any = Parallel(
@@ -37,8 +74,12 @@ def as_completed(
         **options,
     )
     # here for backends that run in this process, in `_numbered` for all others
-    with threadpool_limits(1, "blas"):
-        yield from jobs(delayed(_numbered)(function, index, item) for index, item in enumerate(items))
+    parent = os.getpid()
+    try:
+        with threadpool_limits(1, "blas"):
+            yield from jobs(delayed(_numbered)(function, index, item, parent) for index, item in enumerate(items))
+    except BrokenExecutor as error:
+        raise workers_lost(error) from None
 
 
 def parallel_map(
@@ -57,7 +98,21 @@ def parallel_map(
     return [results[index] for index in range(len(items))]
 
 
-def _numbered(function: Callable[[Item], Result], index: int, item: Item) -> tuple[int, Result]:
+def _numbered(function: Callable[[Item], Result], index: int, item: Item, parent: int) -> tuple[int, Result]:
+    if os.getpid() != parent:
+        _end_with_parent(parent)
     # a worker process keeps its limit: restored by one of several threads, it would end early for the others
     threadpool_limits(1, "blas")
     return index, function(item)
+
+
+@cache
+def _end_with_parent(parent: int) -> None:
+    """End this worker soon after the process that started it is gone, killed for instance, perhaps already."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="odeform-parent", daemon=True).start()

@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["LATER", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
+__all__ = ["LATER", "OBJECT", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
 
-Parameters = Mapping[str, float]
-"""Name -> value in the unit of its parameter."""
+Parameters = Mapping[str, Any]
+"""Name -> value in the unit of its parameter, and "object" -> the name of a body, in a scene with several."""
+
+OBJECT = "object"
+"""Name of the parameter that selects one of `Schema.objects`. It is a string, and no `Parameter`."""
 
 BEYOND = 0.15
 """How far inputs may exceed a trained range, in half ranges. The deformations of the bundled models then stay within a
@@ -23,6 +26,7 @@ fifth above the largest in training; at 0.25, one in a hundred is several times 
 LATER = 0.05
 """How far a model's clock may exceed the trained window and its reach, in windows. A ball at rest then stays so; at
 twice that, some motions of the bundled models deform several times as much as ever before, at ten times that, all."""
+MOST_FRAMES = 1_000_000
 REACH = 0.5
 """Windows beyond the trained one over which models that extrapolate keep their clock running."""
 
@@ -89,6 +93,11 @@ class Parameter:
         if self.scale == "log" and self.low <= 0.0:
             raise InputError(f"parameter {self.name}: expected a positive low for scale 'log', got {self.low:g}")
 
+    @property
+    def label(self) -> str:
+        """The name, with the unit if there is one."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
     def normalise(self, value: float) -> float:
         """Map a value in `unit` so that the trained range becomes [-1, 1]; values outside map outside."""
         if self.scale == "log":
@@ -106,7 +115,7 @@ class Parameter:
     def inside(self, value: float) -> bool:
         """Whether a value lies in the trained range, up to rounding."""
         slack = 1e-6 * (self.high - self.low)
-        return self.low - slack <= value <= self.high + slack
+        return bool(self.low - slack <= value <= self.high + slack)
 
     def check(self, value: Any) -> float:
         """The value as a float, in `unit`. Values outside the trained range are accepted.
@@ -146,6 +155,13 @@ class Window:
     reach: float = 0.0
     """Windows beyond the trained one over which a model extrapolates with its clock running."""
 
+    def __post_init__(self) -> None:
+        span = self.stop - self.start
+        if not (math.isfinite(self.start) and 0.0 < span < math.inf and 0.0 < self.rate < math.inf):
+            raise InputError(f"window: expected start < stop and a rate above 0, got {self}")
+        if not 0.0 <= self.reach < math.inf or span * self.rate > MOST_FRAMES:
+            raise InputError(f"window: expected at most {MOST_FRAMES:,} frames, and a reach of 0 or more, got {self}")
+
     @property
     def times(self) -> NDArray[np.float64]:
         """(T,) frame times in seconds, both ends included."""
@@ -169,6 +185,7 @@ class Schema:
         needs_observations: True for models that interpolate between given frames.
         notes: Remarks for people.
         impact: Half-open span of time in seconds that is also scored separately: free flight and rest dilute scores.
+        objects: Names of the bodies of a scene with several. The parameter "object" selects one, by default the first.
 
     Examples:
         >>> import odeform
@@ -187,25 +204,38 @@ class Schema:
     needs_observations: bool = False
     notes: tuple[str, ...] = ()
     impact: tuple[float, float] | None = None
+    objects: tuple[str, ...] = ()
 
     @property
     def learned(self) -> tuple[Parameter, ...]:
         """The P parameters that a model learns: all except the azimuth of a symmetric scene."""
         return tuple(p for p in self.parameters if p.role != "azimuth")
 
+    @property
+    def names(self) -> list[str]:
+        """Names of all parameters in order, with "object" first in a scene with objects."""
+        return [OBJECT] * bool(self.objects) + [p.name for p in self.parameters]
+
     def azimuth(self, parameters: Parameters) -> float:
         """The azimuth in radians; 0 for a scene without one."""
         return next((parameters[p.name] for p in self.parameters if p.role == "azimuth"), 0.0)
 
-    def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, float]:
+    def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """All parameters, checked, in the order of the schema, with defaults for those not given.
 
-        Three parameters NAME_x, NAME_y and NAME_z may be given as one vector NAME: three numbers, or "X,Y,Z".
+        Three parameters NAME_x, NAME_y and NAME_z may be given as one vector NAME: three numbers, or "X,Y,Z". In a
+        scene with objects the first entry is "object"; all others are floats.
 
         Raises:
             InputError: An unknown name, or a value that is not acceptable (`Parameter.check`).
         """
-        known = [p.name for p in self.parameters]
+        given = self.expanded(parameters)
+        body = {OBJECT: self.check_object(given.get(OBJECT, self.objects[0]))} if self.objects else {}
+        return body | {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
+
+    def expanded(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
+        """The values as given, with vectors as three numbers each; `InputError` for an unknown name."""
+        known = self.names
         given: dict[str, Any] = {}
         for name, value in (parameters or {}).items():
             parts = [f"{name}_{axis}" for axis in "xyz"]
@@ -214,11 +244,17 @@ class Schema:
         for name in given:
             if name not in known:
                 raise InputError(f"unknown parameter {name!r}: scene {self.scene} has {', '.join(known)}")
-        return {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
+        return given
+
+    def check_object(self, name: Any) -> str:
+        """The name of an object; `InputError` for one that the scene does not have."""
+        if name not in self.objects:
+            raise InputError(f"unknown object {name!r}: scene {self.scene} has {', '.join(self.objects) or 'none'}")
+        return name
 
     def known(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """The entries of `parameters` that belong to this scene."""
-        return {p.name: parameters[p.name] for p in self.parameters if p.name in parameters}
+        return {name: parameters[name] for name in self.names if name in parameters}
 
     def outside(self, parameters: Parameters) -> tuple[str, ...]:
         """Names of the parameters outside their trained range."""
@@ -233,7 +269,13 @@ class Schema:
         return soft_clip(self.vector(parameters), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:
-        """Corners of the box of trained ranges, scaled by `reach` about its centre; an azimuth keeps its default."""
+        """Corners of the box of trained ranges, scaled by `reach` about its centre; an azimuth keeps its default.
+
+        Raises:
+            InputError: The scene has objects. Its contacts lie on their surfaces, and their parameters form no box.
+        """
+        if self.objects:
+            raise InputError(f"scene {self.scene}: contacts lie on surfaces, so its parameters have no corners")
         ends = [
             (p.default,) if p.role == "azimuth" else (p.denormalise(-reach), p.denormalise(reach))
             for p in self.parameters
@@ -251,10 +293,13 @@ class Schema:
             return cls(
                 scene=str(data["scene"]),
                 parameters=tuple(Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]),
-                window=Window(**data["window"]),
+                window=Window(**{name: float(value) for name, value in data["window"].items()}),
                 needs_observations=bool(data.get("needs_observations", False)),
                 notes=tuple(data.get("notes", ())),
                 impact=tuple(data["impact"]) if data.get("impact") else None,
+                objects=tuple(data.get("objects", ())),
             )
-        except (KeyError, TypeError) as error:
+        except InputError:
+            raise
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"schema: missing or invalid field of an ODeform scene: {error}") from None

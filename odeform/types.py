@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 from numpy.typing import NDArray
 
 __all__ = [
@@ -79,6 +79,7 @@ class Mesh:
     Attributes:
         points: (N, 3) vertices in metres.
         faces: (F, 3) indices of vertices, counter-clockwise when seen from outside.
+        colors: (F, 3, 3) red, green and blue in sRGB at the corners of each face, 0 to 255; None for a plain mesh.
 
     Examples:
         >>> import numpy as np
@@ -91,6 +92,7 @@ class Mesh:
 
     points: Points
     faces: Faces
+    colors: UInt8[np.ndarray, "faces 3 3"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +142,7 @@ class MotionSequence:
         vertices: (T, N, 3) positions in metres; frame 0 is the body at rest.
         faces: (F, 3) indices of vertices.
         weights: (N,) share of the mass at each vertex; they sum to 1.
-        parameters: By name, in the units of the data set's schema.
+        parameters: By name, in the units of the data set's schema; "object" is a string.
         name: That of the sequence in its data set.
 
     Examples:
@@ -156,7 +158,7 @@ class MotionSequence:
     vertices: Frames
     faces: Faces
     weights: Perpoint
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
     name: str = ""
 
     @property

@@ -1,13 +1,16 @@
 """Composes the viewer: server, session, panels, scene and the loop that joins them."""
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
+from odeform_viz.browser.scripts import run_scripts
 from odeform_viz.columns import Column, Columns
 from odeform_viz.layout import Layout
 from odeform_viz.page import Page, Panel
@@ -15,16 +18,19 @@ from odeform_viz.panels.registry import PANELS, Entry, build_panels
 from odeform_viz.presenter import Presenter
 from odeform_viz.recording.control import RecordingControl
 from odeform_viz.rendering.scene import SceneView
+from odeform_viz.runtime.access import Access, reachable_address
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.runtime.worker import Worker
 from odeform_viz.session import Session
-from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.workspace import Workspace
 
 __all__ = ["App"]
 
+FIRST_IMPACT = 3.0  # s that the first impact takes when the page opens
 P = TypeVar("P", bound=Panel)
 
 
@@ -38,11 +44,14 @@ class App:
         port: int = 8080,
         record: str | None = None,
         panels: Sequence[Entry] = PANELS,
+        origins: Sequence[str] = (),
+        workspace: str | Path = ".",
     ) -> None:
-        """Serve the page and start playing.
+        """Serve the page and start playing. Pages of other addresses are refused unless `origins` names them.
 
         The first column must be a model; its schema gives the sliders. If a column is a recorded sequence, the sliders
-        start at its parameters. `record` is a `.rrd` file to record to from the start.
+        start at its parameters. `record` is a `.rrd` file to record to from the start. Paths that come from the page
+        stay inside of the folder `workspace`.
 
         `InputError` for a port in use, columns of different scenes, or a recording that cannot be written.
         """
@@ -54,34 +63,52 @@ class App:
         self._trim = MallocTrimmer()
         window = self.session.schema.window
         self.clock = Clock(window.start, window.stop)
-        self.server = open_server(host, port, f"ODeform · {self.session.schema.scene}")
+        self._access = Access.of(host, origins)
+        self.server = open_server(self._access, port, f"ODeform · {self.session.schema.scene}")
         try:
-            self.recording = RecordingControl(record)
+            self.recording = RecordingControl(record, lambda: bool(self.server.get_clients()))
         except InputError:
             stop_server(self.server)
             raise
         self._worker = Worker(lambda: self.presenter.serve())
-        notices, layout = Notices(self.server), Layout(self.server)
         self.page = Page(
-            self.server, self.columns, self.session, self.clock, self.recording, notices, self._worker.wake, layout
+            self.server,
+            self.columns,
+            self.session,
+            self.clock,
+            self.recording,
+            Notices(self.server),
+            self._worker.wake,
+            Layout(self.server),
+            Workspace.of(workspace, columns),
         )
         build_panels(self.page, panels)
+        run_scripts(self.server)
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
-        self.scene = SceneView(self.server, extent, len(columns))
+        controls = self.page.controls
+        self.scene = SceneView(self.server, extent, self._worker.wake, controls.pick, controls.pull)
+        controls.fit_view, self.page.shown = self.scene.fit, lambda: self.presenter.frame
         self.presenter = Presenter(
             self.session, self.clock, self._read, self, self.recording, lambda: self._worker.up_to_date
         )
         for column in columns:
             if column.truth:
                 self.page.controls.set_parameters(self.session.schema.known(column.truth.setting))
-        self.clock.play()
+        self.server.on_client_connect(lambda _: self._worker.wake())  # recordings wait for somebody who watches
+        self._play_first()
         self._worker.start()
+
+    def _play_first(self) -> None:
+        """Play slowly through the first impact, then at the chosen speed."""
+        with contextlib.suppress(InputError):  # the page says what is wrong with the request
+            self.clock.slow_down_once(*self.session.first_impact(self.request()), FIRST_IMPACT)
+        self.clock.play()
 
     @property
     def url(self) -> str:
-        """Address of the page, for a browser on this machine."""
-        host = self.server.get_host()
-        return f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{self.server.get_port()}"
+        """Address of the page: for a browser on this machine, or for others if the server accepts them."""
+        host = reachable_address(self._access.host)
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.server.get_port()}"
 
     def panel(self, kind: type[P]) -> P:
         """The panel of that class."""
@@ -101,15 +128,15 @@ class App:
         self.recording.close()
 
     def _read(self) -> tuple[ViewRequest, DisplayOptions]:
-        options = self.page.options()
+        options = replace(self.page.options(), viewport=self.scene.viewport)
         if self.page.controls.arranging():
             # the gizmo is where the first column would be alone
             options = replace(options, overlay=True)
         return self.page.request(), options
 
-    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
+    def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
         """Draw a frame; see `Output`."""
-        self.scene.publish(frame, options, error_scale)
+        self.scene.publish(frame, options, coloring)
 
     def describe(self, description: Description) -> None:
         """Update all panels; see `Output`."""

@@ -7,13 +7,16 @@ from collections.abc import Sequence
 
 import odeform
 from odeform.cli import run_guarded
+from odeform.cli.options import Parser
 from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
+from odeform_viz.own_shapes import describe_own_body, read_own_body, takes_own_bodies, with_own_body
 from odeform_viz.recording.replay import TOLERANCE, replay
+from odeform_viz.runtime.access import is_loopback
 
 __all__ = ["main", "make_columns"]
 
@@ -24,10 +27,16 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     `InputError` for checkpoints and shapes that cannot be read.
     """
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
+    if geometry is not None and takes_own_bodies(models[checkpoint]):
+        print(f"{geometry}: making a soft body of it...", flush=True)
+        own = read_own_body(geometry)
+        print(describe_own_body(own))
+        columns = [Column(_label(m, None), m, m.rest, origin=name) for name, m in models.items()]
+        return with_own_body(columns, own)
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
         fit = shape_from(geometry, body, None if models[checkpoint].rescales_input else Similarity())
-        print(describe_fit(fit, geometry, body))
+        print(describe_fit(fit, geometry, models[checkpoint].trust.likeness(fit.geometry)))
     return [
         Column(_label(model, fit), model, fit.geometry if fit else model.rest, origin=name, fit=fit)
         for name, model in ((name, models[name]) for name in (checkpoint, *compare))
@@ -36,19 +45,26 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
 
 def _label(model: Predictor, fit: FittedShape | None) -> str:
     """The authors' files contain no body, so a ball is shown unless the user gives one."""
-    return model.model if fit or model.rescales_input else f"{model.model} (shown on a ball)"
+    return model.model if fit or model.rescales_input or model.schema.objects else f"{model.model} (shown on a ball)"
 
 
 def _serve(args: argparse.Namespace) -> None:
     if args.device == "cuda":
         raise InputError("--device: expected cpu, got cuda: motions are so small that the CPU computes them faster")
+    if not is_loopback(args.host) and not args.expose:
+        raise InputError(
+            f"--host {args.host}: whoever reaches this address can drive the viewer and write recordings; add --expose "
+            "if that is meant"
+        )
     columns = make_columns(args.checkpoint, args.compare, args.geometry)
     if args.sequence:
         columns.append(truth_column(args.sequence))
     from odeform_viz.app import App
 
-    app = App(columns, args.host, args.port, args.record)
+    app = App(columns, args.host, args.port, args.record, origins=args.allow_origin, workspace=args.workspace)
     try:
+        if not is_loopback(args.host):
+            print(f"warning: any machine that reaches {app.url} can drive this viewer", file=sys.stderr, flush=True)
         print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C to stop)", flush=True)
         while True:
             time.sleep(3600.0)
@@ -57,7 +73,7 @@ def _serve(args: argparse.Namespace) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="odeform-viz",
         description="Serve a web page that shows learned motions of soft bodies and computes them as you change "
         "parameters. CKPT is a path or the name of a bundled checkpoint, SCENE or SCENE/MODEL.",
@@ -79,6 +95,25 @@ def _parser() -> argparse.ArgumentParser:
     page.add_argument("--host", default="127.0.0.1", metavar="H", help="address to listen on (default: 127.0.0.1)")
     page.add_argument(
         "--port", type=int, default=8080, metavar="N", help="port to listen on; 0 takes a free one (default: 8080)"
+    )
+    page.add_argument(
+        "--expose",
+        action="store_true",
+        help="allow a --host that other machines reach: they can drive the viewer, there is no password",
+    )
+    page.add_argument(
+        "--allow-origin",
+        action="append",
+        default=[],
+        metavar="ORIGIN",
+        help="also answer at this address, of a reverse proxy for instance: https://lab.example (may be repeated)",
+    )
+    page.add_argument(
+        "--workspace",
+        default=".",
+        metavar="DIR",
+        help="folder of the files that the page names: recordings, and what a restored state opens (default: the "
+        "current one)",
     )
     page.add_argument("--device", default="cpu", choices=("cpu", "cuda"), help="where to compute: only on the cpu")
     record = parser.add_argument_group("recordings")

@@ -2,7 +2,7 @@
 
 from odeform_viz.columns import Column
 
-__all__ = ["ARROW", "BACKGROUND", "HANDLE", "MODELS", "TRUTH", "Color", "color_of", "paler"]
+__all__ = ["ARROW", "BACKGROUND", "CONTACT", "HANDLE", "MODELS", "SPHERE", "TRUTH", "Color", "color_of", "paler"]
 
 Color = tuple[int, int, int]
 """Red, green and blue, 0 to 255."""
@@ -10,15 +10,22 @@ Color = tuple[int, int, int]
 MODELS: tuple[Color, ...] = (
     (206, 78, 26),
     (30, 92, 190),
-    (48, 132, 66),
-    (126, 66, 172),
-    (176, 42, 98),
-    (0, 128, 140),
+    (0, 148, 108),
+    (170, 68, 153),
+    (230, 159, 0),
+    (130, 185, 225),
+    (105, 66, 30),
+    (205, 190, 90),
 )
+"""Any two of these and of the truth's differ by at least 17 in CIELAB, also for color-blind readers."""
 TRUTH: Color = (70, 74, 82)
 BACKGROUND: Color = (188, 190, 186)
 """The part of a scene that does not move."""
 ARROW: Color = (190, 20, 20)
+CONTACT: Color = (20, 20, 24)
+"""The marker where a sphere touches a body."""
+SPHERE: Color = (150, 156, 166)
+"""The sphere that pushes a body."""
 HANDLE: Color = (214, 96, 48)
 """What the user drags, and the brand color of the page."""
 

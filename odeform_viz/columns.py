@@ -2,15 +2,16 @@
 
 import itertools
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from odeform.dataset.store import open_dataset
+from odeform.dataset.recorded import read_recorded
 from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
 from odeform.models.base import Predictor
+from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Schema
+from odeform.schema import Parameters, Schema
 from odeform.types import Geometry
 
 __all__ = ["Column", "Columns", "truth_column"]
@@ -20,10 +21,13 @@ MOST = 12  # columns; nobody can tell more of them apart
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """One motion among others: of a model or a recorded sequence, under the sliders or `pinned` at parameters."""
+    """One motion among others, under the sliders or `pinned` at parameters.
+
+    It is that of a model, one that is predicted already, or a recorded sequence.
+    """
 
     label: str
-    source: Predictor | RecordedMotion
+    source: Predictor | Motion | RecordedMotion
     geometry: Geometry
     pinned: Mapping[str, float] | None = None
     origin: str = ""
@@ -37,8 +41,8 @@ class Column:
     """Assigned by `Columns`: the lowest that no other model has, so that each keeps a colour of its own."""
 
     @property
-    def foreign(self) -> bool:
-        """Whether the shape is not the trained body."""
+    def loaded(self) -> bool:
+        """Whether the shape was loaded, in place of the trained body."""
         return self.fit is not None
 
     @property
@@ -48,8 +52,8 @@ class Column:
 
     @property
     def predictor(self) -> Predictor | None:
-        """The model; None for a recorded motion."""
-        return None if isinstance(self.source, RecordedMotion) else self.source
+        """The model; None for a recorded motion, and for one that is predicted already."""
+        return self.source if isinstance(self.source, Predictor) else None
 
 
 class Columns:
@@ -115,6 +119,11 @@ class Columns:
         with self._lock:
             self._columns = fresh._columns
 
+    def change(self, changed: Callable[[Sequence[Column]], Sequence[Column]]) -> None:
+        """Replace the columns by what `changed` makes of them, with the same keys and in the same order."""
+        with self._lock:
+            self._columns = tuple(changed(self._columns))
+
     def set_visible(self, key: int, visible: bool) -> None:
         """Show or hide a column, if it still exists."""
         with self._lock:
@@ -128,12 +137,27 @@ class Columns:
                 for c in self._columns
             )
 
+    def follow(self, parameters: Parameters) -> None:
+        """Give models of several objects the trained body that `parameters` select, or those they are pinned at."""
+        with self._lock:
+            followed = tuple(_followed(column, parameters) for column in self._columns)
+            if any(new is not old for new, old in zip(followed, self._columns, strict=True)):
+                self._columns = followed
+
     @classmethod
     def of(cls, columns: Sequence[Column]) -> "Columns":
         """Columns of the first one's scene. `InputError` for models of different scenes."""
         out = cls(columns[0].source.schema)
         out.add(*columns)
         return out
+
+
+def _followed(column: Column, parameters: Parameters) -> Column:
+    predictor = column.predictor
+    if predictor is None or column.loaded or not predictor.schema.objects:
+        return column
+    body = predictor.rest_of(parameters if column.pinned is None else column.pinned)
+    return column if column.geometry is body else replace(column, geometry=body)
 
 
 def _unused(label: str, taken: set[str]) -> str:
@@ -146,10 +170,5 @@ def truth_column(origin: str) -> Column:
 
     `InputError` where there is no such data set or sequence.
     """
-    root, _, name = origin.rpartition("/")
-    dataset = open_dataset(root or ".")
-    entry = next((e for e in dataset.select("all") if e.name == name.removesuffix(".npz")), None)
-    if entry is None:
-        raise InputError(f"sequence {origin}: {dataset.root} has no sequence {name!r}")
-    motion = RecordedMotion(dataset.schema, dataset.read(entry), dataset.fixed)
+    motion = read_recorded(origin)
     return Column("truth", motion, motion.geometry, origin=origin)

@@ -5,24 +5,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from odeform.errors import InputError
 from odeform.formats.bundled import read_shape
+from odeform.geometry.likeness import Likeness
 from odeform.geometry.parts import most_visible
-from odeform.geometry.region import region_from_json, region_to_json
-from odeform.geometry.shape import FittedShape, fit_to, mean_distance
-from odeform.geometry.similarity import Similarity
-from odeform.types import GaussianSplats, Mesh
+from odeform.geometry.region import Region, region_from_json, region_to_json
+from odeform.geometry.shape import FittedShape, fit_to
+from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.geometry.upright import guess_up
+from odeform.types import GaussianSplats, Geometry, Mesh
 
-__all__ = ["MOST_POINTS", "describe_fit", "fit_from_json", "fit_to_json", "shape_from"]
+__all__ = ["MOST_POINTS", "describe_fit", "fit_from_json", "fit_to_json", "readable_shape", "shape_from"]
 
 MOST_POINTS = 200_000  # that can be deformed and sent at interactive rates
-ALIKE = 0.05  # of the body's size; a closer shape is the trained body in another discretization
 
 
-def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None) -> FittedShape:
-    """Read a file or a bundled shape, and fit it to the body, or place it by `transform`.
+def readable_shape(name: str | Path) -> tuple[Geometry, Region | None]:
+    """Read a file or a bundled shape, and the part of it that moves.
 
     Gaussian splats are reduced to the most visible `MOST_POINTS`. `InputError` for a file that cannot be read, or has
     too many points.
@@ -35,7 +34,24 @@ def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None
             f"geometry {Path(name).name}: {len(geometry.points):,} points; expected at most {MOST_POINTS:,}, which can "
             "be shown moving: decimate it first"
         )
-    return replace(fit_to(geometry, body, region, transform=transform), origin=str(name))
+    return geometry, region
+
+
+def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None) -> FittedShape:
+    """Read a shape (`readable_shape`), and fit it to the body, or place it by `transform`."""
+    geometry, region = readable_shape(name)
+    up, reason = _up(Path(name), geometry) if region is None and transform is None else ("+z", "")
+    rotation = UPRIGHT[up] if reason else None
+    return replace(fit_to(geometry, body, region, rotation, transform), origin=str(name), upright=reason)
+
+
+def _up(path: Path, geometry: Geometry) -> tuple[str, str]:
+    """The axis that points up, and why, if it is not z."""
+    if path.suffix.lower() in (".glb", ".gltf"):
+        return "+y", "y is up, as glTF specifies"
+    if isinstance(geometry, Mesh) and guess_up(geometry) == "+y":
+        return "+y", "**y was taken for up**, a guess: the shape stands better on it"
+    return "+z", ""
 
 
 def fit_to_json(fit: FittedShape) -> dict[str, Any]:
@@ -53,16 +69,15 @@ def fit_from_json(raw: Mapping[str, Any], body: Mesh) -> FittedShape:
     return replace(fit_to(fit.source, body, region, transform=Similarity.from_json(raw["place"])), origin=fit.origin)
 
 
-def describe_fit(fit: FittedShape, name: str, body: Mesh) -> str:
-    """One line: points, scale, distance from the trained body if it differs visibly, and notes of the reader."""
-    size = float(np.ptp(body.points, axis=0).max())
-    off = mean_distance(fit.geometry, body)
+def describe_fit(fit: FittedShape, name: str, likeness: Likeness | None) -> str:
+    """One line: points, scale, how similar the shape is to the trained body, if that is known, and notes of the
+    reader."""
     text = f"{Path(name).name}: {len(fit.geometry.points):,} points"
     if fit.remainder is not None:
         text += f" move, {len(fit.remainder.points):,} stand still"
     text += f", scaled by {fit.transform.factor:.4g} to the trained size"
-    if off > ALIKE * size:
-        text += (
-            f"; its surface is on average {1e3 * off:.0f} mm from the trained body's: the model never saw such a shape"
-        )
+    if fit.upright:
+        text += f"; {fit.upright}"
+    if likeness is not None:
+        text += f"; {likeness.describe()}"
     return "; ".join([text, *(fit.source.notes if isinstance(fit.source, GaussianSplats) else ())])

@@ -2,20 +2,24 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import viser
 
 from odeform.schema import Schema
-from odeform.types import Mesh
+from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import fit_from_json
 from odeform_viz.layout import Layout
+from odeform_viz.own_shapes import read_own_body, takes_own_bodies, with_own_body
+from odeform_viz.pushing import ShownPush
 from odeform_viz.recording.control import RecordingControl
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.session import Session
 from odeform_viz.state import PageState, capture, columns_of, state_from_json, state_to_json
-from odeform_viz.view import Description, DisplayOptions, ViewRequest
+from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.workspace import Workspace
 
 __all__ = ["Controls", "Page", "Panel"]
 
@@ -51,14 +55,25 @@ class Panel:
 class Controls:
     """The controls that more than one panel needs. Panels that build them replace these defaults."""
 
-    parameters: Callable[[], dict[str, float]] = dict
+    parameters: Callable[[], dict[str, Any]] = dict
     """The values of the sliders. `InputError` for values that no slider can have."""
-    set_parameters: Callable[[Mapping[str, float]], None] = lambda _: None
+    set_parameters: Callable[[Mapping[str, Any]], None] = lambda _: None
     """Moves the sliders of these names."""
+    pick: Callable[[Column | None, Vector], None] | None = None
+    """Told of a click: the column, and the point (3,) m of its shape at rest; None beside all. Unset in scenes that
+    have no use for clicks."""
+    pull: Callable[[ShownPush, Vector, str], None] | None = None
+    """Told of the arrow of a force being dragged: the push, where its tail is (3,) m, and the phase of the drag."""
     quality: Callable[[], str] = lambda: "balanced"
     overlay: Callable[[], bool] = lambda: False
-    error_colors: Callable[[], bool] = lambda: True
-    follow: Callable[[], bool] = lambda: True
+    set_overlay: Callable[[bool], None] = lambda _: None
+    """Shows all columns in one place, or side by side again."""
+    time_slider: str = ""
+    """The id of the time slider in the page, for scripts; empty if there is none."""
+    drawing: Callable[[], DisplayOptions] = DisplayOptions
+    """How bodies are drawn, but for `overlay`."""
+    fit_view: Callable[[], None] = lambda: None
+    """Aims the cameras at all columns again."""
     arranging: Callable[[], bool] = lambda: False
     """Whether a shape is being placed, for which all columns are overlaid."""
 
@@ -76,6 +91,9 @@ class Page:
     wake: Callable[[], None]
     """Asks the worker to read the newest request."""
     layout: Layout
+    workspace: Workspace
+    shown: Callable[[], Frame | None] = lambda: None
+    """The frame on screen, if there is one."""
     controls: Controls = field(default_factory=Controls)
     panels: list[Panel] = field(default_factory=list)
     hotkeys: dict[str, str] = field(default_factory=dict)
@@ -94,19 +112,20 @@ class Page:
 
     @property
     def body(self) -> Mesh:
-        """The trained body of the first model; loaded shapes are fitted to it."""
+        """The trained body of the first model that the parameters select; loaded shapes are fitted to it."""
         predictor = self.model.predictor
         assert predictor is not None
-        return predictor.rest
+        return predictor.rest_of(self.controls.parameters())
 
     def request(self) -> ViewRequest:
         """The newest request. `InputError` for parameters or a quality that no control can have."""
         parameters = self.schema.complete(self.controls.parameters())
+        self.columns.follow(parameters)
         return ViewRequest(parameters, self.clock.time(), self.controls.quality(), self.columns.all)
 
     def options(self) -> DisplayOptions:
         """The newest display options, as the user set them."""
-        return DisplayOptions(self.controls.overlay(), self.controls.error_colors(), self.controls.follow())
+        return replace(self.controls.drawing(), overlay=self.controls.overlay())
 
     def pause_at(self, time: float) -> None:
         """Stop playing and go to `time` in seconds."""
@@ -132,11 +151,18 @@ class Page:
             action()
         self.wake()
 
-    def add_hotkey(self, key: str, label: str, action: Callable[[], None]) -> None:
-        """Register `action` under a key and in the command palette, labelled `label`."""
-        command = self.server.gui.add_command(label.capitalize(), hotkey=key)  # pyright: ignore[reportArgumentType]
-        command.on_trigger(lambda _: action())
-        self.hotkeys[key] = label
+    def add_hotkey(self, keys: str, label: str, action: Callable[[], None]) -> None:
+        """Register `action` under keys, separated by spaces, and in the command palette, labelled `label`.
+
+        `ValueError` for a key that another action has.
+        """
+        if taken := set(keys.split()) & set(" ".join(self.hotkeys).split()):
+            raise ValueError(f"hot key {', '.join(sorted(taken))}: expected one that is free")
+        for key in keys.split():
+            name = label.capitalize() if key == keys.split()[0] else f"{label.capitalize()} ({key})"
+            command = self.server.gui.add_command(name, hotkey=key)  # pyright: ignore[reportArgumentType]
+            command.on_trigger(lambda _: action())
+        self.hotkeys[keys] = label
 
     def save(self) -> bytes:
         """The state of the page as a file."""
@@ -147,9 +173,11 @@ class Page:
 
         `InputError` for anything but a state of this scene, and for missing files; then nothing has changed.
         """
-        state = state_from_json(data, self.schema.scene)
+        state = self.workspace.confined(state_from_json(data, self.schema.scene))
         columns = columns_of(state, self.schema)
-        if state.shape:
+        if state.shape and any(takes_own_bodies(c.predictor) for c in columns if c.predictor):
+            columns = with_own_body(columns, read_own_body(state.shape["origin"]))
+        elif state.shape:
             fit = fit_from_json(state.shape, self.body)
             columns = [replace(c, geometry=fit.geometry, fit=fit) if c.predictor else c for c in columns]
         self.columns.replace_all(columns)

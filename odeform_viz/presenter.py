@@ -4,27 +4,26 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
-
 from odeform.cancellation import Cancelled, cancel_unless
 from odeform.errors import InputError
-from odeform_viz.rendering.error_colors import scale_for
+from odeform_viz.coloring.colorist import Colorist
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import Session
-from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest, same_motions
+from odeform_viz.view import Coloring, ColorScale, Description, DisplayOptions, Frame, ViewRequest, same_motions
 
 __all__ = ["Output", "Presenter", "Recording"]
 
 TICK = 1.0 / 30.0  # s between frames while playing
 SETTLE = 0.15  # s without a new request after which the view counts as settled
 DESCRIBE = 0.2  # s between updates of numbers and curves; nobody reads faster
+RARELY = 10.0  # times as long as an update took, until the next: those of many columns would hold up their frames
 
 
 class Output(Protocol):
     """Where frames go."""
 
-    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
-        """Draw a frame; errors are coloured up to `error_scale` mm, if given."""
+    def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
+        """Draw a frame, in the bodies' own colours without a `coloring`."""
         ...
 
     def describe(self, description: Description) -> None:
@@ -73,11 +72,14 @@ class Presenter:
         self._output, self._recording, self._up_to_date = output, recording, up_to_date
         self.frame: Frame | None = None
         """The frame on screen; None before the first, and after a request that could not be met."""
-        self.error_scale: float | None = None
+        self.scale: ColorScale | None = None
+        """That of the colours on screen; None for the bodies' own."""
+        self._colorist = Colorist()
         self._options = DisplayOptions()
         self._settled = False
         self._described: Frame | None = None
         self._described_at = 0.0
+        self._pause = DESCRIBE
 
     @property
     def settled(self) -> bool:
@@ -122,24 +124,20 @@ class Presenter:
             self._describe(frame)
 
     def _show(self, frame: Frame, options: DisplayOptions) -> None:
-        # the scale is that of the whole motion, so it has to be known before the first frame
-        self.error_scale = self._scale(frame) if options.error_colors else None
+        # columns in one place are told apart by their own colours
+        coloring = None if options.overlay else self._colorist.color(frame, options.color_by)
+        self.scale = coloring.scale if coloring else None
         self._settled = self.frame is not None and same_motions(frame, self.frame)
-        self._output.publish(frame, options, self.error_scale)
+        self._output.publish(frame, options, coloring)
         self.frame, self._options = frame, options
         with cancel_unless(lambda: True):  # a frame that was shown is recorded, whatever came since
             self._recording.log(frame)
-        if frame.pending or time.monotonic() - self._described_at > DESCRIBE:
+        if frame.pending or time.monotonic() - self._described_at > self._pause:
             self._describe(frame)
 
-    def _scale(self, frame: Frame) -> float | None:
-        """The top of the error scale in mm, for all columns; None without errors."""
-        curves = [self._session.curves(column, frame.request) for column in frame.columns if column.error]
-        stop = self._session.schema.window.stop
-        errors = [c.error[c.times <= stop] for c in curves if c.error is not None]
-        return scale_for(np.concatenate(errors)) if errors else None
-
     def _describe(self, frame: Frame) -> None:
+        begin = time.monotonic()
         curves = tuple(self._session.curves(column, frame.request) for column in frame.columns)
-        self._output.describe(Description(frame, curves, self.error_scale, self._settled))
+        self._output.describe(Description(frame, curves, self._options, self.scale, self._settled))
         self._described, self._described_at = frame, time.monotonic()
+        self._pause = max(DESCRIBE, RARELY * (self._described_at - begin))

@@ -4,12 +4,13 @@ import json
 import math
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from odeform.cancellation import Cancelled
 from odeform.errors import InputError
+from odeform.geometry.rigid import unwrapped_vectors
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
 from odeform.motion.base import Motion
@@ -18,10 +19,12 @@ from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import GaussianSplats, Geometry, MotionSequence, Points, Times
 from odeform_viz.columns import Column
+from odeform_viz.own_shapes import own_of
 from odeform_viz.view import INVISIBLE, REACH, ColumnFrame, Curves, Error, Frame, ViewRequest
 
 __all__ = ["Session", "settings_of", "visible_deformation"]
 
+MUCH = 0.2  # of the largest deformation, above which a body counts as deformed by an impact
 SLOW = 0.1  # s from a new motion to its first frame; slower columns are computed after the others
 
 SolveInputs = tuple[Mapping[str, float], str | SolverSettings, RecordedMotion | None]
@@ -73,7 +76,7 @@ class Session:
     def motion(self, column: Column, request: ViewRequest) -> Motion | RecordedMotion:
         """The motion of one column; the same object until its parameters, shape or quality change."""
         source = column.source
-        if isinstance(source, RecordedMotion):
+        if not isinstance(source, Predictor):
             return source
         with self._lock:
             return self._solve(self._displayed, column, source, column.geometry, request)
@@ -86,26 +89,41 @@ class Session:
         with self._lock:
             return source.solve(column.geometry, parameters, quality, observed=_observed_frames(source, record))
 
+    def new_compared_motion(self, column: Column, truth: RecordedMotion, request: ViewRequest) -> Motion:
+        """As `new_motion`, but of the mesh of `truth` (`truth_of`), vertex by vertex."""
+        source = column.predictor
+        assert source is not None
+        parameters, quality, record = self._inputs(column, source, request)
+        geometry = source.to_body_frame(truth.geometry, parameters)
+        with self._lock:
+            return source.solve(geometry, parameters, quality, observed=_observed_frames(source, record))
+
     def truth_of(self, column: Column, request: ViewRequest) -> RecordedMotion | None:
         """The visible record, if it has the column's parameters and the column the trained body."""
         truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
         if truth is None or column.truth is not None or not truth.of(self.parameters(column, request)):
             return None
-        return None if column.foreign else truth
+        own = own_of(column.predictor)
+        if own is not None:
+            return truth if np.array_equal(truth.geometry.points, own.item.rest_mesh().points) else None
+        return None if column.loaded else truth
 
     def frame(self, request: ViewRequest, include_slow: bool = True) -> Frame:
         """Compute the visible columns. `InputError` for a request that none of them can meet.
 
-        Without `include_slow`, columns that need a new motion and took long for their last one are left pending.
+        Without `include_slow`, columns that need a new motion and took long for their last one are left pending; the
+        first of them is not, if there is nothing else to show.
         """
         if not np.isfinite(request.time) or request.time < 0.0:
             raise InputError(f"time: expected seconds from 0 on, got {request.time}")
         with self._lock:
             self._forget_all_but({column.key for column in request.columns})
+            visible = [column for column in request.columns if column.visible]
+            slow = set() if include_slow else self._slow(visible, request)
             computed, refused, pending = [], [], []
-            for column in (column for column in request.columns if column.visible):
+            for column in visible:
                 try:
-                    if include_slow or not self._is_slow(column, request):
+                    if column.key not in slow:
                         computed.append(self._timed(column, request))
                     else:
                         pending.append(column.label)
@@ -140,6 +158,21 @@ class Session:
         times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
         with self._lock:
             return float(times[np.argmax(self.motion(column, request).deformation_rms(times))])
+
+    def first_impact(self, request: ViewRequest) -> tuple[float, float]:
+        """From when to when, in s, the first visible column is deformed much for the first time; equal if never."""
+        column = next((column for column in request.columns if column.visible), None)
+        if column is None:
+            return (request.time, request.time)
+        window = self.schema.window
+        times = np.linspace(window.start, window.stop, 4 * round((window.stop - window.start) * window.rate) + 1)
+        with self._lock:
+            deformation = self.motion(column, request).deformation_rms(times)
+        much = deformation > MUCH * deformation.max()
+        first = int(much.argmax())
+        after = ~much[first:]
+        last = first + int(after.argmax()) if after.any() else len(times) - 1
+        return (float(times[max(first - 1, 0)]), float(times[last])) if much.any() else (window.start, window.start)
 
     def _forget_all_but(self, keys: set[int]) -> None:
         for cache in (self._displayed, self._compared, self._curves, self._seconds):
@@ -183,12 +216,20 @@ class Session:
         geometry = source.to_body_frame(truth.geometry, parameters)
         return self._solve(self._compared, column, source, geometry, request)
 
+    def _slow(self, columns: Sequence[Column], request: ViewRequest) -> set[int]:
+        """Keys of the slow ones; where all are slow, without the first: the viewport is never empty."""
+        slow = [column.key for column in columns if self._is_slow(column, request)]
+        return set(slow[1:] if len(slow) == len(columns) else slow)
+
     def _is_slow(self, column: Column, request: ViewRequest) -> bool:
         """Whether a column needs a new motion, and took long for its last one."""
         if column.predictor is None or self._seconds.get(column.key, 0.0) < SLOW:
             return False
         known = self._displayed.get(column.key)
-        inputs = self._inputs(column, column.predictor, request)
+        try:
+            inputs = self._inputs(column, column.predictor, request)
+        except InputError:
+            return False  # it is refused at once
         return known is None or known[0] != inputs or known[1].geometry is not column.geometry
 
     def _timed(self, column: Column, request: ViewRequest) -> ColumnFrame:
@@ -234,12 +275,10 @@ class Session:
         poses = motion.pose(times)
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
-        cosine = (np.trace(poses[:, :3, :3], axis1=1, axis2=2) - 1.0) / 2.0
-        rotation = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        rotation = np.degrees(np.linalg.norm(unwrapped_vectors(poses[:, :3, :3]), axis=1))
         error = band = None
-        if predictor is not None:
-            both = predictor.error_band(motion.parameters, times)
-            band = None if both is None else both[:, 1]
+        if (both := shown.error_band(times)) is not None:
+            band = both[:, 1]
         if truth is not None and predictor is not None:
             predicted = self._predicted_truth(shown.column, predictor, truth, request)
             off = predicted.vertices(times) - truth.vertices(times)

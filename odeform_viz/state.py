@@ -8,12 +8,13 @@ from typing import Any
 
 import odeform
 from odeform.errors import InputError
+from odeform.io import parse_json
 from odeform.models.base import Predictor
 from odeform.schema import Schema
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import fit_to_json
 from odeform_viz.recording.provenance import origin_of
-from odeform_viz.view import DisplayOptions, ViewRequest
+from odeform_viz.view import COLOR_BY, DisplayOptions, ViewRequest
 
 __all__ = ["PageState", "capture", "columns_of", "state_from_json", "state_to_json"]
 
@@ -93,7 +94,11 @@ def state_to_json(state: PageState) -> bytes:
         "columns": state.columns,
         "shape": state.shape,
         "overlay": display.overlay,
-        "heat": display.error_colors,
+        "heat": display.color_by == "error",
+        "colors": display.color_by,
+        "exaggeration": display.exaggeration,
+        "ghost": display.ghost,
+        "wireframe": display.wireframe,
         "follow": display.follow,
         "notes": state.notes,
     }
@@ -103,19 +108,31 @@ def state_to_json(state: PageState) -> bytes:
 def state_from_json(data: bytes, scene: str) -> PageState:
     """`InputError` for anything but a state of that scene."""
     try:
-        raw = json.loads(data)
+        raw = parse_json(data, "state: not a state file of ODeform")
         if not isinstance(raw, dict) or raw.pop("odeform_state", None) != FORMAT:
             raise InputError(f"state: expected a state file of ODeform, format {FORMAT}")
         raw["columns"], raw["notes"] = tuple(raw["columns"]), tuple(raw["notes"])
-        names = {"overlay": "overlay", "heat": "error_colors", "follow": "follow"}
-        display = {name: raw.pop(key) for key, name in names.items() if key in raw}
-        state = PageState(**raw, display=DisplayOptions(**display))
+        display = _display(raw)
+        state = PageState(**raw, display=display)
         _check(state, scene)
         return state
     except InputError:
         raise
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
         raise InputError(f"state: not a state file of ODeform: {error}") from None
+
+
+def _display(raw: dict[str, Any]) -> DisplayOptions:
+    """Takes the display options out of a state; files of earlier versions have only some."""
+    default = DisplayOptions()
+    colors = raw.pop("colors", default.color_by if raw.get("heat", True) else COLOR_BY[0])
+    raw.pop("heat", None)
+    exaggeration = float(raw.pop("exaggeration", default.exaggeration))
+    if colors not in COLOR_BY or not 1.0 <= exaggeration <= 10.0:
+        raise InputError(f"state: expected colors {', '.join(COLOR_BY)}, got {colors!r}, exaggeration {exaggeration}")
+    display = DisplayOptions(color_by=colors, exaggeration=exaggeration)
+    boxes = {name: raw.pop(name) for name in ("overlay", "follow", "ghost", "wireframe") if name in raw}
+    return replace(display, **{name: bool(value) for name, value in boxes.items()})
 
 
 def _check(state: PageState, scene: str) -> None:

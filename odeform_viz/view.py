@@ -4,15 +4,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from odeform.geometry.likeness import Likeness
 from odeform.motion.base import Motion, SolveStats
+from odeform.motion.limits import DEPTH
 from odeform.motion.recorded import RecordedMotion
+from odeform.motion.watch import Stop
 from odeform.schema import REACH as CONTINUED
 from odeform.types import Floats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
 __all__ = [
+    "COLOR_BY",
     "INVISIBLE",
     "REACH",
+    "ColorScale",
+    "Coloring",
     "ColumnFrame",
     "Curves",
     "Description",
@@ -24,7 +30,6 @@ __all__ = [
 ]
 
 INVISIBLE = 1e-4  # m; a third of a pixel for a body of 0.1 m that is 720 pixels high
-FLOOR_TOLERANCE = 5e-3  # m; the simulator's own contacts let a body sink in by up to 3 mm
 REACH = 1.0 + CONTINUED  # length of the time slider in trained windows: as far as models continue
 
 
@@ -39,13 +44,43 @@ class ViewRequest:
     columns: tuple[Column, ...]
 
 
+COLOR_BY: tuple[str, ...] = ("own colours", "displacement", "strain", "error")
+"""What the colors of bodies can show."""
+
+
 @dataclass(frozen=True)
 class DisplayOptions:
-    """How columns are drawn: overlaid or in a row, with errors as colours, with the camera following the body."""
+    """How columns are drawn."""
 
     overlay: bool = False
-    error_colors: bool = True
+    """In one place instead of side by side."""
+    color_by: str = "error"
+    """One of `COLOR_BY`; errors need a truth, and own colors are shown without it."""
     follow: bool = True
+    exaggeration: float = 1.0
+    """Factor of the deformation in body axes; the rigid motion stays as it is."""
+    ghost: bool = False
+    """The shape at rest, moved by the same pose."""
+    wireframe: bool = False
+    viewport: tuple[int, int] = (1440, 900)
+    """Width and height of the browser's canvas, in px."""
+
+
+@dataclass(frozen=True)
+class ColorScale:
+    """Colors for values of a quantity from 0 to `top`, in `unit`."""
+
+    quantity: str
+    unit: str
+    top: float
+
+
+@dataclass(frozen=True, eq=False)
+class Coloring:
+    """What the colors of a frame show: `values` (N,) at the points of the columns of these keys."""
+
+    scale: ColorScale
+    values: Mapping[int, Perpoint]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +124,33 @@ class ColumnFrame:
         return self.motion.stats
 
     @property
+    def likeness(self) -> Likeness | None:
+        """How similar the shape is to the bodies that the model was trained on; None where these are not known."""
+        if not isinstance(self.motion, Motion):
+            return None
+        predictor = self.column.predictor
+        return self.motion.likeness or (predictor.trust.likeness(self.column.geometry) if predictor else None)
+
+    @property
+    def foreign(self) -> bool:
+        """Whether the model was not trained on this shape: figures of its errors on trained shapes do not hold."""
+        return self.likeness is not None and not self.likeness.same
+
+    def error_band(self, times: Times) -> Floats | None:
+        """(T, 2) mm at (T,) seconds: the model error that half, and 90 %, of motions stay below; None if not known."""
+        predictor = self.column.predictor
+        if predictor is None or (self.foreign and not predictor.knows_foreign_errors):
+            return None
+        return predictor.error_band(self.motion.parameters, times)
+
+    def stop_at(self, time: float) -> Stop | None:
+        """What is shown in place of `time` in seconds, and why, where the motion is not physically possible."""
+        return self.motion.stop_at(time) if isinstance(self.motion, Motion) else None
+
+    @property
     def below_floor(self) -> bool:
-        """Whether the body is visibly below the floor: deeper than `FLOOR_TOLERANCE`."""
-        return self.depth > FLOOR_TOLERANCE
+        """Whether the body is visibly below the floor: deeper than the simulator's contacts let it sink."""
+        return self.depth > 1.001 * DEPTH  # a motion that is held is at this depth, up to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +191,9 @@ class Frame:
 class Curves:
     """A motion over `times` (T,) in seconds.
 
-    `height` of the centre in m, `rotation` in degrees, RMS `deformation` in mm, RMS `error` in mm, and the
-    `error_band` in mm that 90 % of motions stay below. The last two are None where they are not known.
+    `height` of the centre in m, `rotation` from the shape at rest in degrees, which grows past whole turns, RMS
+    `deformation` in mm, RMS `error` in mm, and the `error_band` in mm that 90 % of motions stay below. The last two are
+    None where they are not known.
     """
 
     times: Times
@@ -151,11 +211,12 @@ def same_motions(one: Frame, other: Frame) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """A frame with what panels show beside it: the top of the error colour scale in mm, and the curves by column."""
+    """A frame with what panels show beside it: how it is drawn, and the curves by column."""
 
     frame: Frame
     curves: tuple[Curves, ...]
-    error_scale: float | None
-    """None where errors are not coloured."""
+    options: DisplayOptions
+    scale: ColorScale | None
+    """None where bodies have their own colours."""
     settled: bool
     """Whether the motions have not changed for a moment: time for numbers that are expensive to compute."""

@@ -48,7 +48,8 @@ def test_predict_npz(
     assert f"15 frames of {count} points" in capsys.readouterr().out
     motion = predictors["odeform"].solve(None, {"mass": 0.6, "azimuth": 1.0, "force": 100.0})
     with np.load(out, allow_pickle=False) as arrays:
-        assert set(arrays) == {"times", "vertices", "faces", "parameters"}
+        assert set(arrays) == {"times", "vertices", "faces", "parameters", "notes"}
+        assert "4 of 15 frames are outside the trained window" in json.loads(str(arrays["notes"]))[0]
         assert arrays["vertices"].dtype == np.float32
         assert arrays["vertices"].shape == (15, count, 3)
         assert np.allclose(arrays["times"], np.arange(15) / 10.0)
@@ -68,6 +69,7 @@ def test_predict_defaults_to_the_trained_frames(trained: dict[str, Path], tmp_pa
 
 def test_predict_ply(trained: dict[str, Path], predictors: dict[str, Predictor], tmp_path: Path) -> None:
     out = tmp_path / "frames" / "ball_{frame}.ply"
+    out.parent.mkdir()
     assert run("predict", trained["odeform"], "--out", out, "--times", "0:0.3:0.1") == 0
     files = sorted(out.parent.iterdir())
     assert [file.name for file in files] == ["ball_00000.ply", "ball_00001.ply", "ball_00002.ply"]
@@ -101,7 +103,9 @@ def test_predict_takes_splats_and_tells_what_it_left_out(
     arguments = ("--geometry", tmp_path / "nine.ply", "--out", tmp_path / "{frame}.ply", "--times", "0:0.2:0.1")
     assert run("predict", trained["nearest"], *arguments) == 0
     said = capsys.readouterr()
-    assert said.err.strip() == f"note: {tmp_path / 'nine.ply'}: 1 of 9 splats left out, not finite"
+    left_out, foreign = said.err.splitlines()
+    assert left_out == f"note: {tmp_path / 'nine.ply'}: 1 of 9 splats left out, not finite"
+    assert foreign.startswith("note: this shape was not trained")
     assert "2 frames of 8 points" in said.out
     again = read_geometry(tmp_path / "00001.ply")
     assert isinstance(again, GaussianSplats)
@@ -112,7 +116,62 @@ def test_predict_tells_what_is_outside(
     trained: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run("predict", trained["nearest"], "--out", tmp_path / "a.npz", "--set", "mass=7") == 0
-    assert capsys.readouterr().err.splitlines() == ["note: mass = 7 is outside the trained range"]
+    said = capsys.readouterr().err.splitlines()
+    assert said == ["note: mass = 7 kg is outside the trained range, 0.5 to 1 kg"]
+
+
+def test_predict_tells_which_times_are_extrapolated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("predict", "kick", "--out", tmp_path / "a.npz", "--times", "0:99:1") == 0
+    (note,) = capsys.readouterr().err.splitlines()
+    assert note.startswith("note: 97 of 99 frames are outside the trained window, 0 to 1 s")
+    assert run("predict", "kick", "--out", tmp_path / "b.npz", "--times", "0:1:0.5") == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_predict_stops_a_motion_that_sinks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Inside the trained box, this ball used to be 105 mm below the floor at 1.3 s."""
+    setting = ("--set", "mass=0.92", "bending=0.39", "force=141.4", "azimuth=0", "elevation=0.76")
+    assert run("predict", "kick", "--out", tmp_path / "a.npz", *setting, "--times", "0:1.5:0.02") == 0
+    said = capsys.readouterr()
+    assert "status stopped at t = 1.202 s" in said.out
+    assert "the motion stops at t = 1.202 s, because it sinks into the floor" in said.err
+    with np.load(tmp_path / "a.npz", allow_pickle=False) as arrays:
+        assert arrays["vertices"][..., 2].min() > -0.00501
+        assert "sinks into the floor" in str(arrays["notes"])
+
+
+def test_predict_tells_of_a_shape_that_was_not_trained(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shapes = {"box": trimesh.creation.box((1.0, 1.0, 1.0)), "ball": trimesh.creation.icosphere(3)}
+    for name, shape in shapes.items():
+        shape.export(tmp_path / f"{name}.obj")
+        out = tmp_path / f"{name}.npz"
+        assert (
+            run("predict", "kick", "--geometry", tmp_path / f"{name}.obj", "--out", out, "--times", "0:0.1:0.05") == 0
+        )
+        said = capsys.readouterr().err
+        assert ("note: this shape was not trained: its surface is on average" in said) == (name == "box")
+        with np.load(out, allow_pickle=False) as arrays:
+            assert ("not trained" in str(arrays["notes"])) == (name == "box")
+
+
+def test_info_tells_which_shapes_were_trained(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("info", "kick") == 0
+    (body,) = json.loads(capsys.readouterr().out)["trained_shapes"]
+    assert body["size_m"] == pytest.approx([0.2, 0.2, 0.2])
+    assert body["tolerance_m"] == pytest.approx(0.004)
+
+
+def test_stress_fails_with_its_checks(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    checks = {"good": {"holds": True, "figure": 0, "bound": 1}, "bad": {"holds": False, "figure": 2, "bound": 1}}
+    inside = {"draws": 1, "stopped": 0, "stopped_in_window": 0, "first_stop_s": None}
+    result = {"cases": 1, "non_finite_shown": 0, "by_status": {"ok": 1}, "inside": inside, "checks": checks}
+    monkeypatch.setattr("odeform.stress.stress.stress", lambda *_, **__: result)
+    assert run("stress", "kick") == 1
+    said = capsys.readouterr()
+    assert said.err.strip() == "failed: bad"
+    assert "FAILS   bad" in said.out
+    checks["bad"]["holds"] = True
+    assert run("stress", "kick") == 0
 
 
 def test_evaluate(
@@ -135,7 +194,7 @@ def test_evaluate_on_another_scene_says_only_that(capsys: pytest.CaptureFixture[
 
 
 def test_a_dash_in_the_scores_is_explained() -> None:
-    scores = dict.fromkeys(COLUMNS, 1.0)
+    scores = {**dict.fromkeys(COLUMNS, 1.0), "per_object": {}}
     assert scores_table({"odeform": scores}).splitlines()[-1].startswith("odeform")
     assert scores_table({"odeform": {**scores, COLUMNS[-1]: None}}).splitlines()[-1] == "-: not measured"
 
@@ -278,3 +337,20 @@ def test_interrupted(capsys: pytest.CaptureFixture[str]) -> None:
 
     assert run_guarded(work) == 130
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_folder_that_a_command_creates_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "info.json"
+    assert main(["info", "kick", "--json", str(out)]) == 0
+    assert f"note: created the folder {out.parent}" in capsys.readouterr().err
+    assert main(["info", "kick", "--json", str(out)]) == 0
+    assert "note" not in capsys.readouterr().err
+
+
+def test_the_version_needs_no_command_and_help_describes_every_argument(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, said in ((["--version"], ["odeform "]), (["predict", "--help"], ["bundled", "units", "reference"])):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        assert ended.value.code == 0
+        out = capsys.readouterr().out
+        assert all(word in out for word in said)

@@ -16,6 +16,22 @@ def test_survives_json() -> None:
     assert Schema.from_json(json.loads(json.dumps(SCHEMA.to_json()))) == SCHEMA
 
 
+def test_the_window_of_a_file_is_of_floats() -> None:
+    data = json.loads(json.dumps(SCHEMA.to_json()))
+    data["window"] |= {"stop": True, "rate": 120}
+    window = Schema.from_json(data).window
+    assert window.soft_clamped(np.array(window.stop)) == 1.0
+    assert type(window.stop) is type(window.rate) is float
+
+
+@pytest.mark.parametrize("stop", [None, "soon", [], float("nan")])
+def test_a_window_without_numbers_is_refused(stop: object) -> None:
+    data = SCHEMA.to_json()
+    data["window"]["stop"] = stop
+    with pytest.raises(InputError):
+        Schema.from_json(data)
+
+
 def test_ranges_map_to_the_unit_cube() -> None:
     for parameter in SCHEMA.parameters:
         assert parameter.normalise(parameter.low) == pytest.approx(-1.0)
@@ -124,3 +140,22 @@ def test_three_components_are_one_vector() -> None:
     with pytest.raises(InputError, match="unknown parameter 'pull'"):
         schema.complete({"pull": "1,2,3"})
     assert SCHEMA.known({"mass": 0.6, "radius_m": 0.1}) == {"mass": 0.6}
+
+
+def test_an_object_is_chosen_by_name() -> None:
+    schema = replace(SCHEMA, objects=("cat", "dog"))
+    assert Schema.from_json(json.loads(json.dumps(schema.to_json()))) == schema
+    assert schema.complete({})["object"] == "cat"
+    complete = schema.complete({"mass": "0.6", "object": "dog"})
+    assert list(complete) == schema.names == ["object", *SCHEMA.names]
+    assert complete["object"] == "dog"
+    assert np.array_equal(schema.vector(complete), SCHEMA.vector(SCHEMA.complete({"mass": 0.6})))
+    assert schema.outside(complete) == ()
+    assert schema.known({"object": "dog", "radius_m": 0.1}) == {"object": "dog"}
+    for name in ("cow", None, 3.0):
+        with pytest.raises(InputError, match=r"unknown object .*: scene kick has cat, dog"):
+            schema.complete({"object": name})
+    with pytest.raises(InputError, match="unknown parameter 'object'"):
+        SCHEMA.complete({"object": "cat"})
+    with pytest.raises(InputError, match="no corners"):
+        schema.corners()

@@ -1,6 +1,7 @@
 """Parameters, windows and schemas of any range."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,7 +31,8 @@ def schemas(draw: st.DrawFn) -> Schema:
     window = Window(start, start + length, draw(st.floats(5.0, 500.0)), draw(st.sampled_from([0.0, 0.5])))
     impact = draw(st.none() | st.just((0.1, 0.5)))
     given = tuple(draw(parameters(name)) for name in names)
-    return Schema(draw(NAMES), given, window, draw(st.booleans()), ("a note",), impact)
+    objects = tuple(draw(st.lists(NAMES, max_size=3, unique=True)))
+    return Schema(draw(NAMES), given, window, draw(st.booleans()), ("a note",), impact, objects)
 
 
 @PROPERTY
@@ -52,8 +54,10 @@ def test_schemas_survive_json(schema: Schema) -> None:
 @PROPERTY
 @given(schemas())
 def test_older_files_open(schema: Schema) -> None:
-    """They have a key `parts`, which nothing used."""
-    assert Schema.from_json({**schema.to_json(), "parts": ["rigid", "local"]}) == schema
+    """They have a key `parts`, which nothing used, and those of scenes of one body no `objects`."""
+    older = {**schema.to_json(), "parts": ["rigid", "local"]}
+    assert Schema.from_json(older) == schema
+    assert Schema.from_json({k: v for k, v in older.items() if k != "objects"}) == replace(schema, objects=())
 
 
 @PROPERTY

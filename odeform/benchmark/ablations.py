@@ -46,7 +46,8 @@ def with_modes(motion: ReducedMotion, modes: int) -> ReducedMotion:
     evaluated = replace(
         motion.evaluated, rows=motion.evaluated.rows[: STILL + modes], reach=motion.evaluated.reach[:modes]
     )
-    return replace(motion, evaluated=evaluated, trajectory=_Shortened(motion.trajectory, modes))
+    shortened = _Shortened(motion.trajectory, modes)
+    return replace(motion, evaluated=evaluated, trajectory=shortened, body=None)
 
 
 def _interpolated(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:

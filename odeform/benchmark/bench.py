@@ -8,15 +8,18 @@ import numpy as np
 
 from odeform.benchmark.ablations import ablations
 from odeform.benchmark.comparisons import comparisons
+from odeform.benchmark.objects import bench_objects
 from odeform.benchmark.precision import OperatingPoint, measure, operating_points, work_precision
 from odeform.benchmark.probes import random_parameters, round_mesh, round_splats
 from odeform.benchmark.roofline import roofline, scaling
 from odeform.benchmark.startup import startup
 from odeform.benchmark.timing import as_viewed, milliseconds, quantiles
 from odeform.dataset.store import bundled_datasets, open_dataset
+from odeform.errors import InputError
 from odeform.models.odeform.model import ODeform
+from odeform.models.per_object import PerObject
 from odeform.models.reduced_model import ReducedModel
-from odeform.models.registry import load_reduced
+from odeform.models.registry import load
 from odeform.motion.evaluated_basis import evaluate_basis
 from odeform.motion.reduced_motion import as_reduced
 
@@ -78,7 +81,7 @@ def _solver(model: ODeform, points: list[OperatingPoint]) -> dict[str, Any]:
 
 def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
     """All measurements of one model, as JSON; `data` is the data set of the truth (default: the bundled one)."""
-    predictor = load_reduced(checkpoint)
+    predictor = load(checkpoint)
     scene = predictor.schema.scene
     data = data or (scene if scene in bundled_datasets() else None)
     dataset = None if data is None else open_dataset(data)
@@ -90,6 +93,10 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
     result = {"machine": machine, "model": predictor.model, "scene": scene, "sha256": predictor.checkpoint.sha256}
     points: list[OperatingPoint] = []
     with as_viewed():
+        if isinstance(predictor, PerObject):
+            return {**result, "data": data, "objects": bench_objects(predictor, dataset)}
+        if not isinstance(predictor, ReducedModel):
+            raise InputError(f"bench: expected a model of reduced coordinates, got {predictor.model}")
         result |= {"data": data, "latency": _latency(predictor)}
         if isinstance(predictor, ODeform):
             points = operating_points(predictor, dataset)

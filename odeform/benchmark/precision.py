@@ -5,19 +5,19 @@ error compares the converged integration with the truth. Both are root mean squa
 the body and over the frames of the window.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from odeform.benchmark.probes import nearest_sequences
+from odeform.benchmark.probes import nearest_sequences, random_parameters
 from odeform.benchmark.timing import milliseconds
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.models.frontier import EXACT
 from odeform.models.odeform.model import ODeform
 from odeform.motion.reduced_space import motion_rmse
+from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats
 
@@ -26,6 +26,7 @@ __all__ = ["OperatingPoint", "ladder", "measure", "operating_points", "work_prec
 TIGHTER = 1e-2  # factor on the tolerance of EXACT, to verify that it has converged
 SEQUENCES = 8  # of the test split, nearest to an operating point, for the model error there
 REPEATS = 15
+DRAWS = 64
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class OperatingPoint:
     """A parameter set at which settings are compared; `exact` (T, 6 + K) is the converged reduced motion there."""
 
     name: str
-    parameters: dict[str, float]
+    parameters: Parameters
     exact: Floats
     unsure_mm: float
     """How much the converged motion changes when its tolerance is tightened once more."""
@@ -42,7 +43,7 @@ class OperatingPoint:
     sequences: tuple[str, ...]
 
 
-def _reduced(model: ODeform, parameters: Mapping[str, float], quality: SolverSettings) -> tuple[Floats, int]:
+def _reduced(model: ODeform, parameters: Parameters, quality: SolverSettings) -> tuple[Floats, int]:
     """(T, 6 + K) at the frames of the window, NaN where the integration failed, and the number of evaluations."""
     times = model.schema.window.times
     evaluated = model.evaluate_basis(model.rest, 0.0)
@@ -51,9 +52,12 @@ def _reduced(model: ODeform, parameters: Mapping[str, float], quality: SolverSet
 
 
 def operating_points(model: ODeform, dataset: Dataset | None) -> list[OperatingPoint]:
-    """The default parameters, and the corner of the trained box that takes the most evaluations."""
+    """The default parameters, and the corner of the trained box that takes the most evaluations.
 
-    def solved_at(name: str, parameters: dict[str, float]) -> OperatingPoint:
+    In a scene with objects, which has no corners, the latter is one of `DRAWS` random parameter sets.
+    """
+
+    def solved_at(name: str, parameters: Parameters) -> OperatingPoint:
         exact, _ = _reduced(model, parameters, EXACT)
         tighter, _ = _reduced(model, parameters, replace(EXACT, tolerance=TIGHTER * (EXACT.tolerance or 0.0)))
         unsure, error, names = 1e3 * motion_rmse(tighter, exact, model.space.gyration_radius), None, ()
@@ -64,7 +68,8 @@ def operating_points(model: ODeform, dataset: Dataset | None) -> list[OperatingP
         return OperatingPoint(name, parameters, exact, unsure, error, names)
 
     probe = SolverSettings("dopri5", tolerance=1e-5)
-    hardest = max(model.schema.corners(), key=lambda parameters: _reduced(model, parameters, probe)[1])
+    edges = random_parameters(model, DRAWS) if model.schema.objects else model.schema.corners()
+    hardest = max(edges, key=lambda parameters: _reduced(model, parameters, probe)[1])
     return [solved_at("default", model.schema.complete(None)), solved_at("corner", hardest)]
 
 

@@ -8,7 +8,8 @@ import trimesh
 
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
-from odeform.schema import Parameters
+from odeform.schema import OBJECT, Parameters
+from odeform.simulation.scenes.registry import find_scene
 from odeform.types import GaussianSplats, Mesh, PointCloud, Points
 
 __all__ = ["nearest_sequences", "random_parameters", "round_cloud", "round_mesh", "round_splats"]
@@ -44,16 +45,22 @@ def round_splats(points: int, predictor: Predictor) -> GaussianSplats:
 
 
 def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[Parameters]:
-    """Random parameter sets of the trained box, with one heading: the basis depends on it and is timed separately."""
+    """Random parameter sets of the trained box, with one heading: the basis depends on it and is timed separately.
+
+    In a scene with objects they are drawn as its data are, all of the default object.
+    """
+    schema = predictor.schema
+    if schema.objects and (scene := find_scene(schema.scene)):
+        return list(scene.sample(count, seed, schema.objects[:1]))
     rng = np.random.default_rng(seed)
-    fixed = {p.name: p.default for p in predictor.schema.parameters if p.role == "azimuth"}
-    learned = predictor.schema.learned
-    return [{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in learned} | fixed for _ in range(count)]
+    fixed = {p.name: p.default for p in schema.parameters if p.role == "azimuth"}
+    return [{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in schema.learned} | fixed for _ in range(count)]
 
 
 def nearest_sequences(dataset: Dataset, parameters: Any, count: int) -> Dataset:
     """The `count` test sequences nearest to these parameters, in units of the trained ranges."""
     schema = dataset.schema
     target = schema.vector(parameters)
-    near = sorted(dataset.select("test"), key=lambda e: float(((schema.vector(e.parameters) - target) ** 2).sum()))
+    same_body = dataset.select("test", parameters.get(OBJECT))
+    near = sorted(same_body, key=lambda e: float(((schema.vector(e.parameters) - target) ** 2).sum()))
     return replace(dataset, entries=tuple(near[:count]))

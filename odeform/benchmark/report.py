@@ -5,6 +5,8 @@ from typing import Any
 
 __all__ = ["report"]
 
+SIMULATED = ("simulator_s", "speedup", "skipped")
+
 
 def report(result: Mapping[str, Any]) -> str:
     """Tables of all measurements."""
@@ -13,11 +15,19 @@ def report(result: Mapping[str, Any]) -> str:
         f"{result['model']} of {result['scene']} on {machine['cores']} cores of {machine['processor']}; load average "
         f"at the start {_cell(machine['load'])}; data: {result['data'] or 'none'}"
     ]
-    for part in (_latency, _solver, _speed, _comparisons):
+    for part in (_objects,) if "objects" in result else (_latency, _solver, _speed, _comparisons):
         lines += part(result)
     if any("-" in line.split() for line in lines):
         lines += ["", "-: not measured"]
     return "\n".join(lines)
+
+
+def _objects(result: Mapping[str, Any]) -> list[str]:
+    found = result["objects"]
+    columns = ("object", "quality", "points", "steps", "ms_p50", "ms_p95", "frame_ms", "solver_error_mm")
+    title = f"a new motion of {found['sequences']} pushes of the test split: a trajectory and all of its frames"
+    lines = _table(title, found["qualities"], (*columns, "model_error_mm"))
+    return lines + _table("the simulator, beside the default quality", found["simulator"], ("object", *SIMULATED))
 
 
 def _latency(result: Mapping[str, Any]) -> list[str]:

@@ -3,10 +3,26 @@
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
-from odeform.cli import bench, evaluate, identify, import_, info, pack, predict, simulate, stress, tables, train
-from odeform.errors import InputError
+from odeform.cli import (
+    bench,
+    evaluate,
+    identify,
+    import_,
+    info,
+    pack,
+    predict,
+    simulate,
+    stress,
+    tables,
+    train,
+    unseen,
+)
+from odeform.cli.interrupts import interruptible
+from odeform.cli.options import Parser
+from odeform.errors import FailedCheck, InputError, one_line
 
 __all__ = ["COMMANDS", "Command", "main", "run_guarded"]
 
@@ -39,11 +55,12 @@ COMMANDS: dict[str, Command] = {
     "identify": identify,
     "bench": bench,
     "stress": stress,
+    "unseen": unseen,
     "info": info,
 }
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(Parser):
     """Adds its options when it first parses: the options of other commands would cost their imports."""
 
     command: Command | None = None
@@ -67,11 +84,19 @@ class _Version(argparse.Action):
 
 
 def run_guarded(work: Callable[[], None]) -> int:
-    """Run `work` and return the exit code: 0, 2 with one line on standard error for faulty input, 130 for Ctrl-C."""
+    """Run `work` and return the exit code: 0, 1 for a check that fails and 2 for faulty input, both with one line on
+    standard error, 130 for Ctrl-C."""
     try:
         work()
-    except (InputError, OSError) as error:
-        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+    except InputError as error:
+        print(f"error: {one_line(error)}", file=sys.stderr)
+        return 2
+    except FailedCheck as failure:
+        print(f"failed: {failure}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        named = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else error
+        print(f"error: {one_line(named)}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("interrupted; finished work is kept", file=sys.stderr)
@@ -81,10 +106,26 @@ def run_guarded(work: Callable[[], None]) -> int:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the `odeform` command with the arguments `argv` (default: those of this process); return its exit code."""
+    with interruptible():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     parser = _Parser(prog="odeform", description="Simulate, train, evaluate and run models of soft-body motion.")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, command in COMMANDS.items():
         commands.add_parser(name, help=command.HELP, description=f"{command.HELP}.").command = command
     args = parser.parse_args(argv)
-    return run_guarded(lambda: args.run(args))
+    missing = _missing_folders(args)
+    code = run_guarded(lambda: args.run(args))
+    for folder in (folder for folder in missing if folder.exists()):
+        print(f"note: created the folder {folder}", file=sys.stderr)
+    return code
+
+
+def _missing_folders(args: argparse.Namespace) -> list[Path]:
+    """The folders of the files that a command writes, where they do not exist yet."""
+    files = (getattr(args, name, None) for name in ("out", "json", "map"))
+    folders = dict.fromkeys(Path(file).parent for file in files if file)
+    return [folder for folder in folders if not folder.exists()]

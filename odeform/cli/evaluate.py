@@ -49,12 +49,21 @@ def run(args: argparse.Namespace) -> None:
     print(_table(models))
 
 
+def _rows(key: str, scores: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """The rows of one model: all sequences, the impact, and each object below."""
+    rows = [(key, scores)]
+    rows += [(f"{key} (impact)", scores["impact"])] if "impact" in scores else []
+    objects = scores["per_object"]
+    rows += [(f"  {name}", one) for name, one in objects.items()]
+    return rows + ([(f"  mean of {len(objects)} objects", scores["mean_of_objects"])] if objects else [])
+
+
 def _table(models: dict[str, dict[str, Any]]) -> str:
-    rows = models | {f"{key} (impact)": scores["impact"] for key, scores in models.items() if "impact" in scores}
+    rows = [row for key, scores in models.items() for row in _rows(key, scores)]
     lines = [f"{'model':<24}" + "".join(f"{column:>22}" for column in COLUMNS)]
-    for key, scores in rows.items():
+    for label, scores in rows:
         cells = ("-" if scores[column] is None else f"{scores[column]:.4g}" for column in COLUMNS)
-        lines.append(f"{key:<24}" + "".join(f"{cell:>22}" for cell in cells))
-    if any(scores[column] is None for scores in rows.values() for column in COLUMNS):
+        lines.append(f"{label:<24}" + "".join(f"{cell:>22}" for cell in cells))
+    if any(scores[column] is None for _, scores in rows for column in COLUMNS):
         lines.append("-: not measured")
     return "\n".join(lines)

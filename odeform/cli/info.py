@@ -2,8 +2,12 @@
 
 import argparse
 import json
+from typing import TYPE_CHECKING, Any
 
 from odeform.cli.options import add_checkpoint, add_json, write_json
+
+if TYPE_CHECKING:
+    from odeform.types import Mesh
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -15,16 +19,28 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "write the JSON to this file instead of printing it")
 
 
-def run(args: argparse.Namespace) -> None:
-    from odeform.models.registry import open_checkpoint
+def describe_body(body: "Mesh") -> dict[str, Any]:
+    """Vertices, size in metres, and the distance up to which another shape counts as this one: scores hold for no other
+    shape."""
+    from odeform.geometry.likeness import compare_shapes
 
-    checkpoint = open_checkpoint(args.checkpoint)
+    size = (body.points.max(axis=0) - body.points.min(axis=0)).tolist()
+    return {"vertices": len(body.points), "size_m": size, "tolerance_m": compare_shapes(body, [body]).tolerance}
+
+
+def run(args: argparse.Namespace) -> None:
+    from odeform.models.registry import load
+
+    predictor = load(args.checkpoint)
+    checkpoint = predictor.checkpoint
     result = {
         "schema": checkpoint.schema.to_json(),
         "model": checkpoint.model,
+        "predicts": "the final state only" if predictor.final_only else "motions",
         "size_bytes": checkpoint.size_bytes,
         "numbers": sum(int(array.size) for array in checkpoint.arrays.values()),
         "config": {key: value for key, value in checkpoint.config.items() if key != "trials"},
+        "trained_shapes": [describe_body(body) for body in predictor.bodies],
         "provenance": checkpoint.provenance,
         "scores": {key: value for key, value in checkpoint.scores.items() if key != "per_frame_rmse_mm"},
         "sha256": checkpoint.sha256,

@@ -4,12 +4,14 @@ import argparse
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
-from odeform.errors import InputError
+from odeform.errors import InputError, one_line
 
 __all__ = [
+    "Parser",
     "add_checkpoint",
+    "add_cluster",
     "add_data",
     "add_json",
     "add_quality",
@@ -24,6 +26,13 @@ __all__ = [
 
 CHECKPOINT = "checkpoint file (.safetensors, or .pth of the paper's authors), or bundled: kick, kick/pod-rbf, ..."
 DATA = "data set: a folder, an .odp file, or the name of a bundled one"
+
+
+class Parser(argparse.ArgumentParser):
+    """Prints its errors in one line of a readable length."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(one_line(message))
 
 
 def add_checkpoint(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -61,6 +70,12 @@ def add_quality(parser: argparse.ArgumentParser) -> None:
 def add_seed(parser: argparse.ArgumentParser, purpose: str) -> None:
     """--seed S."""
     parser.add_argument("--seed", type=int, default=0, metavar="S", help=f"random seed of {purpose} (default: 0)")
+
+
+def add_cluster(parser: argparse.ArgumentParser, needs: str = "") -> None:
+    """--cluster ADDRESS, of `odeform.cluster.on_cluster`."""
+    text = f"work on the workers of this Dask scheduler, tcp://HOST:PORT, instead of this machine{needs}"
+    parser.add_argument("--cluster", metavar="ADDRESS", help=text)
 
 
 def add_json(parser: argparse.ArgumentParser, text: str = "also write the result to this file, as JSON") -> None:

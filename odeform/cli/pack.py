@@ -31,7 +31,9 @@ def run(args: argparse.Namespace) -> None:
     if out.suffix != SUFFIX:
         raise InputError(f"--out: expected a name ending in {SUFFIX}, got {args.out!r}")
     took = pack(open_dataset(args.dataset), out, 1e-3 * args.tolerance)
+    modes = "/".join(str(body["modes"]) for body in took["bodies"].values())
+    rmse, worst, vertex = (1e3 * took[key] for key in ("rmse_m", "largest_rmse_m", "largest_error_m"))
     print(
-        f"{out}: {out.stat().st_size / 1e6:.2f} MB, {took['modes']} modes, RMSE of a sequence at most "
-        f"{1e3 * took['largest_rmse_m']:.4f} mm, error of a vertex at most {1e3 * took['largest_error_m']:.3f} mm"
+        f"{out}: {out.stat().st_size / 1e6:.2f} MB, {modes} modes, RMSE {rmse:.4f} mm, of a sequence at most "
+        f"{worst:.4f} mm, error of a vertex at most {vertex:.3f} mm"
     )

@@ -2,8 +2,17 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from odeform.cli.options import add_checkpoint, add_quality, parse_settings
+from odeform.errors import InputError
+from odeform.io import require_writable
+
+if TYPE_CHECKING:
+    from odeform.models.base import Predictor
+    from odeform.motion.recorded import RecordedMotion
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -29,36 +38,82 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="parameters in the units of `odeform info CKPT`; vectors as X,Y,Z; defaults for the others",
     )
     parser.add_argument(
+        "--truth",
+        metavar="DATASET/NAME",
+        help="stored or simulated sequence: predict its motion, and write errors against it (.csv)",
+    )
+    parser.add_argument(
         "--times", metavar="START:STOP:STEP", help="times in seconds, STOP excluded (default: the trained frames)"
     )
+    parser.add_argument("--force", action="store_true", help="overwrite files that exist")
     add_quality(parser)
 
 
 def run(args: argparse.Namespace) -> None:
     from odeform.formats.bundled import read_shape
     from odeform.formats.times import parse_times
-    from odeform.formats.writing import write_motion
+    from odeform.formats.writing import motion_files, write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import Similarity
-    from odeform.models.registry import load
+    from odeform.models.mechanical.own_body import OwnBodyPredictor, own_body, takes_own_bodies
+    from odeform.models.registry import load, observations
+    from odeform.motion.caveats import caveats
     from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
-    fit = None
+    _require_new(motion_files(args.out, len(times), args.truth is not None), args.force)
+    fit, settings = None, parse_settings(args.set)
+    truth, settings = _read_truth(args, predictor, settings) if args.truth else (None, settings)
     if args.geometry is None and not predictor.rescales_input:
         _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
+    elif args.geometry is not None and takes_own_bodies(predictor):
+        predictor = OwnBodyPredictor(predictor, own_body(read_shape(args.geometry)[0], Path(args.geometry).name))
+        fit, settings = predictor.own.fit, {**predictor.parameters_like(), **settings}
+        _note(f"{args.geometry}: its material and forces are those of the {predictor.own.like}")
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
         fit = fit_to(shape, predictor.rest, region, transform=None if predictor.rescales_input else Similarity())
-    geometry = fit.geometry if fit else None
+    geometry = fit.geometry if fit else truth and predictor.to_body_frame(truth.geometry, settings)
     for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
         _note(f"{args.geometry}: {note}")
-    motion = predictor.solve(geometry, parse_settings(args.set), args.quality, until=float(times[-1]))
-    write_motion(motion, times, args.out, fit)
-    for name in motion.outside:
-        _note(f"{name} = {motion.parameters[name]:g} is outside the trained range")
-    print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {motion.stats.status}")
+    observed = truth and observations(predictor.schema, truth.sequence)
+    motion = predictor.solve(geometry, settings, args.quality, until=float(times[-1]), observed=observed)
+    write_motion(motion, times, args.out, fit, truth)
+    for caveat in caveats(motion, times):
+        _note(caveat)
+    stop = motion.first_stop(float(times.max()))
+    status = motion.stats.status if stop is None else f"stopped at t = {stop.time:.3f} s"
+    print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {status}")
+
+
+def _read_truth(
+    args: argparse.Namespace, predictor: "Predictor", settings: dict[str, Any]
+) -> "tuple[RecordedMotion, dict[str, Any]]":
+    """The sequence of `--truth`, and its parameters with those of `--set`."""
+    from odeform.dataset.recorded import read_recorded
+
+    if args.geometry is not None:
+        raise InputError("--truth compares the truth's own body: leave out --geometry")
+    truth, schema = read_recorded(args.truth), predictor.schema
+    if truth.schema.scene != schema.scene:
+        raise InputError(f"--truth {args.truth}: expected a sequence of {schema.scene}, got {truth.schema.scene}")
+    settings = schema.complete({**schema.known(truth.setting), **schema.expanded(settings)})
+    if not truth.of(settings):
+        raise InputError(f"--truth {args.truth}: --set gives other parameters than the sequence has")
+    return truth, settings
+
+
+def _require_new(files: Sequence[Path], force: bool) -> None:
+    """`InputError` where a file cannot be written, or exists and is not to be overwritten."""
+    folder = files[0].parent
+    if not folder.is_dir():
+        raise InputError(f"--out {files[0]}: expected a folder that exists, got {folder}")
+    require_writable(files[0])
+    existing = [] if force else [file for file in files if file.exists()]
+    if existing:
+        more = f" and {len(existing) - 1} more" if len(existing) > 1 else ""
+        raise InputError(f"--out: {existing[0]}{more} would be overwritten; add --force if that is meant")
 
 
 def _note(text: str) -> None:

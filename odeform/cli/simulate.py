@@ -3,7 +3,8 @@
 import argparse
 import os
 
-from odeform.cli.options import add_seed
+from odeform.cli.options import add_cluster, add_seed
+from odeform.errors import FailedCheck
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -16,13 +17,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     cores = os.cpu_count() or 1
     parser.add_argument("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
     parser.add_argument(
-        "--out", required=True, metavar="DIR", help="folder to write to; an interrupted simulation is continued"
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="folder to write to; an interrupted simulation is continued, a smaller data set extended",
     )
-    parser.add_argument("--count", type=int, metavar="N", help="number of sequences (default: the scene's)")
+    parser.add_argument(
+        "--count", type=int, metavar="N", help="number of sequences, of each object (default: the scene's)"
+    )
+    parser.add_argument(
+        "--object", nargs="+", action="extend", default=[], metavar="NAME", help="objects to simulate (default: all)"
+    )
     add_seed(parser, "parameters and splits")
     parser.add_argument(
         "--workers", type=int, default=cores, metavar="W", help=f"number of processes (default: {cores}, one per core)"
     )
+    add_cluster(parser)
     parser.add_argument("--rate", type=float, metavar="HZ", help="frames per second (default: the scene's)")
     parser.add_argument(
         "--corners", action="store_true", help="also simulate the corners of the parameter box, for training"
@@ -30,10 +40,16 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    from odeform.simulation.runner import simulate
+    from odeform.cluster import on_cluster
+    from odeform.simulation.runner import UNEXPECTED, simulate
 
-    dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, args.rate, corners=args.corners)
+    with on_cluster(args.cluster):
+        dataset = simulate(
+            args.scene, args.out, args.count, args.seed, args.workers, args.rate, None, args.corners, args.object
+        )
     failed = [entry for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {len(failed) or 'none'}")
     for entry in failed:
         print(f"{entry.name} failed: {entry.status}")
+    if unexpected := sum(entry.status.startswith(UNEXPECTED) for entry in failed):
+        raise FailedCheck(f"{unexpected} sequences ended with an unexpected error; the same command tries them again")

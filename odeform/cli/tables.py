@@ -4,7 +4,7 @@ import argparse
 import os
 from pathlib import Path
 
-from odeform.cli.options import positive
+from odeform.cli.options import add_cluster, positive
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -23,14 +23,19 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--jobs", type=int, default=cores, metavar="N", help=f"trainings at a time (default: {cores}, one per core)"
     )
+    add_cluster(parser, "; they must see the folder of --keep")
     parser.add_argument(
         "--kept-only", action="store_true", help="train nothing; entries that are not in DIR stay empty"
     )
 
 
 def run(args: argparse.Namespace) -> None:
+    from odeform.cluster import on_cluster
     from odeform.tables.tables import tables
 
     positive("--share", args.share)
     positive("--jobs", args.jobs)
-    tables(Path(args.keep), Path(args.out), args.share, args.jobs, args.kept_only)
+    keep = Path(args.keep).resolve()  # workers have other current folders
+    keep.mkdir(parents=True, exist_ok=True)
+    with on_cluster(args.cluster, shared=keep):
+        tables(keep, Path(args.out), args.share, args.jobs, args.kept_only)

@@ -11,6 +11,7 @@ HELP = "Train a model on a data set and score it on the test split"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     from odeform.models.registry import MODELS
+    from odeform.training.request import ABLATIONS
 
     parser.add_argument("dataset", metavar="DATASET", help=DATA)
     parser.add_argument("--out", required=True, metavar="FILE", help="checkpoint to write")
@@ -32,6 +33,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steps", type=int, metavar="N", help="number of training steps, in place of --minutes; repeatable"
     )
+    parser.add_argument(
+        "--sequences", type=int, metavar="N", help="train on the first N training sequences (default: all)"
+    )
+    parser.add_argument(
+        "--without", default="", metavar="PART,...", help=f"leave out parts of odeform, of {', '.join(ABLATIONS)}"
+    )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted training from FILE.part")
 
 
@@ -40,5 +47,7 @@ def run(args: argparse.Namespace) -> None:
     from odeform.training.train import train
 
     dataset, window = open_dataset(args.dataset), parse_window(args.window)
-    chosen = {name: getattr(args, name) for name in ("minutes", "steps", "seed", "every", "stagger", "resume")}
-    train(dataset, args.out, args.model, window=window, **chosen)
+    options = ("minutes", "steps", "seed", "every", "stagger", "resume", "sequences")
+    chosen = {name: getattr(args, name) for name in options}
+    without = [name for name in args.without.split(",") if name]
+    train(dataset, args.out, args.model, window=window, without=without, **chosen)

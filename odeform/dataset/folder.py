@@ -11,14 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from odeform.budget import MEMORY, read_limited
+from odeform.dataset.arrays import checked_sequence, read_arrays
 from odeform.dataset.index import Dataset, Entry, Reader, index_from_json, index_to_json
 from odeform.errors import InputError
 from odeform.io import atomic_write
 from odeform.types import MotionSequence
 
-__all__ = ["INDEX", "folder_reader", "open_folder", "save_sequence", "write_index"]
+__all__ = ["INDEX", "encode_sequence", "folder_reader", "open_folder", "save_encoded", "save_sequence", "write_index"]
 
 INDEX = "dataset.json"
+LARGEST_INDEX = 1 << 26  # bytes
 
 
 def folder_reader(root: Path) -> Reader:
@@ -27,26 +30,21 @@ def folder_reader(root: Path) -> Reader:
     def read(entry: Entry) -> MotionSequence:
         path = root / f"{entry.name}.npz"
         try:
-            data = path.read_bytes()
+            if not path.resolve().is_relative_to(root.resolve()):
+                raise InputError(f"{path}: outside of the data set")
+            data = read_limited(path, str(path), MEMORY // 4)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror}") from None
         if hashlib.sha256(data).hexdigest() != entry.sha256:
             raise InputError(f"{path}: checksum does not match {INDEX}; the file is damaged or was changed")
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return MotionSequence(
-                arrays["times"],
-                arrays["vertices"],
-                arrays["faces"],
-                arrays["weights"],
-                dict(entry.parameters),
-                entry.name,
-            )
+        sequence = MotionSequence(**read_arrays(data, str(path)), parameters=dict(entry.parameters), name=entry.name)
+        return checked_sequence(sequence, str(path))
 
     return read
 
 
-def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
-    """Write one sequence to `<root>/<name>.npz` and return its SHA-256."""
+def encode_sequence(sequence: MotionSequence) -> bytes:
+    """The contents of a sequence's file. The same sequence gives the same bytes."""
     buffer = io.BytesIO()
     np.savez(
         buffer,
@@ -55,7 +53,16 @@ def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
         faces=sequence.faces.astype(np.int32),
         weights=sequence.weights,
     )
-    data = buffer.getvalue()
+    return buffer.getvalue()
+
+
+def save_sequence(root: Path, name: str, sequence: MotionSequence) -> str:
+    """Write one sequence to `<root>/<name>.npz` and return its SHA-256."""
+    return save_encoded(root, name, encode_sequence(sequence))
+
+
+def save_encoded(root: Path, name: str, data: bytes) -> str:
+    """Write what `encode_sequence` returned as `save_sequence` does."""
     atomic_write(root / f"{name}.npz", data)
     return hashlib.sha256(data).hexdigest()
 
@@ -68,7 +75,7 @@ def write_index(dataset: Dataset) -> None:
 def open_folder(root: Path) -> Dataset:
     """Open the data set in the folder `root`. Raises `InputError` if there is none."""
     try:
-        data = (root / INDEX).read_bytes()
+        data = read_limited(root / INDEX, str(root / INDEX), LARGEST_INDEX)
     except OSError as error:
         raise InputError(f"{root}: expected a data set folder with {INDEX}: {error.strerror}") from None
     return index_from_json(data, root / INDEX, root, lambda _: folder_reader(root))

@@ -1,20 +1,22 @@
 """A data set: an index of sequences, and a reader of one sequence at a time."""
 
 import json
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.schema import Schema
+from odeform.io import parse_json
+from odeform.schema import OBJECT, Schema
 from odeform.types import MotionSequence
 
-__all__ = ["Dataset", "Entry", "Reader", "assign_splits", "index_from_json", "index_to_json"]
+__all__ = ["Dataset", "Entry", "Reader", "assign_splits", "assign_splits_in_blocks", "index_from_json", "index_to_json"]
 
 FORMAT = 1
+BLOCK = 10  # sequences in which splits have their shares
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,7 @@ class Entry:
 
     name: str
     split: str
-    parameters: dict[str, float]
+    parameters: dict[str, Any]
     sha256: str = ""
     status: str = "ok"
 
@@ -65,26 +67,64 @@ class Dataset:
     """Quantities that are the same in all sequences, for instance a radius in m."""
     provenance: dict[str, Any] = field(default_factory=dict)
 
-    def select(self, split: str) -> list[Entry]:
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the objects with sequences, in the order of the schema; () for a scene of one body.
+
+        All sequences of an object have one mesh.
+        """
+        present = {entry.parameters.get(OBJECT) for entry in self.select("all")}
+        return tuple(name for name in self.schema.objects if name in present)
+
+    def select(self, split: str, object: str | None = None) -> list[Entry]:
         """Entries of the split "train", "val", "test" or "all" whose simulation succeeded.
 
+        `object` restricts them to one object of a scene with several.
+
         Raises:
-            InputError: An unknown split.
+            InputError: An unknown split or object.
         """
         if split not in ("train", "val", "test", "all"):
             raise InputError(f"split: expected train, val, test or all, got {split!r}")
-        return [e for e in self.entries if e.status == "ok" and split in ("all", e.split)]
+        if object is not None:
+            self.schema.check_object(object)
+        return [
+            entry
+            for entry in self.entries
+            if entry.status == "ok" and split in ("all", entry.split) and object in (None, entry.parameters.get(OBJECT))
+        ]
 
-    def sequences(self, split: str) -> Iterator[MotionSequence]:
+    def of(self, object: str) -> "Dataset":
+        """The sequences of one object alone, failed ones included. `InputError` for an object that is not there."""
+        schema = replace(self.schema, objects=(self.schema.check_object(object),))
+        entries = tuple(entry for entry in self.entries if entry.parameters.get(OBJECT) == object)
+        return replace(self, schema=schema, entries=entries)
+
+    def sequences(self, split: str, object: str | None = None) -> Iterator[MotionSequence]:
         """The sequences of a split, read one at a time; see `select`."""
-        return (self.read(entry) for entry in self.select(split))
+        return (self.read(entry) for entry in self.select(split, object))
 
 
 def assign_splits(count: int, seed: int) -> list[str]:
     """70 % train, 10 % val, 20 % test, in random order."""
+    return _shuffled(count, np.random.default_rng(seed))
+
+
+def assign_splits_in_blocks(count: int, seed: int, standard: int) -> list[str]:
+    """As `assign_splits` in each block of ten, up to `standard` sequences; all further ones are for training.
+
+    A longer list starts with the shorter one.
+    """
+    rng = np.random.default_rng(seed)
+    blocks = -(-standard // BLOCK)
+    labels = [label for _ in range(blocks) for label in _shuffled(BLOCK, rng)][:standard]
+    return [*labels, *["train"] * (count - standard)][:count]
+
+
+def _shuffled(count: int, rng: np.random.Generator) -> list[str]:
     train, val = round(0.7 * count), round(0.1 * count)
     labels = np.array(["train"] * train + ["val"] * val + ["test"] * (count - train - val))
-    return [str(label) for label in np.random.default_rng(seed).permutation(labels)]
+    return [str(label) for label in rng.permutation(labels)]
 
 
 def index_to_json(dataset: Dataset, **more: Any) -> bytes:
@@ -102,15 +142,24 @@ def index_to_json(dataset: Dataset, **more: Any) -> bytes:
 
 def index_from_json(data: bytes, where: Path, root: Path, reader: Any) -> Dataset:
     """The inverse of `index_to_json`; `reader(index)` makes the reader. Raises `InputError`, which names `where`."""
-    try:
-        index = json.loads(data)
-    except ValueError:
-        raise InputError(f"{where}: not valid JSON") from None
+    index = parse_json(data, str(where))
     if not isinstance(index, dict) or index.get("format") != FORMAT:
         raise InputError(f"{where}: expected an index of format {FORMAT}")
     try:
-        entries = tuple(Entry(**entry) for entry in index["sequences"])
         schema = Schema.from_json(index["schema"])
-        return Dataset(root, schema, entries, reader(index), index["fixed"], index["provenance"])
-    except (KeyError, TypeError) as error:
+        entries = tuple(_entry(entry, schema) for entry in index["sequences"])
+        fixed = {str(name): float(value) for name, value in index["fixed"].items()}
+        return Dataset(root, schema, entries, reader(index), fixed, dict(index["provenance"]))
+    except InputError as error:
+        raise InputError(error if str(where) in str(error) else f"{where}: {error}") from None
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise InputError(f"{where}: missing or invalid field {error}") from None
+
+
+def _entry(raw: Mapping[str, Any], schema: Schema) -> Entry:
+    entry = Entry(**raw)
+    for text in (entry.name, entry.split, entry.sha256, entry.status):
+        if not isinstance(text, str):
+            raise TypeError(f"{text!r}: expected text")
+    schema.complete(schema.known(entry.parameters))
+    return entry

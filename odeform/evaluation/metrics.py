@@ -8,10 +8,10 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.evaluation.scores import Mask, Scores
+from odeform.evaluation.scores import Comparison, Mask, Scores, mean_of
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
-from odeform.schema import Schema, Window
+from odeform.schema import OBJECT, Schema, Window
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, MotionSequence
 
@@ -46,7 +46,8 @@ def evaluate(
 
     Returns:
         Scores by name: errors in mm (`rmse_mm`, `mae_mm`, `rmse_pooled_mm`, `vertex_mm`, ...) and ratios (`relative`,
-        `deformation_relative`, `coverage_90`). Without a window, the impact of a scene is also scored as `impact`.
+        `deformation_relative`, `coverage_90`). Without a window, the impact of a scene is also scored as `impact`. In a
+        scene with objects, `per_object` has the scores of each by name, and `mean_of_objects` their means.
 
     Raises:
         InputError: Another scene, an empty split, or a window without frames to score.
@@ -65,30 +66,38 @@ def evaluate(
     spans = _spans(predictor, schema, window, clock)
     spans |= {f"{part[0]}:{part[1]}": _spans(predictor, schema, part, clock)["whole"] for part in parts}
     scores = {name: Scores() for name in spans}
-    covered = [
-        _score_sequence(predictor, dataset, recorded, quality, clock, spans, scores)
-        for recorded in dataset.sequences(split)
-    ]
+    objects: dict[str, Scores] = {}
+    for recorded in dataset.sequences(split):
+        compared = _compared(predictor, dataset, recorded, quality, clock, spans)
+        for name, comparison in compared.items():
+            scores[name].add(*comparison)
+        if body := recorded.parameters.get(OBJECT):
+            objects.setdefault(body, Scores()).add(*compared["whole"])
     result = scores["whole"].result()
     result |= {name: scored.result() for name, scored in scores.items() if name != "whole"}
-    result["per_object"] = {}
-    within = np.concatenate(covered)
-    result["coverage_90"] = None if np.isnan(within).any() else float(within.mean())
-    data = ("rest.", "training.", "val.")
-    result["parameters"] = sum(int(a.size) for k, a in predictor.checkpoint.arrays.items() if not k.startswith(data))
+    result["per_object"] = {name: scored.result() for name, scored in objects.items()}
+    if objects:
+        result["mean_of_objects"] = mean_of(list(result["per_object"].values()))
+    result["parameters"] = _learned_numbers(predictor)
     return result
 
 
-def _score_sequence(
+def _learned_numbers(predictor: Predictor) -> int:
+    """The number of values in a checkpoint without the body, the training parameters and the validation errors."""
+    data = ("rest.", "training.", "val.")
+    arrays = predictor.checkpoint.arrays.items()
+    return sum(int(array.size) for key, array in arrays if not key.rpartition("/")[2].startswith(data))
+
+
+def _compared(
     predictor: Predictor,
     dataset: Dataset,
     recorded: MotionSequence,
     quality: str | SolverSettings,
     clock: float,
     spans: dict[str, tuple[float, float]],
-    scores: dict[str, Scores],
-) -> Floats:
-    """Predict one sequence and add it to the scores of each span; returns `_covered` of the scored frames."""
+) -> dict[str, Comparison]:
+    """The prediction of one sequence beside it, in each span."""
     window, trained = dataset.schema.window, predictor.schema.window
     whole = recorded.until(window.stop)
     needed = _within(whole.times, *spans.values())
@@ -105,13 +114,12 @@ def _score_sequence(
     predicted = motion.vertices(clock + truth.times)
     on_frames = _on_frames(truth.times, window)
     between = ~_on_frames(clock + truth.times, trained) & (clock + truth.times < trained.stop)
+    covered, out = _covered(predictor, predicted, truth), {}
     for name, span in spans.items():
         inside = _within(truth.times, span)
         part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
-        scores[name].add(predicted[inside], part, on_frames[inside], between[inside])
-    begin, end = spans["whole"]
-    scored = on_frames & (truth.times > max(begin - 1e-6, 0.0)) & (truth.times < end - 1e-6)
-    return _covered(predictor, predicted, truth)[scored]
+        out[name] = (predicted[inside], part, on_frames[inside], between[inside], covered[inside])
+    return out
 
 
 def _on_frames(times: Floats, window: Window) -> Mask:
@@ -135,10 +143,12 @@ def _spans(
         raise InputError(f"window {window}: scene {schema.scene} has {round(stop * rate) + 1} frames")
     if not predictor.extrapolates:
         begin, end = max(begin, trained.start - clock), min(end, trained.stop - clock + 0.5 / rate)
+        if predictor.final_only:
+            begin = max(begin, trained.stop - clock - 0.01 / rate)
         if end <= begin:
             raise InputError(f"window {window}: {predictor.model} covers only {trained.start:g} to {trained.stop:g} s")
     spans = {"whole": (begin, end)}
-    if schema.impact and window is None:
+    if schema.impact and window is None and not predictor.final_only:
         spans["impact"] = schema.impact
     return spans
 

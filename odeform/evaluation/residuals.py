@@ -1,22 +1,35 @@
-"""The errors of a model on the validation split, from which its error band is estimated."""
+"""What a model does on data it was made from: errors, for its error band, and depths, for the watch over motions."""
+
+import itertools
 
 import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
+from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import observations
 from odeform.types import Arrays
 
-__all__ = ["validation_residuals"]
+__all__ = ["trained_depth", "validation_residuals"]
+
+SEQUENCES, FEW = 64, 8  # training sequences whose depth is looked up; few for models that move each point by itself
 
 
 def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "val") -> Arrays:
     """Arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and `val.rmse_mm` (S, T),
-    the RMSE over all coordinates of each frame of each sequence."""
+    the RMSE over all coordinates of each frame of each sequence; of several objects each, as OBJECT/val.theta."""
+    if len(dataset.objects) < 2:
+        return _residuals(predictor, dataset, split)
+    each = {name: _residuals(predictor, dataset.of(name), split) for name in dataset.objects}
+    return {f"{name}/{key}": array for name, arrays in each.items() for key, array in arrays.items()}
+
+
+def _residuals(predictor: Predictor, dataset: Dataset, split: str) -> Arrays:
     window = predictor.schema.window
     # the error at given frames says nothing about the frames between them
     rate = dataset.schema.window.rate if predictor.schema.needs_observations else window.rate
     times = np.linspace(window.start, window.stop, round((window.stop - window.start) * rate) + 1)
+    times = times[[0, -1]] if predictor.final_only else times
     theta, errors = [], []
     for recorded in dataset.sequences(split):
         truth = recorded.until(window.stop)
@@ -31,3 +44,27 @@ def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "v
         "val.times": times.astype(np.float32),
         "val.rmse_mm": np.array(errors, dtype=np.float32),
     }
+
+
+def trained_depth(predictor: Predictor, dataset: Dataset) -> Arrays:
+    """Array of a checkpoint: `trained.depth_m` (1,), how far below z = 0 predicted motions of the training split take
+    the trained body, in metres; of several objects each, as OBJECT/trained.depth_m.
+
+    A coarse mesh that rests on its faces leaves the fine body that stands for it some millimetres in the floor.
+    """
+    if len(dataset.objects) < 2:
+        return _depth(predictor, dataset)
+    each = {name: _depth(predictor, dataset.of(name)) for name in dataset.objects}
+    return {f"{name}/{key}": array for name, arrays in each.items() for key, array in arrays.items()}
+
+
+def _depth(predictor: Predictor, dataset: Dataset) -> Arrays:
+    depth, window = 0.0, predictor.schema.window
+    count = SEQUENCES if isinstance(predictor, ReducedModel) else FEW
+    for recorded in itertools.islice(dataset.sequences("train"), count):
+        given = observations(predictor.schema, recorded.until(window.stop))
+        watch = predictor.solve(None, recorded.parameters, observed=given).watch
+        if watch is None:
+            return {}
+        depth = max(depth, -float(watch.sample(window.times).lowest.min()))
+    return {"trained.depth_m": np.array([depth], dtype=np.float32)}

@@ -5,18 +5,26 @@ sequences. The others average over the coordinates of a frame first, then over f
 (arXiv:2607.20670), so that the mean RMSE squared lies below the mean MSE.
 """
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
 from odeform.types import Floats, Frames, MotionSequence, Perpoint, Points
 
-__all__ = ["Mask", "Scores"]
+__all__ = ["Comparison", "Mask", "Scores", "mean_of"]
 
 Mask = NDArray[np.bool_]
+Comparison = tuple[Frames, MotionSequence, Mask, Mask, Floats]
+"""The arguments of `Scores.add`."""
+AVERAGED = (
+    *("rmse_mm", "mae_mm", "mse_mm2", "rmse_pooled_mm", "mae_pooled_mm", "mse_pooled_mm2", "vertex_mm"),
+    *("relative", "deformation_relative", "off_grid_rmse_mm", "coverage_90"),
+)
 
 
 def _deformation(vertices: Frames, rest: Points, weights: Perpoint) -> Frames:
@@ -37,13 +45,22 @@ class Scores:
         self._distance: list[Floats] = []
         self._between: list[Floats] = []
         self._moved: list[Floats] = []
+        self._covered: list[Floats] = []
         self._residual = self._reference = 0.0
 
-    def add(self, predicted: Frames, truth: MotionSequence, counted: Mask, between: Mask) -> None:
+    def add(
+        self,
+        predicted: Frames,
+        truth: MotionSequence,
+        counted: Mask,
+        between: Mask,
+        covered: Float[np.ndarray, " times"] | None = None,
+    ) -> None:
         """Add a prediction (T, N, 3) in metres of the sequence `truth`.
 
         Scores average over the frames `counted` (T,), except frame 0. The frames `between` (T,) lie between those that
-        the model was trained on, and are scored separately.
+        the model was trained on, and are scored separately. `covered` (T,) is 1 where the error is within the model's
+        error band, else 0; NaN or None without a band.
         """
         error = 1e3 * (predicted.astype(float) - truth.vertices)
         grid = counted.copy()
@@ -53,6 +70,7 @@ class Scores:
         self._mae.append(np.abs(error).mean(axis=(1, 2))[grid])
         self._distance.append(np.linalg.norm(error, axis=2).mean(axis=1)[grid])
         self._between.append(squares[between])
+        self._covered.append((np.full(len(grid), np.nan) if covered is None else covered)[grid])
         self._moved.append(1e6 * ((truth.vertices - truth.vertices[0]).astype(float) ** 2).mean(axis=(1, 2))[grid])
         rest = truth.vertices[0]
         true_local = _deformation(truth.vertices, rest, truth.weights)
@@ -69,6 +87,7 @@ class Scores:
             raise InputError("evaluate: expected at least one sequence")
         mse, mae, between = (np.concatenate(rows) for rows in (self._mse, self._mae, self._between))
         pooled, moved = float(np.sqrt(mse.mean())), float(np.sqrt(np.concatenate(self._moved).mean()))
+        covered = np.concatenate(self._covered)
         even = len({len(row) for row in self._mse}) == 1
         return {
             "rmse_mm": float(np.sqrt(mse).mean()),
@@ -81,6 +100,13 @@ class Scores:
             "relative": pooled / moved if moved else None,
             "deformation_relative": float(np.sqrt(self._residual / self._reference)) if self._reference else None,
             "off_grid_rmse_mm": float(np.sqrt(between.mean())) if between.size else None,
+            "coverage_90": None if np.isnan(covered).any() else float(covered.mean()),
             "per_frame_rmse_mm": np.sqrt(np.mean(np.stack(self._mse), axis=0)).tolist() if even else [],
             "sequences": len(self._mse),
         }
+
+
+def mean_of(results: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+    """The mean of each score over several results, each with equal weight; None for a score that one of them lacks."""
+    rows = {name: [result[name] for result in results] for name in AVERAGED}
+    return {name: None if None in row else float(np.mean(row)) for name, row in rows.items()}

@@ -13,10 +13,13 @@ import numpy as np
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.evaluation.scores import Scores
+from odeform.models.continuation import Dynamics
+from odeform.motion.reduced_space import POSE, ReducedSpace, decompose, rotation_of, to_canonical
+from odeform.schema import Schema
 from odeform.simulation.physics import GRAVITY
 from odeform.types import Frames, MotionSequence
 
-__all__ = ["ballistic", "evaluate_simple", "hold_last", "spline_through"]
+__all__ = ["SimplePredictor", "ballistic", "continued", "evaluate_simple", "hold_last", "spline_through"]
 
 SimplePredictor = Callable[[MotionSequence, int], Frames]
 """Predicts frames (T, N, 3) m from a true sequence and its index in the split."""
@@ -44,6 +47,33 @@ def ballistic(observed: int, gravity: float = GRAVITY) -> SimplePredictor:
         return hold_last(observed)(truth, index) + shift[:, None]
 
     return fly
+
+
+def continued(observed: int, dynamics: Dynamics, space: ReducedSpace, schema: Schema) -> SimplePredictor:
+    """Continue the first `observed` frames as models of reduced coordinates are continued beyond their windows.
+
+    The last two of these frames are projected onto the basis of `space`, whose training mesh the sequences must have.
+    """
+
+    def go_on(truth: MotionSequence, index: int) -> Frames:
+        azimuth = schema.azimuth(truth.parameters)
+        given = replace(truth, times=truth.times[:observed], vertices=truth.vertices[:observed])
+        pose, deformation = decompose(given, space.anchor, azimuth)
+        rest = to_canonical(truth.vertices[0], space.anchor, azimuth)
+        modes = space.basis.values(rest)
+        flat, root = modes.reshape(-1, modes.shape[-1]), np.sqrt(np.repeat(truth.weights, 3))
+        last = (deformation[-2:].reshape(2, -1) * root) @ np.linalg.pinv(flat * root[:, None]).T
+        frames = list(np.concatenate([pose[-2:], last], axis=1))
+        theta = schema.vector(truth.parameters)[None]
+        while len(frames) < len(truth.times) - observed + 2:
+            frames.append(dynamics.next(frames[-2][None], frames[-1][None], theta)[0])
+        later = np.stack(frames[2:]).reshape(-1, POSE + modes.shape[-1])
+        rotation, shift = rotation_of(later[:, :POSE], azimuth)
+        body = rest + (later[:, POSE:] @ flat.T).reshape(-1, *rest.shape)
+        moved = np.einsum("tij,tnj->tni", rotation, body) + (shift + space.anchor)[:, None]
+        return np.concatenate([given.vertices, moved.astype(np.float32)])
+
+    return go_on
 
 
 def spline_through(subsampling: FrameSubsampling) -> SimplePredictor:

@@ -10,6 +10,7 @@ import numpy as np
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.motion.base import Motion
+from odeform.motion.caveats import caveats
 from odeform.types import Floats, GaussianSplats, Mesh
 
 __all__ = ["write_npz"]
@@ -21,12 +22,14 @@ def write_npz(file: IO[bytes], motion: Motion, times: Floats, fit: FittedShape |
     """`times` (T,) s, `parameters` as JSON, and `vertices` (T, N, 3) m float32 with `faces` (F, 3), or for splats
     `centers` (T, N, 3) and `covariances` (T, N, 3, 3).
 
-    With `fit`, lengths are in the units of its file, and only the part that moves is written. Like
-    `numpy.savez_compressed`, but one frame at a time: moving splats may exceed the memory.
+    `notes`, as JSON, is a list of sentences: what has to be known of the motion (`odeform.motion.caveats`), such as
+    that its shape was not trained. With `fit`, lengths are in the units of its file, and only the part that moves is
+    written. Like `numpy.savez_compressed`, but one frame at a time: moving splats may exceed the memory.
     """
     back = fit.transform.inverse if fit else Similarity()
     geometry = motion.geometry
     small = {"times": times, "parameters": np.array(json.dumps(dict(motion.parameters)))}
+    small["notes"] = np.array(json.dumps(caveats(motion, times)))
     splats = isinstance(geometry, GaussianSplats)
     if not splats:
         small["faces"] = np.asarray(geometry.faces if isinstance(geometry, Mesh) else np.zeros((0, 3)), dtype=np.int32)

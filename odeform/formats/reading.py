@@ -1,5 +1,6 @@
 """Reading geometries. Every file is validated here, once; anything wrong with it raises `InputError`."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from odeform.geometry.parts import subset
 from odeform.types import GaussianSplats, Geometry, Mesh
 
 __all__ = ["read_geometry"]
+
+EXTENT = (1e-15, 1e15)
+"""Of a shape in the units of its file. Squares of lengths, and their inverses, are then numbers of single precision."""
 
 
 def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
@@ -45,10 +49,14 @@ def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
     if suffix not in READERS:
         raise InputError(f"geometry {path}: expected one of {', '.join(READERS)}, got {suffix or 'no ending'}")
     try:
-        with np.errstate(over="ignore", invalid="ignore"):  # values that are not finite are counted below
+        # values that are not finite are counted below; warnings of parsers are about files that are refused or fine
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             geometry: Geometry = load_function(READERS[suffix].read)(path, merge)
     except InputError:
         raise
+    except MemoryError:
+        raise InputError(f"geometry {path}: cannot be read as {suffix}: it takes too much memory") from None
     except Exception as error:
         # parsers raise anything on a broken file
         raise InputError(f"geometry {path}: cannot be read as {suffix}: {error}") from None
@@ -68,8 +76,14 @@ def _validated(geometry: Geometry, path: Path) -> Geometry:
     points = geometry.points
     if len(points) < 2:
         raise InputError(f"geometry {path}: expected at least 2 points, got {len(points)}")
-    if np.ptp(points, axis=0).max() <= 0.0:
+    extent = float(np.ptp(points.astype(float), axis=0).max())
+    if extent <= 0.0:
         raise InputError(f"geometry {path}: all {len(points)} points coincide")
+    if not EXTENT[0] <= extent <= np.abs(points).max(initial=extent) <= EXTENT[1]:
+        raise InputError(
+            f"geometry {path}: expected an extent and coordinates from {EXTENT[0]:g} to {EXTENT[1]:g}, "
+            f"got an extent of {extent:.3g} and coordinates up to {np.abs(points).max():.3g}"
+        )
     if isinstance(geometry, Mesh):
         if len(geometry.faces) == 0:
             raise InputError(f"geometry {path}: a mesh without faces")

@@ -5,7 +5,9 @@ Modules are named, not imported: help texts and menus list the formats without l
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from typing import Any
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "motion_endings",
     "motion_formats",
     "shape_formats",
+    "writers",
 ]  # fmt: skip
 
 FRAME = "{frame}"
@@ -44,7 +47,9 @@ class Writer:
     file per frame."""
     motion: str = ""
     """"module:function" with the signature `(file: IO[bytes], motion: Motion, times, fit) -> None`, as `write_motion`,
-    for all frames in one file."""
+    for all frames in one file. Where there is a `shape` too, a single frame is written as a shape."""
+    compares: bool = False
+    """Whether `motion` also takes `truth`, a `RecordedMotion`, for errors against it."""
 
 
 READERS: dict[str, Reader] = {
@@ -60,22 +65,39 @@ READERS: dict[str, Reader] = {
 }
 
 WRITERS: dict[str, Writer] = {
+    ".csv": Writer("curves over time", motion="odeform.formats.motion_csv:write_csv", compares=True),
     ".ply": Writer("mesh, points, or Gaussian splats", shape="odeform.formats.ply_files:ply_bytes"),
     ".obj": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
     ".stl": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
-    ".glb": Writer("mesh", shape="odeform.formats.meshes:mesh_bytes"),
+    ".glb": Writer(
+        "mesh, animated", shape="odeform.formats.meshes:mesh_bytes", motion="odeform.formats.gltf_motion:write_glb"
+    ),
     ".npz": Writer("NumPy arrays of all frames", motion="odeform.formats.motion_npz:write_npz"),
 }
 
 
+def writers() -> Mapping[str, Writer]:
+    """Suffix -> writer: `WRITERS`, and those of whole motions that installed packages declare.
+
+    Their entry points are in the group `odeform.motion_writers`: the name is the suffix, the object the function.
+    """
+    return {**WRITERS, **_declared()}
+
+
+@cache
+def _declared() -> Mapping[str, Writer]:
+    found = sorted(entry_points(group="odeform.motion_writers"), key=lambda entry: entry.name)
+    return {entry.name: Writer(f"by {entry.module}", motion=entry.value) for entry in found}
+
+
 def shape_formats() -> dict[str, str]:
     """Suffix -> description of the formats that hold one geometry (`write_shape`)."""
-    return {suffix: writer.description for suffix, writer in WRITERS.items() if writer.shape}
+    return {suffix: writer.description for suffix, writer in writers().items() if writer.shape}
 
 
 def motion_formats() -> dict[str, str]:
     """Suffix -> description of the formats that hold a whole motion in one file (`write_motion`)."""
-    return {suffix: writer.description for suffix, writer in WRITERS.items() if writer.motion}
+    return {suffix: writer.description for suffix, writer in writers().items() if writer.motion}
 
 
 def motion_endings() -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from odeform.budget import require_memory
 from odeform.errors import InputError
 from odeform.formats.ply import Table, columns
 from odeform.formats.splat_inria import harmonic_columns
@@ -18,6 +19,7 @@ from odeform.types import SH0, Floats, GaussianSplats, Harmonics, Points
 __all__ = ["compressed_splats"]
 
 CHUNK = 256
+SPLAT_BYTES, HARMONIC_BYTES = 400, 24  # of memory while reading: a splat, and each of its further columns
 
 
 def compressed_splats(tables: dict[str, Table], path: Path) -> GaussianSplats:
@@ -29,6 +31,9 @@ def compressed_splats(tables: dict[str, Table], path: Path) -> GaussianSplats:
         raise InputError(f"geometry {path}: expected {expected} chunks for {count} splats, got {got}")
     if sh is not None and len(sh) != count:
         raise InputError(f"geometry {path}: expected harmonics of {count} splats, got {len(sh)}")
+
+    harmonics = len(sh.dtype.names or ()) if sh is not None else 0
+    require_memory(f"geometry {path}", f"{count:,} splats", count * (SPLAT_BYTES + HARMONIC_BYTES * harmonics))
 
     def words(name: str) -> Table:
         if name not in (table.dtype.names or ()):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from odeform.budget import require_memory
 from odeform.errors import InputError
 from odeform.formats.ply import Table, columns
 from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_axes
@@ -22,6 +23,7 @@ NORMAL = ("nx", "ny", "nz")
 SCALE = ("scale_0", "scale_1", "scale_2")
 ROTATION = ("rot_0", "rot_1", "rot_2", "rot_3")
 CONSTANT = ("f_dc_0", "f_dc_1", "f_dc_2")
+SPLAT_BYTES, HARMONIC_BYTES = 240, 24  # of memory while reading: a splat, and each of its harmonics
 MAX_DEGREE = 3  # of harmonics; no viewer shows more
 MIN_SCALE = 2e-9  # viewers clip logarithms of scales at -20
 MARGIN = 1e-7  # to opacities 0 and 1, whose logits are not finite
@@ -29,6 +31,8 @@ MARGIN = 1e-7  # to opacities 0 and 1, whose logits are not finite
 
 def inria_splats(table: Table, path: Path) -> GaussianSplats:
     """The element vertex -> splats; gray without colour. Raises `InputError` for missing columns."""
+    degrees = sum(name.startswith("f_rest_") for name in table.dtype.names or ()) // 3 + 1
+    require_memory(f"geometry {path}", f"{len(table):,} splats", len(table) * (SPLAT_BYTES + HARMONIC_BYTES * degrees))
     notes = []
     if any(name in (table.dtype.names or ()) for name in CONSTANT):
         rest = harmonic_columns(table, path)

@@ -7,6 +7,8 @@ returned as in the .ply of the same capture, x right, y down, z forward.
 
 import struct
 import zlib
+from collections.abc import Iterator
+from dataclasses import replace
 from gzip import compress
 from pathlib import Path
 from typing import NamedTuple
@@ -15,9 +17,11 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from odeform.budget import MEMORY, read_limited, require_memory
 from odeform.errors import InputError
 from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_axes, with_fourth
 from odeform.geometry.harmonics import rotated_harmonics
+from odeform.geometry.parts import subset
 from odeform.types import Floats, GaussianSplats
 
 __all__ = ["read_spz", "spz_bytes", "spz_splats"]
@@ -30,6 +34,8 @@ MAX_DEGREE = 3  # of harmonics; no viewer shows more
 EXTENDED = 2  # flag: vendor extensions follow
 COLOR_SCALE = 0.15  # a colour byte is 255 * (0.5 + COLOR_SCALE * constant harmonic)
 MAX_RATIO = 1024  # of compression
+BLOCK = 1 << 16  # splats at a time
+SPLAT_BYTES, HARMONIC_BYTES = 240, 34  # of memory while reading: a splat, and each of its harmonics
 AXES = np.diag([1.0, -1.0, -1.0])
 
 
@@ -53,7 +59,7 @@ class Header(NamedTuple):
 
 def read_spz(path: Path, merge: bool) -> GaussianSplats:
     """All splats of a file, x right, y down, z forward."""
-    return spz_splats(path.read_bytes(), path)
+    return spz_splats(read_limited(path, f"geometry {path}", MEMORY >> 1), path)
 
 
 def spz_splats(data: bytes, path: Path) -> GaussianSplats:
@@ -62,27 +68,39 @@ def spz_splats(data: bytes, path: Path) -> GaussianSplats:
     count, widths = header.splats, header.widths
     if len(body) < count * sum(widths):
         raise InputError(f"geometry {path}: expected {count * sum(widths)} bytes of {count} splats, got {len(body)}")
-    cuts = np.cumsum([count * width for width in widths])
-    parts = np.split(np.frombuffer(body, np.uint8)[: cuts[-1]], cuts[:-1])
-    points, alphas, colors, scales, rotations, further = (
-        part.reshape(count, width) for part, width in zip(parts, widths, strict=True)
+    ends = np.cumsum([count * width for width in widths])
+    raw = np.frombuffer(body, np.uint8)
+    parts = [raw[end - count * width : end].reshape(count, width) for end, width in zip(ends, widths, strict=True)]
+    kept = min(header.degree, MAX_DEGREE)
+    splats = GaussianSplats(
+        np.empty((count, 3), np.float32),
+        np.empty((count, 3, 3)),
+        np.empty((count, (kept + 1) ** 2, 3), np.float32),
+        np.empty(count, np.float32),
+        tuple(_notes(header)),
     )
-    harmonics = np.empty((count, (header.degree + 1) ** 2, 3), np.float32)
-    harmonics[:, 0] = (colors / 255.0 - 0.5) / COLOR_SCALE
-    harmonics[:, 1:] = (further.reshape(count, widths[-1] // 3, 3) - 128.0) / 128.0
-    notes = []
+    for start in range(0, count, BLOCK):
+        _decode(header, [part[start : start + BLOCK] for part in parts], subset(splats, slice(start, start + BLOCK)))
+    return replace(splats, harmonics=rotated_harmonics(splats.harmonics, AXES))
+
+
+def _notes(header: Header) -> Iterator[str]:
     if header.degree > MAX_DEGREE:
-        notes.append(f"colour beyond degree {MAX_DEGREE} left out")
+        yield f"colour beyond degree {MAX_DEGREE} left out"
     if header.flags & EXTENDED:
-        notes.append("vendor extensions left out")
+        yield "vendor extensions left out"
+
+
+def _decode(header: Header, parts: list[Bytes], out: GaussianSplats) -> None:
+    """Write the splats of these bytes into arrays, which are views."""
+    points, alphas, colors, scales, rotations, further = parts
     quaternions = _three_bytes(rotations) if header.version < 3 else _smallest_three(rotations)
-    return GaussianSplats(
-        (_positions(points, header) @ AXES).astype(np.float32),
-        AXES @ covariances_from_axes(np.exp(scales / 16.0 - 10.0), quaternions) @ AXES,
-        rotated_harmonics(harmonics[:, : (MAX_DEGREE + 1) ** 2], AXES),
-        alphas[:, 0] / 255.0,
-        tuple(notes),
-    )
+    out.points[:] = _positions(points, header) @ AXES
+    out.covariances[:] = AXES @ covariances_from_axes(np.exp(scales / 16.0 - 10.0), quaternions) @ AXES
+    out.harmonics[:, 0] = (colors / 255.0 - 0.5) / COLOR_SCALE
+    count = out.harmonics.shape[1] - 1
+    out.harmonics[:, 1:] = (further[:, : 3 * count].reshape(len(further), count, 3) - 128.0) / 128.0
+    out.opacities[:] = alphas[:, 0] / 255.0
 
 
 def spz_bytes(splats: GaussianSplats, fraction: int = 12) -> bytes:
@@ -120,6 +138,10 @@ def _unpacked(data: bytes, path: Path) -> tuple[Header, bytes]:
     size = header.splats * sum(header.widths)
     if size > MAX_RATIO * len(data):
         raise InputError(f"geometry {path}: {len(data)} bytes cannot hold {header.splats} splats")
+    harmonics = (header.degree + 1) ** 2
+    require_memory(
+        f"geometry {path}", f"{header.splats:,} splats", header.splats * (SPLAT_BYTES + HARMONIC_BYTES * harmonics)
+    )
     if header.version == 4:
         return header, _streams(data, header, path)
     return header, gzip.decompress(gzip.unconsumed_tail, max(size, 1)) if gzip else data[HEADER.size :]

@@ -14,6 +14,7 @@ Quaternions = Float[np.ndarray, "points 4"]
 Covariances = Float[np.ndarray, "points 3 3"]
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
+BLOCK = 1 << 16  # splats at a time: intermediate results are several times as large as the result
 
 
 def covariances_from_axes(scales: Points, quaternions: Quaternions) -> Covariances:
@@ -22,14 +23,21 @@ def covariances_from_axes(scales: Points, quaternions: Quaternions) -> Covarianc
     Quaternions are normalised; one of zero length is the identity, one that is not finite gives a covariance that is
     not.
     """
+    out = np.empty((len(scales), 3, 3))
+    for start in range(0, len(scales), BLOCK):
+        rows = slice(start, start + BLOCK)
+        out[rows] = _covariances(np.asarray(scales[rows], dtype=float), np.asarray(quaternions[rows], dtype=float))
+    return out
+
+
+def _covariances(scales: Points, quaternions: Quaternions) -> Covariances:
     from scipy.spatial.transform import Rotation
 
-    quaternions = np.asarray(quaternions, dtype=float)
     length = np.linalg.norm(quaternions, axis=1, keepdims=True)
     usable = np.isfinite(length) & (length > 1e-12)
     rotations = Rotation.from_quat(np.where(usable, quaternions, IDENTITY), scalar_first=True).as_matrix()
     rotations[~np.isfinite(length[:, 0])] = np.nan
-    half = rotations * np.asarray(scales, dtype=float)[:, None, :]
+    half = rotations * scales[:, None, :]
     return half @ half.swapaxes(1, 2)
 
 

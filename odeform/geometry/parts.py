@@ -31,8 +31,8 @@ def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None
     return subset(geometry, inside), None if inside.all() else subset(geometry, ~inside)
 
 
-def subset(geometry: Unstructured, kept: Mask) -> Unstructured:
-    """The points where `kept` (N,) is true, with their attributes."""
+def subset(geometry: Unstructured, kept: Mask | slice) -> Unstructured:
+    """The points where `kept` (N,) is true, with their attributes; of a slice, views."""
     if not isinstance(geometry, GaussianSplats):
         return replace(geometry, points=geometry.points[kept])
     return replace(
@@ -50,7 +50,8 @@ def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
         return one
     points = np.concatenate([one.points, other.points])
     if isinstance(one, Mesh) and isinstance(other, Mesh):
-        return Mesh(points, np.concatenate([one.faces, other.faces + len(one.points)]))
+        both = None if one.colors is None or other.colors is None else np.concatenate([one.colors, other.colors])
+        return Mesh(points, np.concatenate([one.faces, other.faces + len(one.points)]), both)
     if isinstance(one, GaussianSplats) and isinstance(other, GaussianSplats):
         return replace(
             one,
@@ -79,4 +80,5 @@ def most_visible(splats: GaussianSplats, count: int) -> GaussianSplats:
 
 def _of_faces(mesh: Mesh, kept: np.ndarray) -> Mesh:
     used, local = np.unique(mesh.faces[kept], return_inverse=True)
-    return Mesh(mesh.points[used], local.reshape(-1, 3))
+    colors = None if mesh.colors is None else mesh.colors[kept]
+    return Mesh(mesh.points[used], local.reshape(-1, 3), colors)

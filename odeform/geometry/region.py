@@ -1,6 +1,5 @@
 """Regions of space that select a part of a shape: a sphere or a box."""
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from jaxtyping import Bool
 from odeform.errors import InputError
 from odeform.geometry.rigid import is_rotation
 from odeform.geometry.similarity import Similarity
+from odeform.io import parse_json
 from odeform.types import Points, Rotations, Vector
 
 __all__ = ["Box", "Mask", "Region", "Sphere", "read_region", "region_from_json", "region_to_json"]
@@ -82,7 +82,7 @@ def region_from_json(raw: Any) -> Region:
             region = Box(numbers["centre"], numbers["size"], numbers["rotation"])
         else:
             raise ValueError(f"unknown kind {kind!r}")
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
         raise InputError(f"region: expected a sphere or a box in JSON: {error}") from None
     return region
 
@@ -90,6 +90,6 @@ def region_from_json(raw: Any) -> Region:
 def read_region(path: Path) -> Region:
     """The region in a JSON file. Raises `InputError` if there is none."""
     try:
-        return region_from_json(json.loads(path.read_text()))
+        return region_from_json(parse_json(path.read_bytes(), "region"))
     except (InputError, ValueError) as error:
         raise InputError(f"{path}: {error}") from None

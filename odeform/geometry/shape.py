@@ -4,14 +4,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from odeform.geometry.parts import concatenated, split
 from odeform.geometry.region import Region
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Perpoint, Points, Rotations
 
-__all__ = ["FittedShape", "fit_to", "mean_distance", "surface_weights", "without_outliers"]
+__all__ = ["FittedShape", "fit_to", "surface_weights", "without_outliers"]
 
 EVEN = 0.2  # length of the mean unit vector below which the surroundings give no direction
 
@@ -46,6 +45,8 @@ class FittedShape:
     """Metres by which a body that is dropped starts above the part that does not move."""
     origin: str = ""
     """The file or the bundled shape that `source` was read from; empty if it cannot be read again."""
+    upright: str = ""
+    """Why an axis other than z was taken for up; empty if z was, or the user chose."""
 
     @cached_property
     def static(self) -> Geometry | None:
@@ -55,13 +56,6 @@ class FittedShape:
     def to_file(self, moved: Geometry) -> Geometry:
         """The whole shape in the units and axes of the file, its moving part as `moved` has it in the scene."""
         return concatenated(self.transform.inverse.shape(moved), self.remainder)
-
-
-def mean_distance(geometry: Geometry, reference: Mesh) -> float:
-    """Mean distance in metres from the points of one shape to the nearest of the other, the larger of both ways."""
-    one, other = (np.asarray(shape.points, dtype=float) for shape in (geometry, reference))
-    ways = (KDTree(other).query(one)[0].mean(), KDTree(one).query(other)[0].mean())
-    return float(max(ways))
 
 
 def fit_to(

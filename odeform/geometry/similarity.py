@@ -50,7 +50,7 @@ class Similarity:
         try:
             factor = float(raw["factor"])
             rotation, shift = np.array(raw["rotation"], dtype=float), np.array(raw["shift"], dtype=float)
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
             raise InputError(f"similarity: expected factor, rotation and shift: {error!r}") from None
         sound = is_rotation(rotation) and 0.0 < factor < np.inf and shift.shape == (3,) and np.isfinite(shift).all()
         if not sound:

@@ -19,19 +19,22 @@ from odeform.identification.linear import Comparison, Linear
 from odeform.identification.observation import View, observe
 from odeform.models.base import Predictor
 from odeform.motion.reduced_space import POSE
-from odeform.types import Floats, Ints, Times
+from odeform.types import Arrays, Floats, Ints, Times
 
-__all__ = ["NOMINAL", "TWO_SIDED", "Discrepancy", "calibrate"]
+__all__ = ["LEAST", "NOMINAL", "PREFIX", "TWO_SIDED", "Discrepancy", "calibrate", "stored_discrepancy"]
 
 NOMINAL, TWO_SIDED = 0.9, 1.6449
 """Nominal coverage of the intervals, and the matching number of standard deviations of a normal distribution."""
+PREFIX = "discrepancy."
+"""Of its arrays in a checkpoint."""
 FLOOR_MM = 2e-3  # error of a cause from rounding of the data
 FIRST_SPAN = 0.025  # s; each span of time is twice as long as all before it
 DISCOUNT = 2.0
 """Power of the ratio by which the errors of a span bias more than independent ones. A power of 1 would be right for a
 single span, but spans are correlated, late ones most. On validation, a power of 2 reduces the errors of kicks by a
 quarter against a power of 1."""
-LEAST = 8  # sequences
+LEAST = 8
+"""Sequences to calibrate on."""
 RIDGE = 1.0  # on the slopes of the linear part, in sequences
 
 
@@ -44,6 +47,11 @@ class Discrepancy:
     variances: Float[np.ndarray, "times causes"]
     means: Float[np.ndarray, "times causes terms"]
 
+    def arrays(self) -> Arrays:
+        """The float32 arrays of a checkpoint, by name; `stored_discrepancy` reads them."""
+        named = {"times": self.times, "variances": self.variances, "means": self.means}
+        return {PREFIX + name: value.astype(np.float32) for name, value in named.items()}
+
     def at(self, times: Times) -> Floats:
         """Variances (T, 6 + K) mm^2 at `times` (T,) s; constant after the last one."""
         return np.exp(_between(times, self.times, np.log(self.variances)))
@@ -54,6 +62,19 @@ class Discrepancy:
         expected = linear.spread @ (means @ np.concatenate([[1.0], theta]))[..., None]
         slopes = means[..., 1 : 1 + linear.gain.shape[-1]]  # empty if the comparison has no gains
         return replace(linear, off=linear.off - expected[..., 0], gain=linear.gain + slopes)
+
+
+def stored_discrepancy(predictor: Predictor) -> Discrepancy | None:
+    """That of a predictor's checkpoint; None where it has none. `InputError` for a damaged one."""
+    arrays = predictor.checkpoint.arrays
+    if f"{PREFIX}times" not in arrays:
+        return None
+    times, variances, means = (arrays[PREFIX + name].astype(float) for name in ("times", "variances", "means"))
+    terms = 1 + len(predictor.schema.learned)
+    sound = times.ndim == 1 and variances.shape[:1] == times.shape and means.shape == (*variances.shape, terms)
+    if not (sound and all(np.isfinite(x).all() for x in (times, variances, means)) and (variances > 0.0).all()):
+        raise InputError("checkpoint: its calibration of `identify` is damaged")
+    return Discrepancy(times, variances, means)
 
 
 def _between(queries: Floats, times: Floats, values: Floats) -> Floats:

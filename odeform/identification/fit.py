@@ -55,11 +55,12 @@ def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tupl
 
 
 def fit_parameters(
-    comparison: Comparison, discrepancy: Discrepancy, progress: Callable[[Floats], None] = lambda _: None
+    comparison: Comparison, discrepancy: Discrepancy, progress: Callable[[Floats, float], None] = lambda *_: None
 ) -> ParameterFit:
     """Compare starts over the box (Sobol points), refine the best ones, and return the best result.
 
-    More starts are refined while none explains the observation. `progress` gets theta (P,) before each step.
+    More starts are refined while none explains the observation. `progress` gets theta (P,) and the misfit before each
+    step.
     """
     coarse = Comparison(comparison.predictor, comparison.observation.subsampled(*COARSE))
     size = len(comparison.predictor.schema.learned)
@@ -80,7 +81,7 @@ def fit_parameters(
 
 
 def _refined(
-    comparison: Comparison, discrepancy: Discrepancy, start: Floats, progress: Callable[[Floats], None]
+    comparison: Comparison, discrepancy: Discrepancy, start: Floats, progress: Callable[[Floats, float], None]
 ) -> ParameterFit:
     observation = comparison.observation
     variances = discrepancy.at(observation.times)
@@ -92,7 +93,7 @@ def _refined(
     theta, damping = start, DAMPING[0]
     information, score, cost = equations(theta)
     for _ in range(ROUNDS):
-        progress(theta)
+        progress(theta, cost / observation.positions.size)
         undamped = _bounded_step(information, score, theta, 0.0)
         if undamped @ information @ undamped < CLOSE or damping > LARGEST:
             break

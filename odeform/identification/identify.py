@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from odeform.identification.bundled import bundled_discrepancy
 from odeform.identification.discrepancy import TWO_SIDED, Discrepancy
 from odeform.identification.fit import ParameterFit, fit_parameters
+from odeform.identification.known import known_discrepancy
 from odeform.identification.linear import Comparison
 from odeform.identification.observation import Observation
 from odeform.models.base import Predictor
@@ -60,6 +60,7 @@ def identify(
     observation: Observation,
     discrepancy: Discrepancy | None = None,
     progress: Callable[[dict[str, float]], None] = lambda _: None,
+    misfits: Callable[[float], None] = lambda _: None,
 ) -> Identification:
     """Estimate the parameters of an observed motion, all jointly, each with a 90 % interval. Takes about a second.
 
@@ -68,9 +69,10 @@ def identify(
     Args:
         predictor: A model of the observed scene, in reduced coordinates (`odeform`, `pod-rbf` or `nearest`).
         observation: N points of the body at T times, in metres and seconds.
-        discrepancy: The model's own error, from `calibrate`. By default it is calibrated on the bundled data set of the
-            scene, which takes seconds to half a minute the first time.
+        discrepancy: The model's own error, from `calibrate`. By default that of the checkpoint; where it has none, it
+            is calibrated on the bundled data set of the scene, which takes seconds to half a minute the first time.
         progress: Called with the parameters after each step; an exception that it raises ends the search.
+        misfits: Called just before, with the misfit there (see `Identification`).
 
     Raises:
         InputError: A model of another kind, or no bundled data set to calibrate on.
@@ -91,9 +93,10 @@ def identify(
         True
     """
     begin = time.perf_counter()
-    discrepancy = bundled_discrepancy(predictor) if discrepancy is None else discrepancy
+    discrepancy = known_discrepancy(predictor) if discrepancy is None else discrepancy
 
-    def report(theta: Floats) -> None:
+    def report(theta: Floats, misfit: float) -> None:
+        misfits(misfit)
         progress({p.name: p.denormalise(float(unit)) for p, unit in zip(predictor.schema.learned, theta, strict=True)})
 
     found = fit_parameters(Comparison(predictor, observation.subsampled()), discrepancy, report)

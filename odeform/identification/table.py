@@ -12,7 +12,7 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
-from odeform.identification.discrepancy import NOMINAL, Discrepancy, calibrate
+from odeform.identification.discrepancy import NOMINAL, Discrepancy, calibrate, stored_discrepancy
 from odeform.identification.identify import Identification, Identified, identify
 from odeform.identification.observation import Observation, View, observe
 from odeform.models.base import Predictor
@@ -70,6 +70,9 @@ def _identified(
 
 
 def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:
+    """That of the checkpoint, else measured on the data set."""
+    if (stored := stored_discrepancy(predictor)) is not None:
+        return stored
     progress = Progress("calibrate", 100)
     done = 0
 

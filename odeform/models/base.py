@@ -2,20 +2,27 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from odeform.checkpoint import Checkpoint
+from odeform.checkpoint import Checkpoint, arrays_of_object
 from odeform.errors import InputError
-from odeform.models.error_band import ErrorBand
+from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
-from odeform.schema import Parameters
+from odeform.motion.limits import DEPTH, Limits
+from odeform.motion.trust import Trust
+from odeform.schema import OBJECT, Parameters
+from odeform.simulation.scenes.registry import find_scene
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
+from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 
 __all__ = ["Predictor", "check_finite"]
+
+DEEPER = 1.25  # times the depth below the floor of trained motions, where that is more than other bodies may have
 
 
 def check_finite(geometry: Geometry) -> None:
@@ -24,13 +31,23 @@ def check_finite(geometry: Geometry) -> None:
         raise InputError("geometry: expected at least one point, all finite")
 
 
+def _rest(arrays: Arrays) -> Mesh:
+    mesh = Mesh(arrays["rest.points"], arrays["rest.faces"])
+    points, faces = mesh.points, mesh.faces
+    if points.ndim != 2 or faces.ndim != 2 or points.shape[1:] != (3,) or faces.shape[1:] != (3,) or not len(points):
+        raise ValueError(f"body with points {points.shape} and faces {faces.shape}")
+    if faces.dtype.kind not in "iu" or faces.min(initial=0) < 0 or faces.max(initial=0) >= len(points):
+        raise ValueError("faces of the body, which refer to points that do not exist")
+    return mesh
+
+
 class Predictor(ABC):
     """A trained model of one scene. `odeform.load` returns one.
 
     Attributes:
         checkpoint: The file it was read from: provenance, scores, SHA-256.
         schema: Its parameters and window of time.
-        rest: The trained body at rest, N vertices in metres.
+        rest: The trained body at rest, N vertices in metres; that of the default object, if there are several.
 
     Examples:
         >>> import odeform
@@ -54,17 +71,26 @@ class Predictor(ABC):
     """The measured solver settings, cheap to fine; empty for models without, and in older checkpoints."""
     rescales_input: bool = True
     """Whether a foreign shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
+    knows_foreign_errors: bool = False
+    """Whether `error_band` holds for shapes that were not trained."""
     extrapolates: bool = True
     """Whether motions continue beyond the trained window; otherwise only the window can be scored."""
+    final_only: bool = False
+    """Whether only the state at the end of the window is predicted; nothing else is scored then."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         try:
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
-            self.rest = Mesh(checkpoint.arrays["rest.points"], checkpoint.arrays["rest.faces"])
-            self._error_band = ErrorBand(checkpoint.arrays) if "val.theta" in checkpoint.arrays else None
+            self.rest = _rest(checkpoint.arrays)
+            objects = {name: arrays_of_object(checkpoint.arrays, name) for name in self.schema.objects}
+            self._rests = {name: _rest(arrays) for name, arrays in objects.items() if "rest.points" in arrays}
+            bodies = {"": checkpoint.arrays, **objects}
+            bands = {name: error_band(arrays) for name, arrays in bodies.items()}
+            self._bands = {name: band for name, band in bands.items() if band is not None}
             self._read(checkpoint)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except Exception as error:
+            # what a damaged file has in the place of a number or a shape may raise anything
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
 
     @abstractmethod
@@ -94,7 +120,8 @@ class Predictor(ABC):
         """The motion of `geometry` under `parameters`.
 
         Args:
-            geometry: a shape of N points in metres, where it lies at rest in the scene; the trained body by default.
+            geometry: a shape of N points in metres, where it lies at rest in the scene; by default the trained body
+                (`rest_of`).
             parameters: by name, in the units of `schema`; defaults for the others.
             quality: the name of one of `qualities`, or solver settings.
             until: seconds that are integrated at once (default: the trained window). Later times may be evaluated
@@ -108,13 +135,61 @@ class Predictor(ABC):
         self._check_observed(observed)
         window = self.schema.window
         end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
-        shape = self.rest if geometry is None else geometry
-        return self._solve(shape, self.schema.complete(parameters), self._settings(quality), end, observed)
+        complete = self.complete(parameters)
+        shape = self.rest_of(complete) if geometry is None else geometry
+        return self._solve(shape, complete, self._settings(quality), end, observed)
+
+    def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
+        """All parameters, checked, with defaults for those not given (`Schema.complete`).
+
+        In a scene in which a sphere pushes bodies, contacts and forces that are not given suit the object: see
+        `Contacts.complete`. Raises `InputError` for unknown names, and values that are not acceptable.
+        """
+        given = self.schema.expanded(parameters)
+        scene = find_scene(self.schema.scene) if self.schema.objects else None
+        if scene is not None and scene.contacts is not None:
+            name = self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))
+            body = {OBJECT: name}
+            given = scene.contacts.complete({**body, **given}, self.rest_of(body), self.force_range(body))
+        return self.schema.complete(given)
+
+    def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
+        """Weakest and strongest force in newton on the body that `parameters` select, in training.
+
+        Raises `InputError` in scenes in which no sphere pushes.
+        """
+        scene = find_scene(self.schema.scene)
+        if scene is None or scene.contacts is None:
+            raise InputError(f"scene {self.schema.scene}: no sphere pushes its bodies")
+        return scene.contacts.forces(str(parameters.get(OBJECT, "")))
+
+    def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
+        """The trained body at rest that `parameters` select in a scene with objects; `rest` in all other scenes."""
+        return self._rests.get(parameters.get(OBJECT, ""), self.rest)
 
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
-        within. None where the checkpoint holds no validation errors."""
-        return None if self._error_band is None else self._error_band.at(self.schema.vector(parameters), times)
+        within. None where the checkpoint holds errors of too few validation sequences for that."""
+        band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
+        return None if band is None else band.at(self.schema.vector(parameters), times)
+
+    @property
+    def bodies(self) -> tuple[Mesh, ...]:
+        """The trained bodies where they rest in the scene; empty where the checkpoint does not hold them."""
+        return tuple(self._rests.values()) or (self.rest,)
+
+    @cached_property
+    def trust(self) -> Trust:
+        """The trained bodies, and the limits of motions in the scene. Nothing is known of an imported scene."""
+        trust = Trust(self.bodies, error_band=self.error_band, knows_foreign_errors=self.knows_foreign_errors)
+        scene = find_scene(self.schema.scene)
+        if scene is None:
+            return replace(trust, limits=Limits(energy=np.inf))
+        trained = self.checkpoint.arrays.get("trained.depth_m", np.zeros(1))
+        limits = Limits(scene.floor, max(DEPTH, DEEPER * float(trained.max())), scene.gravity)
+        if limits.floor is not None and self.rest.points[:, 2].min() < limits.floor - limits.depth:
+            limits = Limits(None, gravity=scene.gravity)
+        return replace(trust, limits=limits)
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         """A body at rest in the scene, in the frame in which `solve` expects it: here the scene's own."""

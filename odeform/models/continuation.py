@@ -10,11 +10,12 @@ training motions differ from it, at contacts: kernel ridge regression on centres
 Williams, Gaussian Processes for Machine Learning, 8.3.1). Far from all centres it is zero, and the body flies.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from odeform.checkpoint import Checkpoint
 from odeform.motion.base import SolveStats
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
@@ -22,9 +23,11 @@ from odeform.motion.splines import catmull_rom
 from odeform.schema import Window
 from odeform.types import Arrays, Floats
 
-__all__ = ["ContinuedTrajectory", "Dynamics", "kernel"]
+__all__ = ["LATER_ERRORS", "ContinuedTrajectory", "Dynamics", "kernel", "without_continuation"]
 
 PREFIX = "continuation."
+LATER_ERRORS = "val.later_mm"
+"""Validation errors of the continuation, by frames after the last that it was given."""
 
 
 def kernel(
@@ -105,6 +108,13 @@ class Dynamics:
         return cls(gravity, float(ground[0]), float(ground[1]), gains, centers, weights)
 
 
+def without_continuation(checkpoint: Checkpoint) -> Checkpoint:
+    """The checkpoint of a model that stops, or goes on by itself, where its trained window ends."""
+    arrays = {name: array for name, array in checkpoint.arrays.items() if not name.startswith((PREFIX, LATER_ERRORS))}
+    window = replace(checkpoint.schema.window, reach=0.0)
+    return replace(checkpoint, arrays=arrays, schema=replace(checkpoint.schema, window=window))
+
+
 class ContinuedTrajectory:
     """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on.
 
@@ -130,12 +140,15 @@ class ContinuedTrajectory:
     def reduced(self, times: Floats) -> Floats:
         """(T,) seconds -> (T, 6 + K)."""
         times = np.asarray(times, dtype=float)
-        y = self._solved.reduced(np.minimum(times, self._stop))
         later = times > self._stop
         # a trajectory that failed within the window stays at its last state
-        if later.any() and self.last_good >= self._stop:
-            y = y.copy()
-            y[later] = self._between(self._rate * (times[later] - self._stop))
+        if not later.any() or self.last_good < self._stop:
+            return self._solved.reduced(np.minimum(times, self._stop))
+        after = self._between(self._rate * (times[later] - self._stop))
+        if later.all():
+            return after
+        y = np.empty((len(times), after.shape[1]))
+        y[~later], y[later] = self._solved.reduced(times[~later]), after
         return y
 
     def _between(self, frames: Floats) -> Floats:
@@ -143,7 +156,8 @@ class ContinuedTrajectory:
         index = np.floor(frames).astype(int)
         self._extend(int(index.max()) + 4)
         # the first kept frame is one before the end of the window
-        four = [np.stack([self._frames[i + k] for i in index]) for k in range(4)]
+        kept = np.stack(self._frames)
+        four = [kept[index + k] for k in range(4)]
         return catmull_rom(*four, share=(frames - index)[:, None])
 
     def _extend(self, count: int) -> None:

@@ -2,16 +2,25 @@
 
 import numpy as np
 
+from odeform.models.continuation import LATER_ERRORS
 from odeform.types import Arrays, Floats, Times
 
-__all__ = ["ErrorBand"]
+__all__ = ["FEWEST", "ErrorBand", "error_band"]
 
 NOMINAL = 0.9
+FEWEST = 8
+"""Validation sequences from which on a band is shown: the 90 % quantile of fewer is that of the worst one."""
 WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
 """Candidates for the distance in normalised parameters over which errors are similar."""
 TINY = 1e-6  # mm
 FARTHEST = 10.0  # widths outside the trained range, from where on the band stops widening
 ABOUT = 0.05  # share of the frames, on either side, that the quantiles of a frame are taken over
+
+
+def error_band(arrays: Arrays) -> "ErrorBand | None":
+    """The band of a checkpoint's arrays; None without validation errors, or with those of too few sequences."""
+    enough = "val.theta" in arrays and len(arrays["val.theta"]) >= FEWEST
+    return ErrorBand(arrays) if enough else None
 
 
 class ErrorBand:
@@ -39,7 +48,7 @@ class ErrorBand:
         near, count = round(ABOUT * len(profile)), len(profile)
         quantiles = [np.quantile(residual[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
         self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
-        later = arrays.get("val.later_mm", np.zeros((1, 1)))
+        later = arrays.get(LATER_ERRORS, np.zeros((1, 1)))
         self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
 
     def _smooth(self, theta: Floats, width: float, leave_out: bool = False) -> Floats:

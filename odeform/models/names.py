@@ -4,10 +4,12 @@ __all__ = ["MODELS", "TRAINABLE"]
 
 MODELS: dict[str, str] = {
     "odeform": "odeform.models.odeform.model:ODeform",
+    "odeform-mechanical": "odeform.models.mechanical.model:MechanicalODeform",
     "odeform-per-point": "odeform.models.baselines.odeform_per_point:OdeformPerPoint",
     "node": "odeform.models.baselines.node:Node",
     "rnn": "odeform.models.baselines.rnn:Rnn",
     "direct": "odeform.models.baselines.direct:Direct",
+    "pe-gnn": "odeform.models.baselines.pe_gnn:PeGnn",
     "occupancy-flow": "odeform.models.baselines.occupancy_flow:OccupancyFlow",
     "pod-rbf": "odeform.models.baselines.pod_rbf:PodRbf",
     "gp": "odeform.models.baselines.gp:GaussianProcess",
@@ -16,5 +18,6 @@ MODELS: dict[str, str] = {
 }
 """Name in checkpoints and on the command line -> "module:class"."""
 
-TRAINABLE = tuple(name for name in MODELS if name != "released")
-"""The models that `odeform train` trains; the authors' network is only read."""
+TRAINABLE = tuple(name for name in MODELS if name not in ("released", "odeform-mechanical"))
+"""The models that `odeform train` trains. The authors' network is only read; `odeform` becomes `odeform-mechanical` in
+scenes with objects."""

@@ -1,13 +1,16 @@
 """What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
 
 from abc import abstractmethod
+from functools import cached_property
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
+from odeform.models.continuation import ContinuedTrajectory, Dynamics
+from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
-from odeform.motion.reduced_space import ReducedSpace
+from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
@@ -21,14 +24,37 @@ class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
 
     def _read(self, checkpoint: Checkpoint) -> None:
-        self.space = ReducedSpace.from_parts(checkpoint.config["space"], checkpoint.arrays, self.rest)
-        self._evaluated: Recent[EvaluatedBasis] = Recent(CACHED)
+        _ = self.space, self.dynamics  # damaged ones are found now, not when they are used
+
+    @cached_property
+    def space(self) -> ReducedSpace:
+        """That of its coordinates."""
+        return ReducedSpace.from_parts(self.checkpoint.config["space"], self.checkpoint.arrays, self.rest)
+
+    @cached_property
+    def dynamics(self) -> Dynamics | None:
+        """What continues motions beyond the trained window; None where they do so by themselves, or stop."""
+        coordinates = POSE + self.space.basis.modes
+        return Dynamics.from_arrays(self.checkpoint.arrays, coordinates, len(self.schema.learned))
+
+    @cached_property
+    def _evaluated(self) -> Recent[EvaluatedBasis]:
+        return Recent(CACHED)
 
     @abstractmethod
-    def _trajectory(
+    def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        """y(t) for inputs theta (P,), solved at least to `until` seconds."""
+        """y(t) for inputs theta (P,), solved at least to `until` seconds, without `dynamics`."""
+
+    def _continued(
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
+    ) -> Trajectory:
+        if self.dynamics is None:
+            return self.trajectory(theta, evaluated, settings, until)
+        window = self.schema.window
+        solved = self.trajectory(theta, evaluated, settings, min(until, window.stop))
+        return ContinuedTrajectory(solved, self.dynamics, theta, window)
 
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
         """The basis on a geometry at an azimuth in radians; the last few are kept."""
@@ -49,5 +75,14 @@ class ReducedModel(Predictor):
         observed: MotionSequence | None,
     ) -> ReducedMotion:
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
-        trajectory = self._trajectory(self.schema.inputs(parameters), evaluated, settings, until)
-        return ReducedMotion(self.schema, parameters, geometry, self.space, evaluated, trajectory)
+        trajectory = self._continued(self.schema.inputs(parameters), evaluated, settings, until)
+        return ReducedMotion(
+            self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
+        )
+
+    @cached_property
+    def watched_body(self) -> WatchedBody:
+        """The trained body, for the checks of motions."""
+        limits = self.trust.limits
+        lowest = float("-inf") if limits.floor is None else limits.floor - limits.depth
+        return watched_body(self.rest, self.space, lowest)

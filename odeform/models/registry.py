@@ -9,6 +9,7 @@ from odeform.errors import InputError
 from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
 from odeform.models.names import MODELS, TRAINABLE
+from odeform.models.per_object import PerObject, is_per_object
 from odeform.models.reduced_model import ReducedModel
 from odeform.schema import Schema
 from odeform.types import MotionSequence
@@ -73,7 +74,7 @@ def load(name: str | Path) -> Predictor:
         model = model_class(checkpoint.model)
     except InputError as error:
         raise InputError(f"checkpoint {name}: {error}") from None
-    return model(checkpoint)
+    return PerObject(checkpoint, model) if is_per_object(checkpoint) else model(checkpoint)
 
 
 def load_continuous(name: str | Path) -> Predictor:

@@ -6,11 +6,13 @@ bending energy; Duchon 1977), with a closed-form gradient. Points farther from t
 the trained body are pulled in along their ray, to at most nine times: far away, the sum would be all rounding.
 """
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import LinAlgError, LinAlgWarning, solve
 
 from odeform.schema import soft_clip
 from odeform.types import Basis, Floats, Perpoint, Points
@@ -107,6 +109,12 @@ def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
     system = np.block([[_squares(centers, centers) ** 1.5, tail], [tail.T, np.zeros((4, 4))]])
     values = np.asarray(modes, dtype=float).swapaxes(1, 2).reshape(len(centers), -1)
-    # least squares rather than a solve: coplanar points leave part of the linear tail undetermined
-    weights = np.linalg.lstsq(system, np.concatenate([values, np.zeros((4, values.shape[1]))]), rcond=None)[0]
+    right = np.concatenate([values, np.zeros((4, values.shape[1]))])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LinAlgWarning)
+        try:
+            weights = solve(system, right)
+        except (LinAlgError, LinAlgWarning):
+            # coplanar points leave part of the linear tail undetermined
+            weights = np.linalg.lstsq(system, right, rcond=None)[0]
     return DisplacementBasis(centers, weights, scale)

@@ -21,6 +21,8 @@ from odeform.geometry.rigid import best_rigid, rotation_z
 from odeform.geometry.shape import surface_weights
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.reduced_space import to_canonical
+from odeform.motion.trust import UNKNOWN, Trust
+from odeform.motion.watch import Sample, Watch
 from odeform.schema import Parameters, Schema, soft_clip
 from odeform.types import Frames, Geometry, Matrices, Mesh, Points, Pose, Times, Vector, Vectors
 
@@ -130,9 +132,11 @@ class PointMotion(Motion):
         probes: Probes,
         shape: PointTrajectory,
         body: PointTrajectory,
+        trust: Trust = UNKNOWN,
     ) -> None:
         self.schema, self.parameters, self.geometry = schema, parameters, geometry
         self._frame, self._mean, self._probes, self._shape, self._body = frame, mean, probes, shape, body
+        self.trust = trust
         self._points = np.asarray(geometry.points, dtype=np.float32)
         self._turn = rotation_z(schema.azimuth(parameters))
         self._last: tuple[float, Points] | None = None
@@ -195,6 +199,16 @@ class PointMotion(Motion):
 
     def _displaced(self, trajectory: PointTrajectory, t: float | Times) -> Frames:
         """(T, N, 3) metres, canonical, float32; (1, N, 3) for a single time."""
-        times = self.schema.window.soft_clamped(np.atleast_1d(np.asarray(t, dtype=float)))
+        return self._predicted(trajectory, self._clock(t))
+
+    def _predicted(self, trajectory: PointTrajectory, times: Times) -> Frames:
         moved = trajectory.displacements(times) + self._mean.at(times)[:, None]
         return self._frame.bounded(moved).astype(np.float32)
+
+    def _make_watch(self) -> Watch | None:
+        return None if self.trust is UNKNOWN else Watch(self.trust.limits, self.schema.window, self._sample)
+
+    def _sample(self, times: Times) -> Sample:
+        """Of the probes. Deformations are bounded by construction."""
+        moved = self._probes.points + self._predicted(self._body, times) + np.array(self._frame.anchor)
+        return Sample(moved[..., 2].min(axis=1), np.zeros(len(times)), moved.mean(axis=1))

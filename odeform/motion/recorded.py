@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
 from odeform.geometry.shape import surface_weights
 from odeform.motion.base import SolveStats
-from odeform.schema import Parameters, Schema
+from odeform.schema import OBJECT, Parameters, Schema
 from odeform.types import Floats, Frames, Mesh, MotionSequence, Points, Pose, Times
 
 __all__ = ["RecordedMotion"]
@@ -92,8 +92,10 @@ class RecordedMotion:
         back = np.einsum("tni,tij->tnj", frames - poses[:, None, :3, 3], poses[:, :3, :3])
         return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_weights(self.geometry))
 
-    def of(self, parameters: Mapping[str, float]) -> bool:
+    def of(self, parameters: Parameters) -> bool:
         """Whether this is the motion under these parameters, to the resolution of a slider."""
+        if parameters.get(OBJECT) != self.parameters.get(OBJECT):
+            return False
         return all(
             abs(p.normalise(parameters[p.name]) - p.normalise(self.parameters[p.name])) < 2e-3
             for p in self.schema.parameters

@@ -8,10 +8,13 @@ from jaxtyping import Float
 
 from odeform.errors import InputError
 from odeform.motion.base import Motion, SolveStats
+from odeform.motion.body import WatchedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
 from odeform.motion.threads import thread_map
+from odeform.motion.trust import UNKNOWN, Trust
+from odeform.motion.watch import Watch
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
@@ -43,7 +46,10 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ReducedMotion(Motion):
-    """T(t) and D(t) separately: a pose, and coefficients of a basis. `evaluated` is the basis on the geometry."""
+    """T(t) and D(t) separately: a pose, and coefficients of a basis. `evaluated` is the basis on the geometry.
+
+    `body` is the trained body, whose motion is watched over: it is the same for every shape.
+    """
 
     schema: Schema
     parameters: Parameters
@@ -51,6 +57,14 @@ class ReducedMotion(Motion):
     space: ReducedSpace
     evaluated: EvaluatedBasis
     trajectory: Trajectory
+    trust: Trust = UNKNOWN
+    body: WatchedBody | None = None
+
+    def _make_watch(self) -> Watch | None:
+        body = self.body
+        if body is None:
+            return None
+        return Watch(self.trust.limits, self.schema.window, lambda times: body.sample(self.trajectory.reduced(times)))
 
     @property
     def stats(self) -> SolveStats:
@@ -61,8 +75,7 @@ class ReducedMotion(Motion):
         return self.trajectory.last_good
 
     def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
-        times = np.atleast_1d(np.asarray(t, dtype=float))
-        return self.space.bounded(self.trajectory.reduced(self.schema.window.soft_clamped(times)))
+        return self.space.bounded(self.trajectory.reduced(self._clock(t)))
 
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)

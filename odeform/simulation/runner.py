@@ -1,38 +1,47 @@
 """Many motions of one scene: in parallel, resumable, with the same data for any number of workers."""
 
 import math
-from collections.abc import Callable, Iterator
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from odeform.dataset.folder import INDEX, folder_reader, open_folder, save_sequence, write_index
-from odeform.dataset.index import Dataset, Entry, assign_splits
-from odeform.errors import InputError
+from odeform.dataset.folder import encode_sequence, folder_reader, save_encoded, write_index
+from odeform.dataset.index import Dataset, Entry
+from odeform.errors import InputError, one_line
 from odeform.parallel import as_completed
 from odeform.progress import Progress
+from odeform.schema import OBJECT
 from odeform.simulation.errors import SimulationError
-from odeform.simulation.scene import Scene
+from odeform.simulation.plan import counts, finished, plan
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
-__all__ = ["simulate"]
+__all__ = ["UNEXPECTED", "simulate"]
 
 
+UNEXPECTED = "unexpected"
+"""Start of the status of a sequence that failed with anything but a `SimulationError`. The next run tries it again."""
 TEST_RATE = 4  # factor on the frame rate of test sequences, to score between the trained frames
+WRITING = 0.02  # share of the time that goes into writing the index
 TIME_SLACK, WEIGHT_SLACK = 1e-3, 1e-4  # of a frame; of the sum of float32 weights
 
 
-def _one(entry: Entry, simulate: Callable[..., MotionSequence], root: Path, rate: float, step: float) -> Entry:
+def _one(entry: Entry, simulate: Callable[..., MotionSequence], rate: float, step: float) -> bytes | str:
+    """The encoded sequence, or the reason why there is none. Workers need not see the folder of the data set."""
     try:
         rate = rate * (TEST_RATE if entry.split == "test" else 1)
         sequence = simulate(entry.parameters, rate=rate, step=step)
+        return next(_faults(sequence, rate), None) or encode_sequence(sequence)
     except SimulationError as error:
-        return replace(entry, status=str(error))
-    fault = next(_faults(sequence, rate), None)
-    return replace(entry, status=fault) if fault else replace(entry, sha256=save_sequence(root, entry.name, sequence))
+        return str(error)
+    except Exception as error:  # of one sequence; the others go on
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return one_line(f"{UNEXPECTED} {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
 
 
 def _faults(sequence: MotionSequence, rate: float) -> Iterator[str]:
@@ -57,19 +66,38 @@ def _faults(sequence: MotionSequence, rate: float) -> Iterator[str]:
         yield f"weights: expected no negative ones and a sum of 1, got {weights.min():g} or more, sum {weights.sum():g}"
 
 
-def _finished(root: Path, plan: list[Entry], new: Dataset) -> dict[str, Entry]:
-    """Entries that an earlier, interrupted run of the same plan has completed."""
-    if not (root / INDEX).exists():
-        return {}
-    old = open_folder(root)
-    for part in ("provenance", "fixed", "schema"):
-        was, expected = getattr(old, part), getattr(new, part)
-        if was != expected:
-            raise InputError(
-                f"{root}: holds another data set, with {part} {was}; expected {expected} or an empty folder"
-            )
-    expected = {entry.name: entry for entry in plan}
-    return {e.name: e for e in old.entries if e.name in expected and e.parameters == expected[e.name].parameters}
+class _Index:
+    """The index of a folder while its sequences are simulated: `done` by name, in the order of the schema's objects."""
+
+    def __init__(self, empty: Dataset, entries: Sequence[Entry], old: Dataset | None) -> None:
+        kept = [entry for entry in old.entries if not entry.status.startswith(UNEXPECTED)] if old is not None else []
+        self.done = {entry.name: entry for entry in kept}
+        order = dict.fromkeys([*(entry.name for entry in entries), *self.done])
+        self._order = {name: place for place, name in enumerate(order)}
+        count = empty.provenance["count"]
+        if old is not None and isinstance(count, dict):
+            count = {**old.provenance["count"], **count}
+        self._empty = replace(empty, provenance={**empty.provenance, "count": count})
+        self._next = 0.0
+
+    def add(self, entry: Entry) -> None:
+        """Add a finished sequence. The file is written again at most a share of the time: with thousands of entries
+        this takes as long as a part of a simulation."""
+        self.done[entry.name] = entry
+        if (begin := time.monotonic()) >= self._next:
+            self.write()
+            self._next = time.monotonic() + (time.monotonic() - begin) / WRITING
+
+    def write(self) -> Dataset:
+        """Write the file; returns what it holds."""
+        objects = self._empty.schema.objects
+
+        def place(entry: Entry) -> tuple[int, int]:
+            return objects.index(entry.parameters[OBJECT]) if objects else 0, self._order[entry.name]
+
+        dataset = replace(self._empty, entries=tuple(sorted(self.done.values(), key=place)))
+        write_index(dataset)
+        return dataset
 
 
 def simulate(
@@ -81,24 +109,31 @@ def simulate(
     rate: float | None = None,
     step: float | None = None,
     corners: bool = False,
+    objects: Sequence[str] = (),
 ) -> Dataset:
     """Simulate `count` sequences of a scene into the folder `out`; an interrupted run is continued.
 
+    A finished data set is extended by a larger count, and by further objects: its sequences are kept. A scene without
+    objects splits its data at random; beyond the scene's own count, further sequences are for training.
+
     Args:
         scene: Name of a scene, for example "kick".
-        out: Folder to write to: empty, or with an unfinished data set of the same arguments.
-        count: Number of sequences; default: that of the scene's own data set.
+        out: Folder to write to: empty, or with a data set of the same arguments that is unfinished or shorter.
+        count: Number of sequences, for each object of a scene with several; default: that of the scene's own data set.
         seed: Seeds the parameters that are drawn and the splits.
         workers: Number of processes. The data do not depend on it.
         rate: Frames per second, in Hz; default: the scene's. Test sequences have four times as many.
         step: Time step of the simulator in seconds; default: the scene's.
         corners: Also simulate the corners of the parameter box, for the training split.
+        objects: Names of the objects to simulate in a scene with several; default: all. The data of one object do not
+            depend on which others are simulated.
 
     Returns:
-        The data set. Failed sequences stay in its index, with the reason as their status.
+        The data set. Failed sequences stay in its index, with the reason as their status. Those that failed with
+        another exception than `SimulationError` are tried again by the next run.
 
     Raises:
-        InputError: An unknown scene, a number out of range, or a folder with another data set.
+        InputError: An unknown scene or object, a number out of range, or a folder with another data set.
 
     Examples:
         >>> import odeform
@@ -111,33 +146,25 @@ def simulate(
     if count < 1 or workers < 1 or seed < 0 or not (rate is None or 0.0 < rate < math.inf):
         raise InputError("simulate: expected count and workers of at least 1, seed of at least 0, and a positive rate")
     root, rate, step = Path(out), rate or known.schema.window.rate, step or known.step
-    plan = _plan(scene, known, count, seed, corners)
+    entries = plan(known, count, seed, objects, corners)
     schema = replace(known.schema, window=replace(known.schema.window, rate=rate))
-    provenance = {"scene": scene, "count": count, "seed": seed, "rate_hz": rate, "step_s": step}
+    asked = counts(known, count, objects)
+    provenance = {"scene": scene, "count": asked, "seed": seed, "rate_hz": rate, "step_s": step}
     provenance |= {"corners": True} if corners else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
-    done = _finished(root, plan, empty)
-    progress = Progress(f"simulate {scene}", len(plan), done=len(done))
-
-    def index() -> Dataset:
-        dataset = replace(empty, entries=tuple(done[e.name] for e in plan if e.name in done))
-        write_index(dataset)
-        return dataset
-
-    root.mkdir(parents=True, exist_ok=True)
-    work = partial(_one, simulate=known.simulate, root=root, rate=rate, step=step)
-    for _, entry in as_completed(work, [entry for entry in plan if entry.name not in done], workers):
-        done[entry.name] = entry
-        index()
-        progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
-    progress.close()
-    return index()
-
-
-def _plan(name: str, scene: Scene, count: int, seed: int, corners: bool) -> list[Entry]:
-    drawn = zip(scene.sample(count, seed), assign_splits(count, seed), strict=True)
-    plan = [Entry(f"{name}_{index:05d}", split, parameters) for index, (parameters, split) in enumerate(drawn)]
-    if corners:
-        # in more than two dimensions hardly any drawn point is near a corner, but sliders reach them
-        plan += [Entry(f"{name}_corner_{i:02d}", "train", at) for i, at in enumerate(scene.schema.corners())]
-    return plan
+    index = _Index(empty, entries, finished(root, entries, empty))
+    left = [entry for entry in entries if entry.name not in index.done]
+    progress = Progress(f"simulate {scene}", len(entries), done=len(entries) - len(left))
+    work = partial(_one, simulate=known.simulate, rate=rate, step=step)
+    try:
+        for place, found in as_completed(work, left, workers):
+            if isinstance(found, str):
+                entry = replace(left[place], status=found)
+            else:
+                entry = replace(left[place], sha256=save_encoded(root, left[place].name, found))
+            index.add(entry)
+            progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
+    finally:
+        progress.close()
+        dataset = index.write()
+    return dataset

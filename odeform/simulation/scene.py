@@ -1,12 +1,13 @@
 """A scene: a family of motions, with everything that the rest of the package needs to know of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
-from odeform.schema import Parameters, Schema
+from odeform.schema import OBJECT, Parameters, Schema
+from odeform.simulation.contacts import Contacts
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.measurements import Measurements
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
@@ -33,15 +34,18 @@ class Scene:
     """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the share done,
     and `resolution`, if the scene has `resolutions`. It raises `SimulationError` where the result is not sound."""
     rest_mesh: Callable[[], Mesh]
-    """A fine mesh of the undeformed body where the motion starts, for display."""
+    """A fine mesh of the undeformed body where the motion starts, for display; of the default object, if there are
+    several."""
     step: float
     """Time step of the simulator in seconds whose results count as the truth."""
     count: int
-    """Number of sequences in its standard data set."""
+    """Number of sequences in its standard data set, for each object. Data beyond it are for training."""
     fixed: dict[str, float] = field(default_factory=dict)
     """Physical quantities that do not vary, with units in their names. They are stored with every data set."""
     gravity: float = GRAVITY
     """m/s^2, along -z."""
+    floor: float | None = 0.0
+    """Height in metres of the floor, which no motion may pass; None for a scene without one."""
     resolutions: tuple[int, ...] = ()
     """Resolutions of the simulated mesh, finest first. The first counts as the truth; none: it cannot be changed."""
     glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs
@@ -50,12 +54,27 @@ class Scene:
     """What `odeform.simulation.study` measures besides the effect of the time step."""
     checks: tuple[PhysicalCheck, ...] = STANDARD_CHECKS
     """What `odeform stress` asks of predicted motions."""
+    contacts: Contacts | None = None
+    """In scenes in which a sphere pushes a body: how strongly, and for how long."""
+    sampler: Callable[[str, int, int], list[dict[str, Any]]] | None = None
+    """`sampler(object, count, seed)` draws `count` parameter sets of one object ("" in a scene without any), for scenes
+    whose parameters do not fill a box. A longer list starts with the shorter one. None: evenly over the box."""
 
-    def sample(self, count: int, seed: int) -> list[dict[str, float]]:
-        """`count` parameter sets, space-filling over the trained box (scrambled Sobol points).
+    def sample(self, count: int, seed: int, objects: Sequence[str] = ()) -> list[dict[str, Any]]:
+        """`count` complete parameter sets; in a scene with objects, `count` of each of `objects` (default: all).
 
-        A longer list with the same seed starts with the shorter one.
+        By default they fill the trained box evenly (scrambled Sobol points); see `sampler`. A longer list of one object
+        with the same seed starts with the shorter one.
         """
+        draw = self.sampler or self._fill_box
+        if not self.schema.objects:
+            return draw("", count, seed)
+        rows = ({OBJECT: name, **row} for name in objects or self.schema.objects for row in draw(name, count, seed))
+        return [self.schema.complete(row) for row in rows]
+
+    def _fill_box(self, _: str, count: int, seed: int) -> list[dict[str, Any]]:
+        from scipy.stats import qmc  # takes half a second to import, and looking at a scene does not need it
+
         parameters = self.schema.parameters
         sobol = qmc.Sobol(len(parameters), scramble=True, rng=np.random.default_rng(seed))
         points = sobol.random(1 << max(count - 1, 0).bit_length())[:count]

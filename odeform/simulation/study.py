@@ -65,6 +65,8 @@ def _row(
 def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any]:
     """The figures of `count` sequences: the scene's extremes first, then space-filling samples of the trained box."""
     scene = get_scene(scene_name)
+    if scene.schema.objects:
+        raise InputError(f"{scene_name}: its parameters fill no box; see `python -m odeform.simulation.contact_study`")
     measured, learned = scene.measurements, scene.schema.learned
     hidden = [p for p in learned if p.name in (measured.hidden or [q.name for q in learned])]
     settings = [*measured.extremes, *scene.sample(count, seed)][:count]

@@ -7,6 +7,7 @@ time does not depend on earlier queries.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -47,7 +48,8 @@ class SolverSettings:
     """Fixed step in seconds."""
     tolerance: float | None = None
     """Bound on the estimated error of a step, as the root mean square over the entries of the state. It is absolute:
-    relative to the state, errors of large entries would be decoded into large errors of the motion."""
+    relative to the state, errors of large entries would be decoded into large errors of the motion. For
+    `limex` it is in m, as the field estimates it."""
     dtype: str = "float32"
     """"float32" or "float64"."""
 
@@ -88,12 +90,18 @@ def _first_step(order: int, field: Field, time: float, state: Any, slope: Any, t
 
 
 def integrate(
-    field: Field, start: Any, quality: SolverSettings, until: float, begin: float | Solution = 0.0
+    field: Field,
+    start: Any,
+    quality: SolverSettings,
+    until: float,
+    begin: float | Solution = 0.0,
+    before_step: Callable[[], None] = lambda: None,
 ) -> Solution:
     """Integrate dz/dt = field(t, z) at least to `until` seconds.
 
     `start` (n,) is the state at time `begin` in seconds; its dtype is the precision. A `Solution` given as `begin` is
-    continued in place. Failures end the solution early with a status other than OK; nothing is raised.
+    continued in place. `before_step` is called before each step, and may raise (`check_cancelled`). Failures end the
+    solution early with a status other than OK; nothing else is raised.
     """
     if isinstance(begin, Solution):
         solution = begin
@@ -105,18 +113,21 @@ def integrate(
         method = get_method(quality.method)
         stepper = method.stepper(start)
         if quality.step is not None:
-            _fixed(stepper, field, quality.step, solution, until)
+            _fixed(stepper, field, quality.step, solution, until, before_step)
         else:
-            _controlled(method, stepper, field, quality.tolerance or 0.0, solution, until)
+            _controlled(method, stepper, field, quality.tolerance or 0.0, solution, until, before_step)
     return solution
 
 
-def _fixed(stepper: Stepper, field: Field, step: float, solution: Solution, until: float) -> None:
+def _fixed(
+    stepper: Stepper, field: Field, step: float, solution: Solution, until: float, before_step: Callable[[], None]
+) -> None:
     origin = solution.times[0]
     while solution.end < until - 1e-9 * step:
         if solution.steps >= MAX_STEPS:
             solution.status = Status.MAX_STEPS
             return
+        before_step()
         time, state, slope = solution.times[-1], solution.states[-1], solution.slopes[-1]
         after, slope = stepper.step(field, time, state, slope, step)
         solution.evaluations += stepper.evaluations
@@ -130,7 +141,13 @@ def _fixed(stepper: Stepper, field: Field, step: float, solution: Solution, unti
 
 
 def _controlled(
-    method: Method, stepper: Stepper, field: Field, tolerance: float, solution: Solution, until: float
+    method: Method,
+    stepper: Stepper,
+    field: Field,
+    tolerance: float,
+    solution: Solution,
+    until: float,
+    before_step: Callable[[], None],
 ) -> None:
     """Proportional-integral step control on the embedded error estimate."""
     first, second = NOW / method.order, BEFORE / method.order
@@ -143,6 +160,7 @@ def _controlled(
         if solution.steps + solution.rejected >= MAX_STEPS:
             solution.status = Status.MAX_STEPS
             return
+        before_step()
         time, state, slope, step = solution.times[-1], solution.states[-1], solution.slopes[-1], solution.next_step
         if time + step <= time:
             solution.status = Status.UNDERFLOW

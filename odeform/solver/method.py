@@ -21,7 +21,8 @@ class Stepper(Protocol):
         ...
 
     def error(self, step: float) -> Any:
-        """(n,) estimated error of the last step; only asked of methods that control their step."""
+        """(m,) estimated error of the last step, whose root mean square counts; only asked of methods that control
+        their step."""
         ...
 
     def middle(self, state: Any, step: float) -> Any:

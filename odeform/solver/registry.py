@@ -2,6 +2,7 @@
 
 from odeform.errors import InputError
 from odeform.solver import tableau
+from odeform.solver.linearly_implicit import LinearlyImplicit
 from odeform.solver.method import Method
 from odeform.solver.runge_kutta import ExplicitRungeKutta
 
@@ -13,6 +14,7 @@ METHODS: dict[str, Method] = {
     "rk4": ExplicitRungeKutta(tableau.RK4),
     "bosh3": ExplicitRungeKutta(tableau.BOSH3),
     "dopri5": ExplicitRungeKutta(tableau.DOPRI5),
+    "limex": LinearlyImplicit(),
 }
 
 

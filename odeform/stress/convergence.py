@@ -10,7 +10,7 @@ from odeform.models.odeform.model import ODeform
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Method
 from odeform.solver.registry import METHODS
-from odeform.stress.cases import inside
+from odeform.stress.cases import inside, methods_of
 from odeform.stress.check import Check, Checks
 from odeform.types import Floats
 
@@ -52,11 +52,13 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
     """`order_METHOD_deviation`: difference between the observed order and the method's own, on the model's field."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     fields = {dtype: make_field(model.weights, model.config, dtype) for dtype in (np.float64, np.longdouble)}
-    off = dict.fromkeys(METHODS, 0.0)
+    methods = methods_of(model)
+    off = dict.fromkeys(methods, 0.0)
     for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)
         _, start, _ = model.problem(theta, evaluated, np.float64)
-        for name, method in METHODS.items():
+        for name in methods:
+            method = METHODS[name]
             dtype = np.float64 if method.order <= DOUBLE else np.longdouble
             found = _order(fields[dtype](theta), start.astype(dtype), method, schema.window.stop)
             off[name] = max(off[name], abs(found - method.order))
@@ -79,4 +81,4 @@ def check_refining(model: ODeform, dataset: Dataset) -> Checks:
         errors = [error(SolverSettings(method, step=1.0 / (window.rate * steps))) for steps in STEPS_A_FRAME]
         return np.divide(errors[1:], errors[:-1]).tolist()
 
-    return {"refining_error_ratio": Check(max(ratio for name in METHODS for ratio in ratios(name)), CHANCE)}
+    return {"refining_error_ratio": Check(max(ratio for name in methods_of(model) for ratio in ratios(name)), CHANCE)}

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float
 from PIL import Image, ImageDraw
 
 from odeform.models.base import Predictor
+from odeform.schema import Parameter
 from odeform.stress.cases import inside
 from odeform.types import Floats, Times
 
@@ -24,7 +25,7 @@ class StabilityMap:
 
     `values[t, i, j]` is relative to the largest in the trained box, with the first of `names` at `units[j]` and the
     second at `units[i]` (halves of the trained range, from its middle), at `times[t]` seconds. `window` is the trained
-    one, in seconds. `sound` is False where the integration failed and the last good state is used.
+    one, in seconds. `sound` is False where an earlier state is shown: the integration failed, or the motion is stopped.
     """
 
     names: tuple[str, str]
@@ -33,6 +34,8 @@ class StabilityMap:
     window: float
     values: Float[np.ndarray, "times units units"]
     sound: Bool[np.ndarray, "times units units"]
+    boxes: tuple[str, str]
+    """The trained range of each parameter, with its unit."""
 
 
 def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) -> float:
@@ -64,18 +67,30 @@ def stability_map(
         given = {first.name: first.denormalise(float(units[j])), second.name: second.denormalise(float(units[i]))}
         motion = predictor.solve(None, given, quality, until=times[-1])
         values[:, i, j] = motion.deformation_rms(times)
-        sound[:, i, j] = schema.window.soft_clamped(times) <= motion.last_good
+        solved = schema.window.soft_clamped(times) <= motion.last_good
+        sound[:, i, j] = solved & [motion.stop_at(time) is None for time in times.tolist()]
     return StabilityMap(
-        (first.name, second.name), units, times, schema.window.stop, values / largest_deformation(predictor), sound
+        (first.name, second.name),
+        units,
+        times,
+        schema.window.stop,
+        values / largest_deformation(predictor),
+        sound,
+        (_range(first), _range(second)),
     )
 
 
+def _range(parameter: Parameter) -> str:
+    return f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
+
+
 def map_image(plot: StabilityMap) -> Image.Image:
-    """One panel per time, grey where the integration failed."""
+    """One panel per time, grey where an earlier state is shown."""
 
     side = CELL * len(plot.units)
     image = Image.new("RGB", (GAP + len(plot.times) * (side + GAP), side + 3 * GAP), (255, 255, 255))
     case = ImageDraw.Draw(image)
+    axes = f"x: {plot.names[0]} ({plot.boxes[0]}), y: {plot.names[1]} ({plot.boxes[1]})"
     for index, time in enumerate(plot.times):
         left = GAP + index * (side + GAP)
         cells = np.where(plot.sound[index][..., None], _colors(plot.values[index]), FAILED).astype(np.uint8)
@@ -87,7 +102,7 @@ def map_image(plot: StabilityMap) -> Image.Image:
         windows = time / plot.window
         caption = f"{time:.3g} s ({windows:g} trained window{'' if windows == 1.0 else 's'})"
         case.text((left, 6), caption, fill=(0, 0, 0))
-        case.text((left, side + GAP + 4), f"x: {plot.names[0]}, y: {plot.names[1]}", fill=(0, 0, 0))
+        case.text((left, side + GAP + 4), axes, fill=(0, 0, 0))
     text = (
         "RMS deformation over the largest trained: 0 (pale), 1 (orange), 2 or more (dark red). Frame: the trained box"
     )

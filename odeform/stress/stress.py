@@ -14,15 +14,17 @@ from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load_reduced
+from odeform.motion.base import Motion
 from odeform.parallel import parallel_map
 from odeform.schema import Window
-from odeform.stress.cases import Case, extreme_cases, shapes, subsampled
+from odeform.stress.cases import Case, extreme_cases, methods_of, shapes, subsampled
 from odeform.stress.check import Check, Checks
 from odeform.stress.consistency import check_consistency
 from odeform.stress.convergence import check_orders, check_refining
 from odeform.stress.physics import check_physics
 from odeform.stress.solvers import check_calibration, check_field, check_sensitivities
-from odeform.types import Floats, Geometry
+from odeform.stress.watched import DRAWS, check_shown
+from odeform.types import Floats, Geometry, Times
 
 __all__ = ["Outcome", "report", "run_case", "stress"]
 
@@ -62,13 +64,13 @@ def run_case(predictor: Predictor, case: Case, geometries: Mapping[str, Geometry
 
 def _evaluated(predictor: Predictor, case: Case, geometry: Geometry, begin: float) -> Outcome:
     schema = predictor.schema
-    parameters = {p.name: value for p, value in zip(schema.parameters, case.values, strict=True)}
+    parameters = dict(zip(schema.names, case.values, strict=True))
     times = schema.window.stop * np.array(MOMENTS)
     motion = predictor.solve(geometry, parameters, case.quality or "balanced", until=times[-1])
     frames, rest = motion.vertices(times), np.asarray(geometry.points, dtype=np.float32)
     moved = np.sqrt(((frames - rest) ** 2).sum(axis=2).max(axis=1))
     return Outcome(
-        status=motion.stats.status + (", outside the trained box" if motion.outside else ""),
+        status=_status(motion, times),
         seconds=time.perf_counter() - begin,
         non_finite=int((~np.isfinite(frames).all(axis=(1, 2))).sum()),
         start_off=float(np.abs(frames[0] - rest).max()),
@@ -77,14 +79,29 @@ def _evaluated(predictor: Predictor, case: Case, geometry: Geometry, begin: floa
     )
 
 
-def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]:
-    """`count` distinct cases and all checks, as JSON. The seed fixes everything but wall times."""
+def _status(motion: Motion, times: Times) -> str:
+    """That of the solver, and what a motion is held for at any of the (T,) `times` in seconds."""
+    held = next((stop.reason for stop in map(motion.stop_at, times.tolist()) if stop is not None), "")
+    return (
+        motion.stats.status
+        + (f", stopped: {held}" if held else "")
+        + (", outside the trained box" if motion.outside else "")
+    )
+
+
+def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAWS) -> dict[str, Any]:
+    """`count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
+
+    The seed fixes everything but wall times.
+    """
     predictor = load_reduced(checkpoint)
     schema = predictor.schema
-    cases = extreme_cases(schema, bool(predictor.qualities), count, seed)
+    cases = extreme_cases(schema, methods_of(predictor), count, seed)
     outcomes = parallel_map("stress", partial(_run_from, checkpoint), cases, batch_size=BATCH)
     checks = _overall(predictor, cases, outcomes)
     checks |= check_consistency(predictor, seed) | check_physics(predictor, seed)
+    watched, inside = check_shown(checkpoint, draws, seed)
+    checks |= watched
     if isinstance(predictor, ODeform):
         checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
         checks |= check_field(predictor, seed) | check_calibration(predictor, seed)
@@ -94,6 +111,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0) -> dict[str, Any]
         "cases": len(cases),
         "non_finite_shown": sum(outcome.non_finite for outcome in outcomes),
         "by_status": dict(Counter(outcome.status for outcome in outcomes).most_common()),
+        "inside": inside,
         "checks": {name: check.to_json() for name, check in checks.items()},
     }
 
@@ -159,6 +177,11 @@ def report(result: Mapping[str, Any]) -> str:
     """The result as text, one line per status and check."""
     lines = [f"{result['cases']} cases, {result['non_finite_shown']} non-finite frames"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
+    inside = result["inside"]
+    lines.append(
+        f"{inside['draws']} motions inside the trained box, to the end of the time axis: {inside['stopped']} stopped, "
+        f"{inside['stopped_in_window']} of them within the trained window"
+    )
     for name, check in result["checks"].items():
         figure = "not finite" if check["figure"] is None else f"{check['figure']:.4g}"
         lines.append(f"{'holds' if check['holds'] else 'FAILS'}   {name:<40}{figure:>12}   bound {check['bound']:.4g}")

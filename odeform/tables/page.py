@@ -1,21 +1,35 @@
 """The tables as a Markdown page, beside the paper's figures."""
 
-import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from odeform.tables.paper import EXTRAPOLATED, IDENTIFIED, INTERPOLATED, UNSEEN, UNSEEN_FORCE
-from odeform.tables.plan import AHEAD, DROP, FRAMES, IMPACT, INTERVALS, MINUTES, UNTIL
-from odeform.tables.runs import Result, Run
+from odeform.tables.cells import Runs, key_of, models, number, paragraph, scored_rows, scores_of, table
+from odeform.tables.paper import (
+    EXTRAPOLATED,
+    EXTRAPOLATED_FORCE,
+    IDENTIFIED,
+    INTERPOLATED,
+    UNSEEN,
+    UNSEEN_FORCE,
+    UNSEEN_OBJECTS,
+)
+from odeform.tables.plan import AHEAD, DROP, FORCE, FRAMES, IMPACT, INTERVALS, MINUTES, PUSH, UNTIL
+from odeform.tables.runs import ALONE
+from odeform.tables.studies import ablations, learning_curve
 
 __all__ = ["page"]
 
 METRICS = ("rmse_pooled_mm", "mae_pooled_mm", "mse_pooled_mm2")
-
-Row = Sequence[str]
-Runs = Mapping[Run, Result]
+SHAPE = "deformation_relative"
+SIMPLE = {
+    "continued": "the true frames of the window, continued",
+    "hold-last": "the true last frame, held",
+    "ballistic": "ballistic flight from the true last frames",
+}
+"""Rows of the table of extrapolation that know the true window."""
+PAIR = (METRICS[0], SHAPE)
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -27,9 +41,9 @@ def page(found: Mapping[str, Any]) -> str:
     )
     return "\n".join(
         [
-            "# Tables II to V",
+            "# Tables I to V, ablations and learning curve",
             "",
-            *_paragraph(
+            *paragraph(
                 f"Written by `odeform tables{share}`.",
                 "Within a table every model is trained on the same data and split, with a fixed budget of steps that",
                 "includes trials of its settings on the validation split.",
@@ -38,16 +52,20 @@ def page(found: Mapping[str, Any]) -> str:
                 f"Here, with two runs at a time: {_taken(runs)}.",
             ),
             "",
-            *_paragraph(
+            *paragraph(
                 "Scores are on the test split, pooled over frames and sequences, in mm and mm².",
                 "The paper's figures are shown below each table; its data differ, so only the ranking can be compared.",
-                "A dash (–) was not run, or cannot be run: there is no Contact-Force scene yet.",
+                "Scores of pushed objects (`contact-force`) are means of seven objects.",
+                "A dash (–) was not run, or cannot be run.",
             ),
             "",
+            *_objects(runs["II"]),
             *_unseen(runs["II"], found["shipped"]),
             *_extrapolated(runs["III"], found["simple"]),
             *_interpolated(runs["IV"], found["simple"]),
             *_identified(found["identified"]),
+            *ablations(runs["ablations"]),
+            *learning_curve(runs["learning curve"]),
             "## Commands",
             "",
             *commands,
@@ -66,103 +84,106 @@ def _taken(runs: Mapping[str, Runs]) -> str:
     return ", ".join(f"`{model}` {min(some):.0f} to {max(some):.0f} s" for model, some in seconds.items())
 
 
-def _paragraph(*parts: str) -> list[str]:
-    return textwrap.wrap(" ".join(parts), 118, break_long_words=False, break_on_hyphens=False)
+def _objects(runs: Runs) -> list[str]:
+    key = key_of(FRAMES[FORCE])
+    each = {run.model: r["scores"][key].get("objects") for run, r in runs.items() if run.scene == FORCE}
+    each = {model: objects for model, objects in each.items() if objects}
+    if not each:
+        return []
+    others = [model for model in each if model != "odeform"]
+    head = ["object", "odeform, RMSE", "MAE", "MSE", "deformation"]
+    head += [f"{model}, {unit}" for model in others for unit in ("RMSE", "deformation")]
+    asked = [("odeform", metric) for metric in (*METRICS, SHAPE)] + [(m, metric) for m in others for metric in PAIR]
+    values = {name: [each[model][name][metric] for model, metric in asked] for name in UNSEEN_OBJECTS}
+    values["mean"] = np.mean(list(values.values()), axis=0).tolist()
+    rows = [
+        [name, *(_score(v, metric) for v, (_, metric) in zip(row, asked, strict=True))] for name, row in values.items()
+    ]
+    paper = [[name, *map(number, values)] for name, values in UNSEEN_OBJECTS.items()]
+    paper.append(["mean", *map(number, UNSEEN_FORCE["ODeform"])])
+    return [
+        "## I. Pushed objects, unseen contacts and forces",
+        "",
+        *paragraph(
+            "One checkpoint for all seven objects (`contact-force`).",
+            "Deformation is the error of what the best rigid motion of each frame leaves, relative to its size.",
+            "The paper trains one network per object, on other meshes, materials and pushes.",
+        ),
+        "",
+        *table(head, rows),
+        *table(["paper, ODeform", "RMSE", "MAE", "MSE"], paper),
+    ]
 
 
-def _table(head: Row, rows: Iterable[Row]) -> list[str]:
-    return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)] + [""]
-
-
-def _number(value: float | None) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
-
-
-def _spread(values: Sequence[float]) -> str:
-    """Mean and standard deviation over seeds."""
-    if not values:
-        return "–"
-    return _number(float(np.mean(values))) + (f" ± {np.std(values, ddof=1):.2g}" if len(values) > 1 else "")
-
-
-def _bold(model: str) -> str:
-    return f"**{model}**" if model == "odeform" else model
-
-
-def _key(window: tuple[int, int]) -> str:
-    return f"{window[0]}:{window[1]}"
-
-
-def _of(runs: Runs, window: tuple[int, int], metric: str, **attributes: object) -> list[float]:
-    """A score of the runs with these attributes, one per seed."""
-    found = [r for run, r in runs.items() if all(getattr(run, key) == value for key, value in attributes.items())]
-    return [r["scores"][_key(window)][metric] for r in found if _key(window) in r["scores"]]
-
-
-def _models(runs: Runs, **attributes: object) -> list[str]:
-    """Names of the models of the runs with these attributes, in order."""
-    return list(
-        dict.fromkeys(run.model for run in runs if all(getattr(run, key) == v for key, v in attributes.items()))
-    )
+def _score(value: float, metric: str) -> str:
+    return f"{100.0 * value:.0f} %" if metric == SHAPE else number(value)
 
 
 def _unseen(runs: Runs, shipped: Mapping[str, Mapping[str, float]]) -> list[str]:
-    asked = [(DROP, FRAMES[DROP]), (DROP, IMPACT), ("kick", FRAMES["kick"])]
+    asked = [(DROP, FRAMES[DROP]), (DROP, IMPACT), ("kick", FRAMES["kick"]), (FORCE, FRAMES[FORCE])]
+    labels = ("drop", "its impact", "kick", "pushed objects")
     head = ["model", "parameters"]
-    head += [f"{label}, {unit}" for label in ("drop", "its impact", "kick") for unit in ("RMSE", "MAE", "MSE")]
-    rows = []
-    for model in _models(runs):
-        counts = [r["parameters"] for run, r in runs.items() if run.model == model and run.scene == DROP]
-        row = [_bold(model), f"{max(counts):,}" if counts else "–"]
-        for scene, window in asked:
-            row += [_spread(_of(runs, window, metric, scene=scene, model=model)) for metric in METRICS]
-        rows.append(row)
-    longer = [_number(shipped[f"{scene} {_key(window)}"][metric]) for scene, window in asked for metric in METRICS]
+    head += [f"{label}, {unit}" for label in labels for unit in ("RMSE", "MAE", "MSE")]
+    rows = scored_rows(
+        {
+            model: [scores_of(runs, window, metric, scene=s, model=model) for s, window in asked for metric in METRICS]
+            for model in models(runs)
+        }
+    )
+    for row in rows:
+        counts = [r["parameters"] for run, r in runs.items() if run.model == row[0] and run.scene == DROP]
+        row.insert(1, f"{max(counts):,}" if counts else "–")
+    longer = [number(shipped[f"{scene} {key_of(window)}"][metric]) for scene, window in asked for metric in METRICS]
     rows.append(["odeform, bundled checkpoint: trained longer", "", *longer])
     paper = [
-        [name, *map(_number, UNSEEN.get(name, (None,) * 3)), *map(_number, UNSEEN_FORCE[name])] for name in UNSEEN_FORCE
+        [name, *map(number, UNSEEN.get(name, (None,) * 3)), *map(number, UNSEEN_FORCE[name])] for name in UNSEEN_FORCE
     ]
     return [
         "## II. Unseen parameters",
         "",
-        *_paragraph(
+        *paragraph(
             f"All frames of the drop (`mass-elastic`), its frames {IMPACT[0]} to {IMPACT[1] - 1} with the first two",
-            "contacts, and all frames of the kick.",
-            "± is the standard deviation over seeds; `pod-rbf` and `nearest` are deterministic.",
+            "contacts, all frames of the kick, and all frames of pushed objects.",
+            "± is the standard deviation over seeds; `pod-rbf`, `gp` and `nearest` are deterministic.",
+            "Here and below, bold is what leads all others of its column by more than the spread.",
         ),
         "",
-        *_table(head, rows),
-        *_table(["paper", "Mass-Elastic, RMSE", "MAE", "MSE", "Contact-Force, RMSE", "MAE", "MSE"], paper),
+        *table(head, rows),
+        *table(["paper", "Mass-Elastic, RMSE", "MAE", "MSE", "Contact-Force, RMSE", "MAE", "MSE"], paper),
     ]
 
 
 def _extrapolated(runs: Runs, simple: Mapping[str, Mapping[str, float]]) -> list[str]:
     windows = [(until, until + AHEAD) for until in UNTIL]
     head = ["model", *(f"{b - AHEAD} to {b - 1}, {unit}" for _, b in windows for unit in ("RMSE", "MAE"))]
-    rows = []
-    for model in _models(runs):
-        row = [_bold(model)]
-        for until, window in zip(UNTIL, windows, strict=True):
-            row += [_spread(_of(runs, window, metric, model=model, until=until)) for metric in METRICS[:2]]
-        rows.append(row)
-    for name in ("hold-last", "ballistic"):
-        scores = [simple[f"{name} {_key(window)}"] for window in windows]
-        rows.append([f"{name}, given the true last frames", *(_number(s[m]) for s in scores for m in METRICS[:2])])
-    paper = [[name, *map(_number, values)] for name, values in EXTRAPOLATED.items()]
+    head += [f"pushed objects {PUSH[0]} to {PUSH[1] - 1}, {unit}" for unit in ("RMSE", "MAE")]
+    scores = {}
+    for model in models(runs):
+        for kind, label in (("", model), (ALONE, f"{model} without continuation")):
+            row = [scores_of(runs, w, m, kind, model=model, until=w[0]) for w in windows for m in METRICS[:2]]
+            row += [scores_of(runs, PUSH, metric, kind, model=model, scene=FORCE) for metric in METRICS[:2]]
+            if any(row):
+                scores[label] = row
+    rows = scored_rows(scores)
+    for name, label in SIMPLE.items():
+        scores = [simple[f"{name} {key_of(window)}"] for window in windows]
+        rows.append([label, *(number(s[m]) for s in scores for m in METRICS[:2]), "–", "–"])
+    paper = [[name, *map(number, (*EXTRAPOLATED[name], *EXTRAPOLATED_FORCE[name]))] for name in EXTRAPOLATED]
     return [
         "## III. Extrapolation",
         "",
-        *_paragraph(
+        *paragraph(
             f"The {AHEAD} frames after the trained ones, at 120 Hz.",
             f"Drops are trained to frame {UNTIL[0] - 1}, when the stiffer balls have left the floor, or to frame",
             f"{UNTIL[1] - 1}, when some have landed again.",
-            "Models that cannot extrapolate in time hold their last trained frame.",
+            f"Pushed objects are trained to frame {PUSH[0] - 1} at 100 Hz, as in the paper.",
+            "Models of reduced coordinates, rivals included, are continued by dynamics that are fitted to the training",
+            "motions within the window; without it, baselines hold their last trained frame.",
+            "The true frames, continued, are the least error that this continuation leaves: its floor.",
         ),
         "",
-        *_table(head, rows),
-        *_table(["paper, Mass-Elastic", "RMSE", "MAE"], paper),
+        *table(head, rows),
+        *table(["paper", "Mass-Elastic, RMSE", "MAE", "Contact-Force, RMSE", "MAE"], paper),
     ]
 
 
@@ -170,28 +191,28 @@ def _interpolated(runs: Runs, simple: Mapping[str, Mapping[str, float]]) -> list
     head = ["model", "every frame", *(f"every {_nth(k)}" for k in INTERVALS), *(f"{_nth(k)}, MAE" for k in INTERVALS)]
     tables = {}
     for stagger in (True, False):
-        rows = []
-        for model in _models(runs, stagger=stagger, every=INTERVALS[0]):
-            row = [_bold(model), _spread(_of(runs, IMPACT, METRICS[0], model=model, every=1))]
+        found = {}
+        for model in models(runs, stagger=stagger, every=INTERVALS[0]):
+            found[model] = [scores_of(runs, IMPACT, METRICS[0], model=model, every=1)]
+            every = {"model": model, "stagger": stagger}
             for metric in METRICS[:2]:
-                attributes = {"model": model, "stagger": stagger}
-                row += [_spread(_of(runs, IMPACT, metric, every=k, **attributes)) for k in INTERVALS]
-            rows.append(row)
+                found[model] += [scores_of(runs, IMPACT, metric, every=k, **every) for k in INTERVALS]
+        rows = scored_rows(found)
         splines = [simple[f"spline {k} staggered" if stagger else f"spline {k}"] for k in INTERVALS]
-        errors = [_number(one[metric]) for metric in METRICS[:2] for one in splines]
-        tables[stagger] = _table(head, [*rows, ["cubic spline through the true trained frames", "0", *errors]])
-    paper = [[name, *map(_number, values)] for name, values in INTERPOLATED.items()]
+        errors = [number(one[metric]) for metric in METRICS[:2] for one in splines]
+        tables[stagger] = table(head, [*rows, ["cubic spline through the true trained frames", "0", *errors]])
+    paper = [[name, *map(number, values)] for name, values in INTERPOLATED.items()]
     return [
         "## IV. Interpolation",
         "",
-        *_paragraph(
+        *paragraph(
             f"All frames {IMPACT[0]} to {IMPACT[1] - 1} of drops, by models trained on every 3rd, 5th or 8th frame;",
             "RMSE, then MAE.",
             "Trained frames are staggered between sequences (`--stagger`: the i-th keeps i, i + k, i + 2 k, ...):",
         ),
         "",
         *tables[True],
-        *_paragraph(
+        *paragraph(
             "Trained frames are the same in all sequences.",
             "A contact lasts a few frames, so no sequence shows what happens between the trained ones.",
             "At test time `occupancy-flow` is given the true trained frames of the same motion, as in the paper, and",
@@ -199,7 +220,7 @@ def _interpolated(runs: Runs, simple: Mapping[str, Mapping[str, float]]) -> list
         ),
         "",
         *tables[False],
-        *_table(["paper, RMSE", *(f"every {_nth(k)}" for k in INTERVALS)], paper),
+        *table(["paper, RMSE", *(f"every {_nth(k)}" for k in INTERVALS)], paper),
     ]
 
 
@@ -210,19 +231,19 @@ def _nth(k: int) -> str:
 def _identified(identified: Mapping[str, Any]) -> list[str]:
     rows = [
         [scene, name, f"{one['mae_normalised']:.4f}", _covered(one), f"{result['seconds']:.1f} s",
-         _number(IDENTIFIED[name]) if scene == DROP else "–"]
+         number(IDENTIFIED[name]) if scene == DROP else "–"]
         for scene, result in identified.items()
         for name, one in result["parameters"].items()
     ]  # fmt: skip
     return [
         "## V. Identification",
         "",
-        *_paragraph(
+        *paragraph(
             "All parameters of a motion together, by the bundled checkpoints; MAE in halves of the trained range",
             "(`odeform identify`). The paper recovers one parameter at a time.",
         ),
         "",
-        *_table(["scene", "parameter", "MAE", "in 90 % interval", "time per sequence", "paper"], rows),
+        *table(["scene", "parameter", "MAE", "in 90 % interval", "time per sequence", "paper"], rows),
     ]
 
 

@@ -5,25 +5,32 @@ A checkpoint may be deleted once its scores are complete.
 
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.io import atomic_write
+from odeform.models.continuation import without_continuation
+from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load
 from odeform.parallel import as_completed
 from odeform.progress import Progress
 from odeform.training.request import TrainRequest
 from odeform.training.train import train
 
-__all__ = ["Result", "Run", "complete_runs"]
+__all__ = ["ALONE", "KEPT", "Result", "Run", "complete_runs", "kept_scores"]
 
 KEPT = ("rmse_pooled_mm", "mae_pooled_mm", "mse_pooled_mm2", "rmse_mm", "deformation_relative", "sequences")
+
+ALONE = " alone"
+"""After a window of frames: the scores of the model without what continues it beyond its trained window."""
 
 Result = dict[str, Any]
 """`command`, `sha256` of the checkpoint, number of `parameters`, training `seconds`, and `scores` by "FIRST:LAST"."""
@@ -34,7 +41,8 @@ class Run:
     """A model trained on every k-th of the frames 0 to `until` (default: all) of a data set, and scored on `scored`.
 
     `scored` are half-open windows of frames at the scene's rate; `scene` is a bundled data set or a path. `steps` is
-    None for models without iterative training.
+    None for models without iterative training. `sequences` and `without` are those of
+    `TrainRequest`.
     """
 
     model: str
@@ -45,6 +53,8 @@ class Run:
     every: int = 1
     until: int | None = None
     stagger: bool = False
+    sequences: int | None = None
+    without: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -53,6 +63,8 @@ class Run:
         parts += [f"w{self.until}"] if self.until else []
         parts += [f"e{self.every}"] if self.every > 1 else []
         parts += ["staggered"] if self.stagger else []
+        parts += [f"n{self.sequences}"] if self.sequences else []
+        parts += [f"no-{name}" for name in self.without]
         return "_".join([*parts, f"s{self.seed}"])
 
     @property
@@ -64,9 +76,8 @@ class Run:
     def request(self) -> TrainRequest:
         """What to ask of the trainer."""
         window = (0, self.until) if self.until else None
-        return TrainRequest(
-            self.model, self.seed, steps=self.steps, window=window, every=self.every, stagger=self.stagger
-        )
+        shared = {name: getattr(self, name) for name in ("model", "seed", "steps", "every", "stagger")}
+        return TrainRequest(**shared, window=window, sequences=self.sequences, without=self.without)
 
 
 def complete_runs(runs: Sequence[Run], folder: Path, jobs: int, kept_only: bool = False) -> dict[Run, Result]:
@@ -104,8 +115,12 @@ def _complete(run: Run, folder: Path) -> Result:
     for span in run.scored:
         key = f"{span[0]}:{span[1]}"
         if key not in scores:
-            found = (model.checkpoint.scores or {}).get(key) or evaluate(model, dataset, "test", span)
-            scores[key] = {name: found[name] for name in KEPT}
+            known_scores = {} if dataset.objects else model.checkpoint.scores or {}
+            scores[key] = kept_scores(known_scores.get(key) or evaluate(model, dataset, "test", span))
+        continued = run.until is not None and isinstance(model, ReducedModel) and model.dynamics is not None
+        if continued and f"{key}{ALONE}" not in scores:
+            alone = type(model)(without_continuation(model.checkpoint))
+            scores[f"{key}{ALONE}"] = kept_scores(evaluate(alone, dataset, "test", span))
     result: Result = {
         "command": run.command,
         "sha256": model.checkpoint.sha256,
@@ -115,6 +130,15 @@ def _complete(run: Run, folder: Path) -> Result:
     }
     atomic_write(kept, json.dumps(result, indent=1).encode())
     return result
+
+
+def kept_scores(found: Mapping[str, Any]) -> Result:
+    """The scores that tables show. In a scene with objects: their means, and those of each under `objects`."""
+    each = found.get("per_object")
+    if not each:
+        return {name: found[name] for name in KEPT}
+    means = {name: float(np.mean([one[name] for one in each.values()])) for name in KEPT}
+    return {**means, "objects": {name: kept_scores(one) for name, one in each.items()}}
 
 
 def _scored(run: Run, folder: Path) -> Result | None:

@@ -43,5 +43,7 @@ class TrainConfig:
     """Longest step in seconds during descent; longer frames are integrated in several steps."""
     refine: int = 2
     """Steps per half frame, relative to those of a frame during descent, where no gradients are needed."""
+    without: tuple[str, ...] = ()
+    """Parts that are left out (`odeform.training.ablation`)."""
     report: float = 60.0
     """Seconds between progress lines, and between saved states."""

@@ -6,8 +6,8 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
-from odeform.models.continuation import ContinuedTrajectory, Dynamics, kernel
-from odeform.models.odeform.model import ODeform
+from odeform.models.continuation import LATER_ERRORS, ContinuedTrajectory, Dynamics, kernel
+from odeform.models.reduced_model import ReducedModel
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
@@ -83,7 +83,7 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     return replace(dynamics, centers=centers, weights=weights)
 
 
-def predicted_errors(model: ODeform, data: TrainingData) -> Floats | None:
+def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
     """(S, L) RMSE in mm of the validation motions over the last third of the window, which is held out of the fit, when
     continued from the model's own motions. None if motions that stop there have smaller errors, and where a spline
     filled in frames: it knows no contacts."""
@@ -95,7 +95,7 @@ def predicted_errors(model: ODeform, data: TrainingData) -> Floats | None:
     evaluated, later = model.evaluate_basis(model.rest, 0.0), data.times[kept:]
     continued, stopped = [], []
     for theta in data.theta["val"]:
-        motion = model.integrate(theta, evaluated, model.qualities["reference"], window.stop)
+        motion = model.trajectory(theta, evaluated, model.qualities.get("reference"), window.stop)
         continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
     truth, gyration_radius = data.reduced["val"][:, kept:], data.space.gyration_radius
@@ -105,13 +105,15 @@ def predicted_errors(model: ODeform, data: TrainingData) -> Floats | None:
     return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
 
 
-def with_continuation(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained model with the dynamics that continue it and their validation errors; unchanged where
-    these dynamics predict worse than motions that stop."""
-    errors = predicted_errors(ODeform(checkpoint), data)
+def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
+    """The checkpoint of a trained `model` with the dynamics that continue it and their validation errors.
+
+    It is unchanged where these dynamics predict worse than motions that stop.
+    """
+    errors, checkpoint = predicted_errors(model, data), model.checkpoint
     if errors is None:
         return checkpoint
     dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.gyration_radius)
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
-    arrays = {**checkpoint.arrays, **dynamics.arrays(), "val.later_mm": errors.astype(np.float32)}
+    arrays = {**checkpoint.arrays, **dynamics.arrays(), LATER_ERRORS: errors.astype(np.float32)}
     return replace(checkpoint, schema=schema, arrays=arrays)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,16 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.models.baselines.fitted_model import FittedModel
+from odeform.models.baselines.pe_gnn import PeGnn
 from odeform.models.baselines.point_model import PointModel
 from odeform.models.odeform.model import ODeform
+from odeform.models.per_object import joined
 from odeform.models.registry import TRAINABLE, model_class
+from odeform.training.body import body_arrays
 from odeform.training.continuation import with_continuation
+from odeform.training.correction import with_correction
+from odeform.training.graphs import fit_graphs
+from odeform.training.mechanical import fit_mechanical
 from odeform.training.odeform import fit_odeform
 from odeform.training.point_data import prepare_points
 from odeform.training.points import Budget, fit_points
@@ -25,6 +32,8 @@ from odeform.training.request import TrainRequest
 from odeform.types import Arrays
 
 __all__ = ["Run", "is_resumable", "train_model"]
+
+NARROW = 1e-3  # of a scene's range, by which that of an object is wider than its data
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +66,20 @@ def train_model(run: Run) -> Checkpoint:
     name = run.request.model
     if name not in TRAINABLE:
         raise InputError(f"unknown model {name!r}: expected one of {', '.join(TRAINABLE)}")
-    return next(METHODS[kind] for kind in model_class(name).__mro__ if kind in METHODS)(run)
+    if run.dataset.objects and name == ODeform.model:
+        return fit_mechanical(_cut(run), run.request.seed, run.report)
+    method = next(METHODS[kind] for kind in model_class(name).__mro__ if kind in METHODS)
+    return _train_each(run, method) if run.dataset.objects else method(run)
+
+
+def _cut(run: Run) -> Dataset:
+    """The data of pushed objects up to the last frame asked for. `InputError` for frames that are left out."""
+    request, dataset = run.request, run.dataset
+    if request.every > 1 or request.stagger or request.steps is not None or request.without:
+        raise InputError("odeform on pushed objects: expected no --every, --stagger, --steps or --without")
+    window = dataset.schema.window
+    last = (FrameSubsampling(request.window).count(dataset.schema) - 1) / window.rate
+    return replace(dataset, schema=replace(dataset.schema, window=replace(window, stop=last)))
 
 
 def is_resumable(model: str) -> bool:
@@ -65,19 +87,55 @@ def is_resumable(model: str) -> bool:
     return issubclass(model_class(model), ODeform)
 
 
+def _train_each(run: Run, method: Callable[[Run], Checkpoint]) -> Checkpoint:
+    """A model for each object, with an equal share of the budget. Its parameters are normalised by their own ranges."""
+    objects, request = run.dataset.objects, run.request
+    steps = None if request.steps is None else max(request.steps // len(objects), 1)
+    request = replace(request, minutes=request.minutes / len(objects), steps=steps)
+    parts = {}
+    for name in objects:
+        dataset = _with_own_ranges(run.dataset.of(name))
+        report = partial(_report_of, name, run.report)
+        parts[name] = method(replace(run, dataset=dataset, request=request, body=body_arrays(dataset), report=report))
+    return joined(run.dataset.schema, parts)
+
+
+def _with_own_ranges(dataset: Dataset) -> Dataset:
+    """Data whose schema has the ranges of its training sequences: contacts differ with the body, and so do forces."""
+    rows = [entry.parameters for entry in dataset.select("train")]
+    if not rows:
+        raise InputError(f"{dataset.root}: no sequence of {dataset.schema.objects[0]} in split train")
+    ranges = []
+    for p in dataset.schema.parameters:
+        values = [float(row[p.name]) for row in rows]
+        slack = NARROW * (p.high - p.low) if p.scale == "linear" else 0.0
+        low, high = min(values) - slack, max(values) + slack
+        own = replace(p, low=low, high=high, default=min(max(p.default, low), high)) if low < high else p
+        ranges.append(p if p.role == "azimuth" else own)
+    return replace(dataset, schema=replace(dataset.schema, parameters=tuple(ranges)))
+
+
+def _report_of(name: str, report: Callable[[str], None], line: str) -> None:
+    report(f"{name}: {line}")
+
+
 def _train_odeform(run: Run) -> Checkpoint:
     data = run.reduced_data()
     modes = data.space.basis.modes
     arrays, settings = fit_odeform(data, run.request, run.report, run.part)
-    checkpoint, data = without_modes(_reduced_checkpoint(run, data, arrays, settings), data)
+    checkpoint = _reduced_checkpoint(run, data, arrays, settings)
+    if "correction" not in run.request.without:
+        checkpoint = with_correction(checkpoint, data)
+    checkpoint, data = without_modes(checkpoint, data)
     run.report(f"{data.space.basis.modes} of {modes} modes are needed")
-    return with_continuation(with_qualities(checkpoint, data), data)
+    checkpoint = with_qualities(checkpoint, data)
+    return with_continuation(ODeform(checkpoint), data)
 
 
 def _fit(run: Run) -> Checkpoint:
     model, data = model_class(run.request.model), run.reduced_data()
     assert issubclass(model, FittedModel)
-    return _reduced_checkpoint(run, data, *model.fit(data))
+    return with_continuation(model(_reduced_checkpoint(run, data, *model.fit(data))), data)
 
 
 def _train_points(run: Run) -> Checkpoint:
@@ -96,6 +154,16 @@ def _train_points(run: Run) -> Checkpoint:
     return replace(checkpoint, arrays=arrays)
 
 
+def _train_graphs(run: Run) -> Checkpoint:
+    request = run.request
+    data = prepare_points(run.dataset, FrameSubsampling(request.window))
+    run.report(f"{request.model} on the last frames of {len(data.theta['train'])} sequences")
+    rest = next(run.dataset.sequences("train")).rest
+    checkpoint = fit_graphs(data, rest, Budget(60.0 * request.minutes, request.steps), request.seed, run.report)
+    arrays = {**checkpoint.arrays, **run.body, "training.theta": data.theta["train"].astype(np.float32)}
+    return replace(checkpoint, arrays=arrays)
+
+
 def _reduced_checkpoint(run: Run, data: TrainingData, arrays: Arrays, settings: dict[str, object]) -> Checkpoint:
     theta = data.theta["train"].astype(np.float32)
     return Checkpoint(
@@ -110,6 +178,7 @@ def _reduced_checkpoint(run: Run, data: TrainingData, arrays: Arrays, settings: 
 METHODS: dict[type, Callable[[Run], Checkpoint]] = {
     ODeform: _train_odeform,
     FittedModel: _fit,
+    PeGnn: _train_graphs,
     PointModel: _train_points,
 }
 """By base class."""

@@ -39,11 +39,14 @@ def needed_modes(model: ODeform, data: TrainingData) -> int:
 
 def without_modes(checkpoint: Checkpoint, data: TrainingData) -> tuple[Checkpoint, TrainingData]:
     """The checkpoint of a trained ODeform and its data, with only the modes that it needs."""
-    count = needed_modes(ODeform(checkpoint), data)
+    model = ODeform(checkpoint)
+    count = needed_modes(model, data)
     space = replace(data.space, basis=data.space.basis.first(count))
     reduced = {split: y[..., : POSE + count] for split, y in data.reduced.items()}
     readout, gains = f"{PREFIX}local_decoder.readout.weight", f"{PREFIX}gains"
     kept = {readout: checkpoint.arrays[readout][:count], gains: checkpoint.arrays[gains][: POSE + count]}
+    if model.correction is not None:
+        kept |= model.correction.first(count).arrays()
     config = {**checkpoint.config, "network": {**checkpoint.config["network"], "modes": count}}
     arrays = {**checkpoint.arrays, **kept, **space.arrays()}
     return replace(checkpoint, config=config, arrays=arrays), replace(data, space=space, reduced=reduced)

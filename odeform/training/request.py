@@ -7,7 +7,16 @@ from odeform.errors import InputError
 from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.registry import model_class
 
-__all__ = ["TrainRequest"]
+__all__ = ["ABLATIONS", "TrainRequest"]
+
+ABLATIONS = {
+    "ode": "states stay as they start",
+    "clock": "decoders are not conditioned on time",
+    "parameters": "decoders are not conditioned on parameters",
+    "random-features": "decoders have trained features only",
+    "correction": "what is left unexplained is not regressed",
+}
+"""Parts that a training of `odeform` may leave out, and what that means."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +37,23 @@ class TrainRequest:
     """Start every n-th frame at a different frame in each sequence, so that the sequences interleave."""
     resume: bool = False
     """Continue an interrupted training of `odeform`."""
+    sequences: int | None = None
+    """Train on the first n training sequences, of each object if there are several; default: all."""
+    without: tuple[str, ...] = ()
+    """Parts of `odeform` that are left out: names of `ABLATIONS`."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.minutes < math.inf:
             raise InputError(f"minutes: expected a positive number, got {self.minutes:g}")
         if self.steps is not None and self.steps < 1:
             raise InputError(f"steps: expected a positive number, got {self.steps}")
+        if self.sequences is not None and self.sequences < 1:
+            raise InputError(f"sequences: expected a positive number, got {self.sequences}")
+        for name in self.without:
+            if name not in ABLATIONS:
+                raise InputError(f"without {name!r}: expected some of {', '.join(ABLATIONS)}")
+        if self.without and self.model != "odeform":
+            raise InputError(f"without {', '.join(self.without)}: these are parts of odeform, got {self.model}")
 
     @property
     def command(self) -> str:
@@ -44,4 +64,6 @@ class TrainRequest:
         options += f" --window {self.window[0]}:{self.window[1]}" if self.window else ""
         options += f" --every {self.every}" if self.every > 1 else ""
         options += " --stagger" if self.stagger else ""
+        options += f" --sequences {self.sequences}" if self.sequences else ""
+        options += f" --without {','.join(self.without)}" if self.without else ""
         return f"odeform train DIR --out FILE{options}"

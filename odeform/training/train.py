@@ -9,32 +9,23 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from odeform.checkpoint import Checkpoint, write_checkpoint
-from odeform.dataset.index import Dataset
+from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
-from odeform.evaluation.residuals import validation_residuals
+from odeform.evaluation.residuals import trained_depth, validation_residuals
+from odeform.identification.discrepancy import LEAST, calibrate
+from odeform.io import require_writable
 from odeform.models.base import Predictor
+from odeform.models.odeform.model import ODeform
 from odeform.models.registry import load
-from odeform.simulation.scenes.registry import find_scene
+from odeform.schema import OBJECT
+from odeform.training.body import body_arrays
 from odeform.training.methods import Run, is_resumable, train_model
 from odeform.training.request import TrainRequest
-from odeform.types import Arrays, Mesh
+from odeform.types import Arrays
 
-__all__ = ["print_line", "rest_of", "train"]
-
-
-def rest_of(dataset: Dataset) -> Mesh:
-    """The body that viewers show: the scene's fine mesh, or for imported data that of the first training sequence."""
-    scene = find_scene(dataset.schema.scene)
-    if scene is not None:
-        return scene.rest_mesh()
-    first = next(dataset.sequences("train"), None)
-    if first is None:
-        raise InputError(f"{dataset.root}: no sequence in split train")
-    return first.rest
+__all__ = ["print_line", "train"]
 
 
 def print_line(line: str) -> None:
@@ -54,6 +45,8 @@ def train(
     every: int = 1,
     stagger: bool = False,
     resume: bool = False,
+    sequences: int | None = None,
+    without: Iterable[str] = (),
     parts: Iterable[tuple[int, int]] = (),
     report: Callable[[str], None] = print_line,
 ) -> Predictor:
@@ -70,6 +63,8 @@ def train(
         every: Train on every n-th frame.
         stagger: Start every n-th frame at a different frame in each sequence, so that the sequences interleave.
         resume: Continue the interrupted training of which `OUT.part` is the state.
+        sequences: Train on the first n training sequences, of each object if there are several; default: all.
+        without: Parts of `odeform` to leave out: names of `odeform.training.request.ABLATIONS`.
         parts: Half-open ranges of frames to score separately as well.
         report: Called with each line of progress; default: prints it to standard error.
 
@@ -87,12 +82,15 @@ def train(
         >>> predictor.model, predictor.checkpoint.scores["sequences"]
         ('nearest', 4)
     """
-    request = TrainRequest(model, seed, minutes, steps, window, every, stagger, resume)
+    request = TrainRequest(model, seed, minutes, steps, window, every, stagger, resume, sequences, tuple(without))
     part = Path(f"{out}.part")
+    require_writable(Path(out))
     if resume and not (is_resumable(model) and part.exists()):
         raise InputError(f"resume: expected {part}, which an interrupted training of odeform leaves")
     begin = time.process_time()
-    trained = train_model(Run(dataset, request, _body(dataset), part, report))
+    dataset = replace(dataset, schema=replace(dataset.schema, objects=dataset.objects))
+    dataset = dataset if sequences is None else _first(dataset, sequences)
+    trained = train_model(Run(dataset, request, body_arrays(dataset), part, report))
     # the processor time of all sittings of a resumed training
     seconds = trained.config.get("val", {}).get("seconds", time.process_time() - begin)
     provenance = {**_provenance(dataset, request, seconds), **trained.provenance}
@@ -102,24 +100,38 @@ def train(
     return load(out)
 
 
+def _first(dataset: Dataset, count: int) -> Dataset:
+    """The data set with the first `count` training sequences of each object, and all sequences of other splits.
+    `InputError` where there are fewer."""
+    known: dict[Any, list[Entry]] = {}
+    for entry in dataset.select("train"):
+        known.setdefault(entry.parameters.get(OBJECT), []).append(entry)
+    most = min(map(len, known.values()), default=0)
+    if count > most:
+        raise InputError(f"sequences: expected at most {most}, got {count}")
+    left_out = {entry.name for entries in known.values() for entry in entries[count:]}
+    return replace(dataset, entries=tuple(entry for entry in dataset.entries if entry.name not in left_out))
+
+
 def _write_scored(
     checkpoint: Checkpoint, out: str | Path, dataset: Dataset, parts: Iterable[tuple[int, int]]
 ) -> dict[str, Any]:
     """Write the checkpoint with its residuals on validation and its scores on the test split; return the scores."""
-    write_checkpoint(out, checkpoint)
-    checkpoint = replace(checkpoint, arrays={**checkpoint.arrays, **validation_residuals(load(out), dataset)})
+    # errors are those of motions that are watched over
+    for measure in (trained_depth, validation_residuals, _calibration):
+        write_checkpoint(out, checkpoint)
+        checkpoint = replace(checkpoint, arrays={**checkpoint.arrays, **measure(load(out), dataset)})
     write_checkpoint(out, checkpoint)
     scores = evaluate(load(out), dataset, "test", parts=parts)
     write_checkpoint(out, replace(checkpoint, scores=scores))
     return scores
 
 
-def _body(dataset: Dataset) -> Arrays:
-    rest = rest_of(dataset)
-    return {
-        "rest.points": np.asarray(rest.points, dtype=np.float32),
-        "rest.faces": np.asarray(rest.faces, dtype=np.int32),
-    }
+def _calibration(predictor: Predictor, dataset: Dataset) -> Arrays:
+    """What `identify` needs to know of the error of an ODeform; of baselines it is measured when it is asked for."""
+    if not isinstance(predictor, ODeform) or len(dataset.select("val")) < LEAST:
+        return {}
+    return calibrate(predictor, dataset).arrays()
 
 
 def _provenance(dataset: Dataset, request: TrainRequest, seconds: float) -> dict[str, Any]:
@@ -137,6 +149,9 @@ def _provenance(dataset: Dataset, request: TrainRequest, seconds: float) -> dict
 def _data_command(made: dict[str, Any]) -> str:
     if "imported" in made:
         return f"odeform import {made['imported']} --out DIR"
-    command = f"odeform simulate {made.get('scene')} --out DIR --count {made.get('count')} --seed {made.get('seed')}"
+    count = made.get("count")
+    each = set(count.values()) if isinstance(count, dict) else {count}
+    command = f"odeform simulate {made.get('scene')} --out DIR --count {each.pop() if len(each) == 1 else count}"
+    command += f" --seed {made.get('seed')}"
     command += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
     return command + (" --corners" if made.get("corners") else "")

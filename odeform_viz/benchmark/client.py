@@ -1,5 +1,8 @@
 """A client of viser's protocol on this machine, as far as benchmarks and tests need one."""
 
+import contextlib
+import io
+import socket
 import struct
 import time
 import uuid
@@ -11,6 +14,7 @@ import msgspec
 import numpy as np
 import viser
 import zstandard
+from PIL import Image
 from websockets.sync.client import connect
 
 __all__ = ["Control", "LoopbackClient"]
@@ -51,7 +55,10 @@ class Control:
 
 
 class LoopbackClient:
-    """Connects to a viewer. It keeps the controls by label, and passes on updates of scene nodes."""
+    """Connects to a viewer. It keeps the controls by label, and passes on updates of scene nodes.
+
+    It answers requests for a picture by a black one.
+    """
 
     def __init__(self, port: int) -> None:
         """Connect to a port of this machine, and wait for the page. `TimeoutError` if it does not come."""
@@ -65,12 +72,15 @@ class LoopbackClient:
         self._commands: dict[str, str] = {}
         self.received = 0
         """Bytes received so far."""
+        self.sent = 0
+        """Messages sent so far."""
         self.notifications: list[str] = []
         """Messages of notifications, the newest last."""
         self.nodes: set[str] = set()
         """Names of the scene's nodes."""
         self.downloads: dict[str, bytearray] = {}
         """Downloaded files, by name."""
+        self._sizes: dict[str, int] = {}
         self._transfers: dict[str, str] = {}
         self._send("ViewerCameraMessage", **CAMERA)  # the server ignores clients without a camera
         if not self.until(lambda: bool(self._controls)):  # the first batch holds them all
@@ -81,9 +91,20 @@ class LoopbackClient:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection, as a tab does that is closed."""
+        self._socket.close()
+
+    def vanish(self) -> None:
+        """Cut the connection without a word, as a killed browser does."""
+        with contextlib.suppress(OSError):
+            self._socket.socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
     def _send(self, kind: str, **content: Any) -> None:
+        self.sent += 1
         self._socket.send(msgspec.msgpack.encode({"type": kind, **content}))
 
     @property
@@ -98,6 +119,7 @@ class LoopbackClient:
 
     def set(self, label: str, value: Any) -> None:
         """Set the value of a control; that of a button group is the label of a button."""
+        self.until(lambda: label in self.controls)  # a page may come in several batches
         control = self.controls[label]
         self._send("GuiUpdateMessage", uuid=control.uuid, updates={"value": value})
         control.value = value
@@ -106,8 +128,14 @@ class LoopbackClient:
         """Click a button."""
         self.set(label, True)
 
+    def click_scene(self, origin: np.ndarray, direction: np.ndarray) -> None:
+        """Click in the scene, where a ray from (3,) m along (3,) leads."""
+        ray = {"ray_origin": [float(x) for x in origin], "ray_direction": [float(x) for x in direction]}
+        self._send("ScenePointerMessage", event_type="click", screen_pos=[[0.5, 0.5]], modifier=None, **ray)
+
     def press(self, command: str) -> None:
         """Trigger a command, as its hot key does."""
+        self.until(lambda: command in self._commands)
         self._send("CommandTriggerMessage", uuid=self._commands[command])
 
     def upload(self, label: str, name: str, content: bytes) -> None:
@@ -161,8 +189,13 @@ class LoopbackClient:
         elif kind == "FileTransferStartDownload":
             self._transfers[message["transfer_uuid"]] = message["filename"]
             self.downloads[message["filename"]] = bytearray()
+            self._sizes[message["filename"]] = message["size_bytes"]
         elif kind == "FileTransferPart" and message["transfer_uuid"] in self._transfers:
             self.downloads[self._transfers[message["transfer_uuid"]]] += message["content"]
+        elif kind == "GetRenderRequestMessage":
+            picture, size = io.BytesIO(), (message["width"], message["height"])
+            Image.new("RGB", size).save(picture, "PNG" if message["format"] == "image/png" else "JPEG")
+            self._send("GetRenderResponseMessage", payload=picture.getvalue(), render_uuid=message["render_uuid"])
         elif kind.startswith("Gui") and props:
             name = kind.removeprefix("Gui").removesuffix("Message")
             self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), props)
@@ -174,6 +207,11 @@ class LoopbackClient:
         if control is not None:
             control.value = updates.get("value", control.value)
             control.props.update({name: value for name, value in updates.items() if name in control.props})
+
+    def downloaded(self, suffix: str) -> bytes | None:
+        """The first complete download whose name ends in `suffix`."""
+        names = (n for n in self.downloads if n.endswith(suffix) and len(self.downloads[n]) == self._sizes[n])
+        return next((bytes(self.downloads[name]) for name in names), None)
 
     def text(self) -> str:
         """All visible Markdown and HTML of the page."""

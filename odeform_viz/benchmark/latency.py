@@ -14,7 +14,16 @@ from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 
-__all__ = ["SPLATS", "drag", "largest_deformation_times", "play_free_flight", "scrub_splats"]
+__all__ = [
+    "DRAG_RATE",
+    "SPLATS",
+    "drag",
+    "largest_deformation_times",
+    "measure",
+    "play_free_flight",
+    "scrub_splats",
+    "served",
+]
 
 DRAG_RATE = 20.0  # Hz; browsers send slider values no faster
 SCRUB_RATE = 10.0  # Hz
@@ -39,13 +48,13 @@ def drag(models: list[Predictor], truth: Column | None, messages: int, points: i
     motions = (model.solve(shape, {**others, slider.name: v}) for v in values)
     expected = np.stack([parts[-1].vertices(motion.deformed(moment))[0] for motion in motions])
 
-    with _serve(columns, moment) as client:
+    with served(columns, moment) as client:
 
         def wait(seconds: float) -> int | None:
             vertices = client.wait_vertices(node, seconds)
             return None if vertices is None else int(np.abs(expected - vertices[0]).sum(axis=1).argmin())
 
-        return _measure(values, lambda v: client.set(f"{slider.name} ({slider.unit})", v), wait, DRAG_RATE)
+        return measure(values, lambda v: client.set(slider.label, v), wait, DRAG_RATE)
 
 
 def scrub_splats(model: Predictor, messages: int) -> dict[str, float]:
@@ -54,19 +63,19 @@ def scrub_splats(model: Predictor, messages: int) -> dict[str, float]:
     motion = model.solve(splats)
     expected = np.array([motion.deformed(float(v))[0] for v in np.round(values, 4)])
 
-    with _serve([Column("splats", model, splats)], float(values[0])) as client:
+    with served([Column("splats", model, splats)], float(values[0])) as client:
 
         def wait(seconds: float) -> int | None:
             centres = client.wait_splats("/world/column_0/body/splats", seconds)
             return None if centres is None else int(np.abs(expected - 0.01 * centres[0]).sum(axis=1).argmin())
 
-        return _measure(values, lambda v: client.set("time (s)", round(v, 4)), wait, SCRUB_RATE)
+        return measure(values, lambda v: client.set("time (s)", round(v, 4)), wait, SCRUB_RATE)
 
 
 def play_free_flight(model: Predictor) -> dict[str, float]:
     """Bytes for each frame of the free flight before the impact, played for two seconds at a tenth of the speed."""
     assert model.schema.impact is not None
-    with _serve([Column(model.model, model, model.rest)], 0.02) as client:
+    with served([Column(model.model, model, model.rest)], 0.02) as client:
         client.set("speed", "1/10")
         client.collect(0.5)
         begin = client.received
@@ -82,7 +91,7 @@ def largest_deformation_times(model: Predictor, count: int) -> Floats:
 
 
 @contextlib.contextmanager
-def _serve(columns: list[Column], moment: float) -> Iterator[LoopbackClient]:
+def served(columns: list[Column], moment: float) -> Iterator[LoopbackClient]:
     """A client of a viewer with these columns, paused at `moment` in s."""
     app = App(columns, port=0)
     try:
@@ -94,10 +103,10 @@ def _serve(columns: list[Column], moment: float) -> Iterator[LoopbackClient]:
         app.close()
 
 
-def _measure(
+def measure(
     values: Floats, send: Callable[[float], None], wait: Callable[[float], int | None], rate: float
 ) -> dict[str, float]:
-    """Send `values` at `rate` Hz; `wait` returns the index of the message that the next answer serves.
+    """Send `values` (N,) at `rate` Hz; `wait` returns the index of the message that the next answer serves.
 
     The latency of a message ends with the first answer to it or to a newer one. `out_of_order` counts answers to older
     messages than the answer before; `stale_last` is 1 if the last answer is not to the last message.

@@ -27,7 +27,10 @@ LABEL_WEIGHTS = {
     "Simulate this": 0.02,
     "Map stability": 0.0,  # would use both cores for ten seconds, in which nothing else can be measured
     "Start recording": 0.1,
+    "Film (.webp)": 0.1,
     "Cancel": 3.0,
+    "Cancel the fit": 3.0,
+    "Cancel the film": 3.0,
     "Stop recording": 3.0,
     "Download": 0.2,
 }

@@ -1,4 +1,4 @@
-"""Soak test: thousands of random inputs through the protocol. Finds errors, stale frames and growing memory."""
+"""Soak test: random inputs and scripted visits, from several browsers. Finds errors, stale frames, growing memory."""
 
 import contextlib
 import gc
@@ -12,18 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from odeform.errors import InputError
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.benchmark.newest import seconds_to_newest
 from odeform_viz.benchmark.random_input import send_random_input
-from odeform_viz.rendering.checkerboard import checkerboard_parts
-from odeform_viz.session import visible_deformation
+from odeform_viz.benchmark.resetting import reset
+from odeform_viz.benchmark.use import SCRIPTS
+from odeform_viz.benchmark.visitors import Missed, Visitors
 
-__all__ = ["Soak", "soak"]
+__all__ = ["GROWTH", "Soak", "soak"]
 
-MOMENT = 0.3  # s; bundled scenes with an impact are deformed then
-REST = 3  # s without a change after which the page counts as at rest
-DEADLINE = 120.0  # s, for a busy machine
+GROWTH = 0.05  # of the memory after warm-up, at most
+WARM_UP = 0.2  # of the parts
+BETWEEN = 1.0  # s at rest between scripts
 
 
 @dataclass(frozen=True)
@@ -31,107 +32,90 @@ class Soak:
     """The result of a soak test, measured after each part of it, with the page at rest."""
 
     requests: int
+    """Messages of all browsers."""
     refused: int
     """Notifications that refused an input."""
     errors: tuple[str, ...]
-    """Tracebacks that were printed."""
+    """Tracebacks that were printed, and what scripts missed."""
     newest_s: tuple[float, ...]
-    """Seconds from the end of a drag to the frame of its last message; infinite if another frame comes last."""
+    """Seconds from the end of a drag to the frame of its last message, in the last of the browsers to show it;
+    infinite if one of them gets another frame last."""
     resident_mb: tuple[float, ...]
-    """Resident memory of the process."""
+    """Resident memory of the process, the browsers' clients included."""
     wall_s: float
 
     @property
+    def memory(self) -> tuple[float, float]:
+        """Resident memory after warm-up and at the end, in MB.
+
+        Each is the median of a quarter of the parts: single ones differ with what was shown last.
+        """
+        warm = self.resident_mb[math.ceil(WARM_UP * len(self.resident_mb)) - 1 :]
+        quarter = max(len(warm) // 4, 1)
+        return float(np.median(warm[:quarter])), float(np.median(warm[-quarter:]))
+
+    @property
     def growth(self) -> float:
-        """Relative growth of the memory from the first part, the warm-up, to the last."""
-        return self.resident_mb[-1] / self.resident_mb[0] - 1.0
+        """Relative growth of the memory after warm-up."""
+        warm, last = self.memory
+        return last / warm - 1.0
+
+    @property
+    def passed(self) -> bool:
+        """No error, the newest frame always last, and memory that grows by less than `GROWTH`."""
+        return not self.errors and all(math.isfinite(s) for s in self.newest_s) and self.growth < GROWTH
 
 
-def soak(app: App, requests: int, folder: Path, rate: float = 40.0, parts: int = 10, seed: int = 0) -> Soak:
-    """Send `requests` random inputs to an app at `rate` Hz, in `parts`; recordings are put into `folder`."""
+def soak(
+    app: App,
+    requests: int,
+    folder: Path,
+    rate: float = 40.0,
+    parts: int = 10,
+    minutes: float | None = None,
+    seed: int = 0,
+) -> Soak:
+    """Send `requests` random inputs to an app at `rate` Hz, in `parts`, each followed by all scripts in random order.
+
+    With `minutes`, parts of the same size are sent until that time is over. `folder` is the workspace of the app.
+    """
     rng, begin = np.random.default_rng(seed), time.monotonic()
-    newest, resident = [], []
-    with _tracebacks() as errors, LoopbackClient(app.server.get_port()) as client:
-        for _ in range(parts):
+    port, newest, resident = app.server.get_port(), [], []
+    with _tracebacks() as errors, LoopbackClient(port) as first, LoopbackClient(port) as second:
+        visitors = Visitors(app, (first, second), folder, rng)
+        while len(resident) < parts if minutes is None else time.monotonic() < begin + 60.0 * minutes:
             for _ in range(requests // parts):
+                client = visitors.clients[int(rng.integers(2))]
                 send_random_input(client, rng, folder)
-                client.collect(1.0 / rate)
-            _reset(client, app)
-            newest.append(_seconds_to_newest(client, app))
-            client.downloads.clear()  # memory of the client, not of the viewer
+                visitors.collect(1.0 / rate)
+            reset(visitors)
+            missed = _run_scripts(visitors)
+            errors.extend(missed)
+            reset(visitors)
+            newest.append(seconds_to_newest(visitors, visitors.clients[len(newest) % 2]))
+            for client in visitors.clients:
+                client.downloads.clear()  # memory of the client, not of the viewer
             gc.collect()
             resident.append(_resident_mb())
-        refused = len(client.notifications)
-    return Soak(requests, refused, tuple(errors), tuple(newest), tuple(resident), time.monotonic() - begin)
+        refused = len(first.notifications)
+        sent = visitors.sent + first.sent + second.sent
+    return Soak(sent, refused, tuple(errors), tuple(newest), tuple(resident), time.monotonic() - begin)
 
 
-def _reset(client: LoopbackClient, app: App) -> None:
-    """Bring the page back to one model with default parameters and its own shape, paused, and wait until it rests."""
-    end, rested = time.monotonic() + DEADLINE, 0
-    while time.monotonic() < end:
-        client.collect(1.0)
-        rested = rested + 1 if _is_reset(app) else 0
-        if rested == REST:
-            return
-        if rested:
-            continue
-        for label in ("Cancel", "Stop recording", "Back to the trained body"):
-            if client.controls[label].visible:
-                client.click(label)
-        client.set("reset", "all")
-        client.set("test sequence", "none")
-        first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
-        boxes = {c.label: c is first for c in app.columns.all}
-        for label in boxes.keys() & client.controls.keys():  # the checkbox of a column appears a moment after it
-            client.set(label, boxes[label])
-        client.collect(0.5)
-        client.click("Remove hidden columns")
-        client.set("quality", "balanced")
-        client.set("time (s)", MOMENT)
-    raise TimeoutError(f"the page did not come to rest within {DEADLINE:g} s")
-
-
-def _is_reset(app: App) -> bool:
-    columns, parameters = app.columns.all, app.session.schema.parameters
-    try:
-        request = app.request()
-    except InputError:  # a slider is out of range
-        return False
-    return (
-        len(columns) == 1
-        and columns[0].predictor is not None
-        and columns[0].pinned is None
-        and columns[0].visible
-        and columns[0].geometry is columns[0].predictor.rest
-        and not app.clock.playing
-        and request.time == MOMENT
-        and request.quality == "balanced"
-        and request.parameters == {p.name: p.default for p in parameters}
-    )
-
-
-def _seconds_to_newest(client: LoopbackClient, app: App) -> float:
-    """Seconds from the end of a drag to the vertices of its last message; infinite unless they come, and come last."""
-    column, schema = app.columns.all[0], app.session.schema
-    assert column.predictor is not None
-    slider = schema.parameters[0]
-    values = np.linspace(slider.low, slider.high, 40)[np.random.default_rng(1).permutation(40)]
-    node = f"/world/column_{column.key}/body/part_0"
-    deformed = visible_deformation(column.predictor.solve(column.geometry, {slider.name: float(values[-1])}), MOMENT)
-    assert deformed is not None, "expected a time at which the body is deformed"
-    expected = checkerboard_parts(column.predictor.rest)[0].vertices(deformed)
-    for value in values:
-        client.set(f"{slider.name} ({slider.unit})", float(value))
-    newest, begin = math.inf, time.monotonic()
-    while time.monotonic() < begin + DEADLINE:
-        vertices = client.wait_vertices(node, 1.0)
-        if vertices is not None:
-            # frames of other values differ by a hundred times as much; rounding may differ after a new basis
-            agrees = np.allclose(vertices, expected, rtol=0.0, atol=1e-6)
-            newest = time.monotonic() - begin if agrees else math.inf
-        elif newest < math.inf:
-            return newest
-    return math.inf
+def _run_scripts(visitors: Visitors) -> list[str]:
+    """Run all scripts that the page has the controls for; returns what they missed."""
+    missed, controls = [], visitors.first.controls
+    usable = [script for script, needed in SCRIPTS if needed in controls and not controls[needed].props.get("disabled")]
+    for index in visitors.rng.permutation(len(usable)):
+        script = usable[index]
+        visitors.begin()
+        try:
+            script(visitors)
+        except (Missed, AssertionError) as error:
+            missed.append(f"{script.__name__}: {error}")
+        missed += [f"{script.__name__}: unexpected notification {said!r}" for said in visitors.unexpected()]
+        reset(visitors, BETWEEN)
+    return missed
 
 
 @contextlib.contextmanager

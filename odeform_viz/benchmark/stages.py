@@ -10,6 +10,7 @@ from odeform.models.base import Predictor
 from odeform_viz.benchmark.latency import SPLATS, largest_deformation_times
 from odeform_viz.columns import Column, Columns
 from odeform_viz.rendering.scene import SceneView
+from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.session import Session
 from odeform_viz.view import DisplayOptions, ViewRequest
@@ -24,9 +25,9 @@ def stages(model: Predictor, messages: int) -> dict[str, float]:
     parameters = model.schema.complete({})
     times = largest_deformation_times(model, messages)
     requests = [ViewRequest(parameters, float(t), "balanced", columns) for t in times]
-    server = open_server("127.0.0.1", 0, "stages")
+    server = open_server(Access(), 0, "stages")
     try:
-        view = SceneView(server, 0.2, 1)
+        view = SceneView(server, 0.2, lambda: None)
         view.publish(session.frame(requests[0]), DisplayOptions(), None)
         compute = milliseconds(lambda i: session.frame(requests[i]), messages - 3)
         frames = itertools.cycle([session.frame(request) for request in requests[:: max(messages // 10, 1)]])

@@ -8,12 +8,14 @@ import viser
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
+from odeform_viz.browser.limits import set_limits
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
 from odeform_viz.rendering.gizmos import CameraFocus, TransformGizmo
 
 __all__ = ["Alignment"]
 
 MANUAL = "as rotated"
+SIZES = (1.0, 10_000.0)  # %
 
 
 class Alignment:
@@ -37,7 +39,8 @@ class Alignment:
         self._folder = gui.add_folder("Alignment", expand_by_default=False, visible=False)
         with self._folder:
             self._up = gui.add_dropdown("up axis", (*UPRIGHT, MANUAL), hint="of the file; for captures often -y")
-            self._size = gui.add_number("size (%)", 100.0, min=1.0, step=0.5, hint="relative to the trained body")
+            self._size = gui.add_number("size (%)", 100.0, step=0.5, hint="relative to the trained body")
+            set_limits(server, self._size, *SIZES)
             self._drag = gui.add_checkbox("show gizmo", False, hint="drag arrows and rings to move and rotate")
             reset = gui.add_button("Reset alignment", color="gray", hint="to the trained size, on the floor")
         on_user_change(self._up, self._set_up_axis)
@@ -86,7 +89,10 @@ class Alignment:
     def _set_size(self) -> None:
         """Scale about the foot of the moving part, which keeps it on the floor."""
         size = float(self._size.value)
-        if self._fit is None or not (np.isfinite(size) and size > 0.0):
+        if self._fit is None:
+            return
+        if not SIZES[0] <= size <= SIZES[1]:  # by the box's own arrows; typed sizes are refused in words
+            self._size.value = round(100.0 * self._fit.transform.factor / self._automatic_scale, 2)
             return
         points = np.asarray(self._fit.geometry.points, dtype=float)
         low, high = points.min(axis=0), points.max(axis=0)

@@ -3,35 +3,62 @@
 import threading
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import viser
 
 import odeform
 from odeform.checkpoint import bundled_checkpoints
 from odeform.errors import InputError
-from odeform.schema import Parameter, Schema
+from odeform.schema import OBJECT, Schema
+from odeform.simulation.contacts import contact_parameters, push_from, vector_of
 from odeform_viz.columns import Column
+from odeform_viz.own_shapes import own_of, with_own_body
 from odeform_viz.page import Page, Panel
+from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 
-__all__ = ["ComparePanel", "pinned_label", "sweep"]
+__all__ = ["ComparePanel", "pinned_label", "sweep", "swept_names"]
 
 SWEEP = 5  # columns of a sweep, as in the paper's figure
 
 
-def pinned_label(name: str, parameters: Mapping[str, float], schema: Schema) -> str:
+def pinned_label(name: str, parameters: Mapping[str, Any], schema: Schema) -> str:
     """A model's name with the parameters it is pinned at."""
+    if contacts_of(schema):
+        strength = float(np.linalg.norm(vector_of(parameters, "force")))
+        return f"{name}: {parameters[OBJECT]}, {strength:.3g} N"
     return f"{name} at " + ", ".join(f"{p.name} {parameters[p.name]:.3g}" for p in schema.learned)
 
 
-def sweep(column: Column, parameters: Mapping[str, float], schema: Schema, swept: Parameter) -> list[Column]:
-    """Copies of a model, pinned at even steps of one parameter over its trained range; the others stay the same."""
-    out = []
-    for index in range(SWEEP):
-        pinned = {**parameters, swept.name: swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0)}
-        label = f"{swept.name} {pinned[swept.name]:.3g} {swept.unit}"
-        out.append(replace(column, label=label, pinned=pinned, visible=True))
-    return out
+def swept_names(schema: Schema) -> tuple[str, ...]:
+    """What can be swept: each parameter; in scenes in which a sphere pushes, the force and the objects."""
+    names = tuple(p.name for p in schema.learned)
+    return ("force", OBJECT)[: 1 + (len(schema.objects) > 1)] if contacts_of(schema) else names
+
+
+def sweep(column: Column, parameters: Mapping[str, Any], schema: Schema, name: str) -> list[Column]:
+    """Copies of a model, pinned at even steps of a parameter over its trained range; the others stay the same.
+
+    In scenes in which a sphere pushes, the strength of the force at the contact is swept, or each object is pushed at
+    its default contact. `InputError` for what cannot be swept.
+    """
+    if name not in swept_names(schema):
+        raise InputError(f"parameter: expected one of {', '.join(swept_names(schema))}, got {name!r}")
+    predictor = column.predictor
+    assert predictor is not None
+    if name == OBJECT:
+        rows = [(body, predictor.complete({OBJECT: body})) for body in schema.objects]
+    elif contacts_of(schema):
+        push, (low, high) = push_from(parameters, predictor.rest_of(parameters)), predictor.force_range(parameters)
+        pushes = [replace(push, strength=float(strength)) for strength in np.linspace(low, high, SWEEP)]
+        rows = [(f"{p.strength:.3g} N", {**parameters, **contact_parameters(p)}) for p in pushes]
+    else:
+        swept = next(p for p in schema.learned if p.name == name)
+        values = [swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0) for index in range(SWEEP)]
+        rows = [(f"{name} {value:.3g} {swept.unit}", {**parameters, name: value}) for value in values]
+    return [replace(column, label=label, pinned=pinned, visible=True) for label, pinned in rows]
 
 
 class ComparePanel(Panel):
@@ -50,16 +77,11 @@ class ComparePanel(Panel):
         with self._gui.add_folder("Add"):
             self._build_add()
         with self._gui.add_folder("Arrangement"):
-            self._overlay = self._gui.add_checkbox("overlay", False, hint="draw columns over each other, not in a row")
-            self._error_colors = self._gui.add_checkbox(
-                "error colours", True, hint="colour the surface by its distance to the truth"
-            )
-            for box in (self._overlay, self._error_colors):
-                box.on_update(lambda _: page.wake())
+            self._overlay = self._gui.add_checkbox("overlay", False, hint="in one place instead of side by side")
+            self._overlay.on_update(lambda _: page.wake())
         page.controls.overlay = lambda: bool(self._overlay.value)
-        page.controls.error_colors = lambda: bool(self._error_colors.value)
+        page.controls.set_overlay = lambda value: setattr(self._overlay, "value", value)
         page.add_hotkey("O", "overlay on or off", lambda: _toggle(self._overlay))
-        page.add_hotkey("C", "error colours on or off", lambda: _toggle(self._error_colors))
         page.on_columns_changed(self._refresh)
         self._refresh()
 
@@ -71,14 +93,14 @@ class ComparePanel(Panel):
             add.on_click(lambda _: self._guarded("Model not added", self._add))
         pin = gui.add_button("Pin these parameters", color="gray", hint="add a copy that keeps the present parameters")
         pin.on_click(lambda _: self._guarded("Parameters not pinned", self._pin))
-        self._swept = gui.add_dropdown("parameter", tuple(p.name for p in self._schema.learned))
+        self._swept = gui.add_dropdown("parameter", swept_names(self._schema))
         over = gui.add_button(
             f"Sweep it in {SWEEP} columns", color="gray", hint="over its trained range; the others stay the same"
         )
         over.on_click(lambda _: self._guarded("Sweep not added", self._sweep))
 
     def restore(self, state: PageState) -> None:
-        self._overlay.value, self._error_colors.value = state.display.overlay, state.display.error_colors
+        self._overlay.value = state.display.overlay
 
     def _guarded(self, title: str, action: Callable[[], None]) -> None:
         """Change the columns, or show under `title` why not."""
@@ -92,9 +114,13 @@ class ComparePanel(Panel):
         if self._model.value not in self._models:
             raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
         predictor = odeform.load(self._models[self._model.value])
-        fit = self._page.model.fit
-        shape = fit.geometry if fit else predictor.rest
-        self._columns.add(Column(predictor.model, predictor, shape, origin=self._model.value, fit=fit))
+        fit, own = self._page.model.fit, own_of(self._page.model.predictor)
+        column = Column(predictor.model, predictor, predictor.rest, origin=self._model.value)
+        if own is not None:
+            column = with_own_body([column], own)[0]
+        elif fit is not None:
+            column = replace(column, geometry=fit.geometry, fit=fit)
+        self._columns.add(column)
 
     def _pin(self) -> None:
         model, parameters = self._page.model, self._page.controls.parameters()
@@ -102,12 +128,8 @@ class ComparePanel(Panel):
         self._columns.add(replace(model, label=label, pinned=parameters, visible=True))
 
     def _sweep(self) -> None:
-        swept = next((p for p in self._schema.learned if p.name == self._swept.value), None)
-        if swept is None:
-            names = ", ".join(p.name for p in self._schema.learned)
-            raise InputError(f"parameter: expected one of {names}, got {self._swept.value!r}")
         before = self._columns.all
-        self._columns.add(*sweep(self._page.model, self._page.controls.parameters(), self._schema, swept))
+        self._columns.add(*sweep(self._page.model, self._page.controls.parameters(), self._schema, self._swept.value))
         for column in before:
             self._columns.set_visible(column.key, False)
 

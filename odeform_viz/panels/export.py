@@ -6,7 +6,7 @@ from pathlib import Path
 import viser
 
 from odeform.errors import InputError
-from odeform_viz.export import export, export_formats
+from odeform_viz.export import export, export_formats, export_notes
 from odeform_viz.page import Page, Panel
 
 __all__ = ["ExportPanel"]
@@ -28,11 +28,13 @@ class ExportPanel(Panel):
         if client is None:
             return
         try:
-            suffix = self._formats.get(self._format.value)
-            if suffix is None:
+            if self._format.value not in self._formats:
                 raise InputError(f"format: expected one of {', '.join(self._formats)}, got {self._format.value!r}")
+            suffix, whole = self._formats[self._format.value]
             with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
-                file = export(self._page.session, self._page.request(), Path(folder) / f"motion{suffix}")
+                file = export(self._page.session, self._page.request(), Path(folder) / f"motion{suffix}", whole)
                 client.send_file_download(file.name, file.read_bytes(), save_immediately=True)
+            if notes := export_notes(self._page.session, self._page.request(), whole):
+                self._page.notices.show("Exported, but note", ". ".join(notes))
         except (InputError, OSError) as error:
             self._page.notices.show("Export failed", str(error))

@@ -14,14 +14,19 @@ TABS = {
     "Compare": "show models, pinned copies and the truth side by side; with a truth, errors are coloured and plotted",
     "Record": "save a recording, the state of the page, or the motion as a file",
 }
+KEY_NAMES = {"space": "Space", "arrowleft": "←", "arrowright": "→"}
 MOUSE = "Drag to rotate, right-drag to pan, scroll to zoom. You can also type numbers beside the sliders."
 
 
 def help_text(hotkeys: Mapping[str, str]) -> str:
     """Markdown; `hotkeys` are keys and what they do."""
     tabs = "  \n".join(f"**{name}**: {what}." for name, what in TABS.items())
-    keys = " · ".join(f"**{key}** {what}" for key, what in hotkeys.items())
+    keys = " · ".join(f"{_named(key)} {what}" for key, what in hotkeys.items())
     return f"{tabs}\n\n{MOUSE}\n\nKeys: {keys}"
+
+
+def _named(keys: str) -> str:
+    return " or ".join(f"**{KEY_NAMES.get(key, key)}**" for key in keys.split())
 
 
 class HelpPanel(Panel):

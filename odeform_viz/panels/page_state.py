@@ -4,6 +4,7 @@ import viser
 
 from odeform.errors import InputError
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import take_upload
 
 __all__ = ["StatePanel"]
 
@@ -18,7 +19,7 @@ class StatePanel(Panel):
             save = gui.add_button("Save state", color="gray", hint="columns, parameters and time, as a small file")
             save.on_click(lambda event: self._save(event.client))
             restore = gui.add_upload_button("Restore state", color="gray", mime_type="application/json")
-            restore.on_upload(lambda event: self._restore(event.target.value.content))
+            restore.on_upload(lambda event: self._restore(take_upload(event).content))
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         if client is None:

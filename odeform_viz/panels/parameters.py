@@ -12,6 +12,7 @@ from odeform.types import Floats
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
+from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 from odeform_viz.view import Description
 
@@ -107,11 +108,15 @@ class ParameterPanel(Panel):
         page.controls.parameters, page.controls.set_parameters = self.parameters, self.set
         self._refresh()
 
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        return contacts_of(page.schema) is None
+
     def _add_slider(self, parameter: Parameter) -> None:
         low, high = slider_range(parameter)
         trained = f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
         slider = self._gui.add_slider(
-            f"{parameter.name} ({parameter.unit})",
+            parameter.label,
             min=round(low, 4),
             max=round(high, 4),
             step=slider_step(low, high),

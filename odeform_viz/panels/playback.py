@@ -11,7 +11,10 @@ from odeform_viz.view import REACH, Description
 
 __all__ = ["PlaybackPanel"]
 
-SPEEDS = {"real time": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/50": 0.02}
+PREVIOUS, NEXT = "prev", "next"  # frame
+SPEEDS = {"real time": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/20": 0.05, "1/50": 0.02}
+USUAL = 0.2  # of real time, or slower:
+LEAST = 3.0  # s that the trained window takes
 
 
 class PlaybackPanel(Panel):
@@ -33,18 +36,18 @@ class PlaybackPanel(Panel):
                 hint="after the trained window, the motion is extrapolated",
             )
             self._time.on_update(self._dragged)
+            page.controls.time_slider = self._time._impl.uuid
             self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
             self._play.on_click(lambda _: self.toggle())
-            go = gui.add_button_group("go to", ("start", "◀", "▶", "peak"))
+            go = gui.add_button_group("go to", ("start", PREVIOUS, NEXT, "peak"))
             go.on_click(self._clicked)
-            go.hint = "start, previous frame, next frame, largest deformation"
-            self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value="1/5")
+            self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value=_usual_speed(stop - start))
             self._speed.on_update(lambda _: self._changed())
             self._loop = gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())
-        page.add_hotkey("K", "play or pause", self.toggle)
-        page.add_hotkey("J", "previous frame", lambda: self.step("◀"))
-        page.add_hotkey("L", "next frame", lambda: self.step("▶"))
+        page.add_hotkey("space K", "play or pause", self.toggle)
+        page.add_hotkey("arrowleft J", "previous frame", lambda: self.step(PREVIOUS))
+        page.add_hotkey("arrowright L", "next frame", lambda: self.step(NEXT))
         page.add_hotkey("0", "go to the start", lambda: self.step("start"))
         page.add_hotkey("P", "go to the peak of the deformation", lambda: self.step("peak"))
         self._changed()
@@ -62,7 +65,7 @@ class PlaybackPanel(Panel):
         self._page.wake()
 
     def step(self, target: str) -> None:
-        """Go to the "start", the previous ("◀") or next ("▶") frame, or the "peak" of the deformation."""
+        """Go to the "start", the `PREVIOUS` or `NEXT` frame, or the "peak" of the deformation."""
         self._seeks += 1
         self._to_peak(self._seeks) if target == "peak" else self._to_frame(target)
 
@@ -103,7 +106,7 @@ class PlaybackPanel(Panel):
     def _to_frame(self, target: str) -> None:
         frame = 1.0 / self._window.rate
         index = round((self._clock.time() - self._window.start) / frame)
-        if target in (steps := {"start": 0, "◀": index - 1, "▶": index + 1}):
+        if target in (steps := {"start": 0, PREVIOUS: index - 1, NEXT: index + 1}):
             self.jump(self._window.start + max(steps[target], 0) * frame)
 
     def _to_peak(self, seek: int) -> None:
@@ -124,3 +127,9 @@ class PlaybackPanel(Panel):
         self._time.value = min(max(round(self._clock.time(), 4), self._time.min), self._time.max)
         if (self._play.label == "Pause") != self._clock.playing:
             self._refresh_button()
+
+
+def _usual_speed(window: float) -> str:
+    """The name of the speed for a trained window of that many seconds."""
+    slow_enough = (name for name, speed in SPEEDS.items() if speed <= USUAL and window >= LEAST * speed)
+    return next(slow_enough, list(SPEEDS)[-1])

@@ -1,24 +1,29 @@
-"""Curves of all columns over time."""
+"""Curves of all columns over time, with a cursor and a legend."""
 
 from odeform_viz.colors import color_of
 from odeform_viz.page import Page, Panel
-from odeform_viz.panels.plots_svg import WIDTH, Line, cursor_svg, plots_svg, quantities_of
+from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.plot_legend import ENLARGE, legend_html, values_html
+from odeform_viz.panels.plots_svg import WIDTH, Line, cursor_css, plots_html, quantities_of
 from odeform_viz.view import Description
 
 __all__ = ["PlotPanel"]
 
 ROTATES = 1.0  # degrees; bodies that turn less have no plot of it
+MARGIN, LARGE = 40, 860  # px; around the plots, and the width of two large ones
 
 
 class PlotPanel(Panel):
-    """Two layers: the curves, sent when a motion changes, and the cursor, sent with the time."""
+    """The curves, sent when a motion changes; the cursor and the legend, sent with the time."""
 
     def __init__(self, page: Page) -> None:
-        self._window, self._layout = page.schema.window, page.layout
-        self._curves = page.server.gui.add_html("")
-        self._cursor = page.server.gui.add_html("")
+        self._window, self._layout, self._slider = page.schema.window, page.layout, page.controls.time_slider
+        gui = page.server.gui
+        self._curves, self._cursor, self._legend = gui.add_html(""), gui.add_html(""), gui.add_html("")
         self._lines: list[Line] = []
-        self._rotates = False
+        self._described: Description | None = None
+        self._rotates = self._large = False
+        page.add_hotkey(ENLARGE, "larger or smaller plots", self._resize)
 
     def describe(self, description: Description) -> None:
         frame = description.frame
@@ -26,9 +31,29 @@ class PlotPanel(Panel):
             (shown.column.label, color_of(shown.column), curves)
             for shown, curves in zip(frame.columns, description.curves, strict=True)
         ]
-        if [id(c) for _, _, c in lines] != [id(c) for _, _, c in self._lines]:
+        if [(label, color, id(c)) for label, color, c in lines] != [(n, color, id(c)) for n, color, c in self._lines]:
             self._lines = lines
             self._rotates = any(float(c.rotation.max()) > ROTATES for _, _, c in lines)
-            self._curves.content = plots_svg(lines, self._window, self._rotates)
-            self._layout.set_bottom_width(WIDTH * max(len(quantities_of(lines, self._rotates)), 3) + 40)
-        self._cursor.content = cursor_svg(lines, self._window, self._rotates, frame.request.time)
+            self._draw()
+        self._described = description
+        self._follow(description)
+
+    def _resize(self) -> None:
+        self._large = not self._large
+        self._draw()
+        if self._described is not None:
+            self._follow(self._described)
+
+    def _draw(self) -> None:
+        plots = max(len(quantities_of(self._lines, self._rotates)), 3)
+        self._curves.content = plots_html(self._lines, self._window, self._rotates, self._slider, self._large)
+        self._layout.set_bottom_width(LARGE if self._large else WIDTH * plots + MARGIN)
+
+    def _follow(self, description: Description) -> None:
+        frame, lines = description.frame, self._lines
+        time = frame.request.time
+        set_content(self._cursor, cursor_css(self._window, time))
+        legend = legend_html(lines, time, self._large)
+        if self._large:
+            legend += values_html(frame.columns, lines, quantities_of(lines, self._rotates), time)
+        set_content(self._legend, legend)

@@ -1,6 +1,7 @@
-"""Curves of all columns as SVG, and the current time over them."""
+"""Curves of all columns over time as SVG, in the colors of the page's theme."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,101 +10,132 @@ from odeform.types import Floats
 from odeform_viz.colors import Color
 from odeform_viz.view import REACH, Curves
 
-__all__ = ["WIDTH", "Line", "cursor_svg", "plots_svg", "quantities_of"]
+__all__ = ["WIDTH", "Line", "Quantity", "cursor_css", "plots_html", "quantities_of"]
 
-WIDTH, HEIGHT, LEFT, TOP, FOOT = 208, 112, 34, 18, 16  # px of one plot and its margins
-WIDE, HIGH = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT  # px of the area that is drawn on
-LABELS = 6  # columns whose values are written beside the cursor; more do not fit
+WIDTH, HEIGHT, LEFT, TOP, FOOT = 208, 100, 34, 18, 16  # units of the drawing, of one plot and its margins
+WIDE, HIGH = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT  # the area that is drawn on
 
 Line = tuple[str, Color, Curves]
-"""Label, colour and curves of one column."""
+"""Label, color and curves of one column."""
 
-STYLE = (
-    f".at{{display:block;position:relative;top:-{HEIGHT}px;height:{HEIGHT}px;margin-bottom:-{HEIGHT}px;width:100%;"
-    "overflow:visible;font:10px sans-serif}.at path{stroke:#222}"
-    ".at text{text-anchor:end;stroke:#fff;stroke-width:2.5px;paint-order:stroke}"
-)
-"""Style of the cursor, which is sent with every frame, so its attributes are sent once, with the curves."""
+
+@dataclass(frozen=True)
+class Quantity:
+    """An attribute of `Curves`, the title of its plot, its unit, and the digits after the point that are of use."""
+
+    name: str
+    title: str
+    unit: str
+    digits: int
+
 
 QUANTITIES = (
-    ("height", "height of the centre, m"),
-    ("rotation", "rotation, degrees"),
-    ("deformation", "deformation RMS, mm"),
+    Quantity("height", "height of the centre", "m", 3),
+    Quantity("rotation", "rotation", "°", 1),
+    Quantity("deformation", "deformation RMS", "mm", 2),
+    Quantity("error", "error RMS (dashed: 90 %)", "mm", 2),
 )
-ERROR = ("error", "error RMS, mm (dashed: 90 %)")
+
+STYLE = """<style>
+.odeform-plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));padding:0 0.4em}
+.odeform-plots.large{grid-template-columns:1fr 1fr}
+.odeform-plots.large text{font-size:7px}
+.odeform-plots svg{cursor:crosshair;touch-action:none;user-select:none}
+.odeform-plots text{font-family:sans-serif;font-size:10px;fill:var(--mantine-color-text);stroke:none}
+.odeform-plots .quiet{opacity:0.65}
+.odeform-plots .area{fill:var(--mantine-color-body)}
+.odeform-plots .beyond{fill:#d08a40;opacity:0.22}
+.odeform-plots .axis{stroke:var(--mantine-color-text);opacity:0.5;fill:none}
+.odeform-plots .curve{fill:none;stroke-width:1.4;vector-effect:non-scaling-stroke}
+.odeform-plots .cursor{stroke:var(--mantine-color-text);stroke-width:1;vector-effect:non-scaling-stroke}
+[data-mantine-color-scheme=dark] :is(.odeform-plots .curve,.odeform-swatch){filter:brightness(1.2)}
+</style>"""
 
 
-def quantities_of(lines: Sequence[Line], rotates: bool) -> list[tuple[str, str]]:
-    """Attribute of `Curves` and title of each plot; rotation only if a body `rotates`, the error only if known."""
-    quantities = [q for q in QUANTITIES if q[0] != "rotation" or rotates]
+def quantities_of(lines: Sequence[Line], rotates: bool) -> list[Quantity]:
+    """The quantities to plot: rotation only if a body `rotates`, the error only if it is known."""
     known = any(c.error is not None or c.error_band is not None for _, _, c in lines)
-    return [*quantities, ERROR] if known else quantities
+    hidden = {"rotation": not rotates, "error": not known}
+    return [q for q in QUANTITIES if not hidden.get(q.name, False)]
 
 
-def plots_svg(lines: Sequence[Line], window: Window, rotates: bool) -> str:
-    """One plot per quantity, side by side, with a style sheet for `cursor_svg`."""
-    quantities = quantities_of(lines, rotates)
-    plots = [_plot(index, name, title, lines, window) for index, (name, title) in enumerate(quantities)]
-    return (
-        f"<style>{STYLE}</style>"
-        f'<svg width="{WIDTH * len(quantities)}" height="{HEIGHT}" font-family="sans-serif" font-size="10" '
-        f'style="display:block">{"".join(plots)}</svg>'
-    )
+def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str = "", large: bool = False) -> str:
+    """One plot per quantity, in a row or `large`, in two columns.
 
-
-def cursor_svg(lines: Sequence[Line], window: Window, rotates: bool, time: float) -> str:
-    """A line at `time` in seconds over all plots, with the values there; drawn over `plots_svg`."""
-    quantities = quantities_of(lines, rotates)
-    share = (time - window.start) / (REACH * (window.stop - window.start))
-    index, x = share * (len(lines[0][2].times) - 1) if lines else 0.0, LEFT + share * WIDE
-    marks = f"M{x:.0f} {TOP}v{HIGH}" + f"m{WIDTH}-{HIGH}v{HIGH}" * (len(quantities) - 1)
-    texts = "".join(
-        f'<g fill="#{bytes(color).hex()}">{_values(curves, quantities, index, TOP + 10 + 11 * row)}</g>'
-        for row, (_, color, curves) in enumerate(lines[:LABELS])
-    )
-    return f'<svg class="at"><path d="{marks}"/>{texts}</svg>'
-
-
-def _plot(index: int, name: str, title: str, lines: Sequence[Line], window: Window) -> str:
+    A click on a plot goes to that time, by the number box of the slider with the id `slider`.
+    """
     end = window.start + REACH * (window.stop - window.start)
-    values = [(color, getattr(c, name), "") for _, color, c in lines if getattr(c, name) is not None]
+    data = f'data-time-slider="{slider}" data-start="{window.start:g}" data-stop="{end:g}"'
+    data += f' data-left="{LEFT}" data-right="{LEFT + WIDE}"'
+    plots = "".join(
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" {data}>{_plot(quantity, lines, window)}</svg>'
+        for quantity in quantities_of(lines, rotates)
+    )
+    return f'{STYLE}<div class="odeform-plots{" large" if large else ""}">{plots}</div>'
+
+
+def cursor_css(window: Window, time: float) -> str:
+    """A style that moves the cursors of all plots to `time` in seconds; sent instead of the plots."""
+    share = (time - window.start) / (REACH * (window.stop - window.start))
+    return f"<style>.odeform-plots .cursor{{transform:translateX({share * WIDE:.1f}px)}}</style>"
+
+
+def _plot(quantity: Quantity, lines: Sequence[Line], window: Window) -> str:
+    end = window.start + REACH * (window.stop - window.start)
+    curves = _curves(quantity.name, lines)
+    low, high = _axis([v[: _trained(c.times, window)] for c, _, v, _ in curves])
+    trained = WIDE / REACH
+    largest = max((float(np.nanmax(v, initial=high)) for _, _, v, _ in curves), default=high)
+    cut = f'<text x="{WIDE}" y="-6" text-anchor="end" class="quiet">to {largest:.3g} ↑</text>' if largest > high else ""
+    return (
+        f'<g transform="translate({LEFT},{TOP})">'
+        f'<rect class="area" width="{WIDE}" height="{HIGH}"/>'
+        f'<rect class="beyond" x="{trained:.1f}" width="{WIDE - trained:.1f}" height="{HIGH}"/>'
+        f'<path class="axis" d="M0 0V{HIGH}H{WIDE}"/>'
+        f'<text x="-28" y="-6">{quantity.title}, {quantity.unit}</text>{cut}'
+        f'<text class="quiet" x="-4" y="8" text-anchor="end">{high:.3g}</text>'
+        f'<text class="quiet" x="-4" y="{HIGH}" text-anchor="end">{low:.3g}</text>'
+        f'<text class="quiet" x="0" y="{HIGH + 12}">{window.start:g}</text>'
+        f'<text class="quiet" x="{trained:.1f}" y="{HIGH + 12}" text-anchor="middle">{window.stop:g} s</text>'
+        f'<text class="quiet" x="{WIDE}" y="{HIGH + 12}" text-anchor="end">{end:.3g}</text>'
+        f"{''.join(_curve(c, color, v, dashes, low, high) for c, color, v, dashes in curves)}"
+        f'<path class="cursor" d="M0 0v{HIGH}"/></g>'
+    )
+
+
+def _curves(name: str, lines: Sequence[Line]) -> list[tuple[Curves, Color, Floats, str]]:
+    """Curves, color, values (T,) and attributes of each curve of one plot."""
+    out = [(c, color, getattr(c, name), "") for _, color, c in lines if getattr(c, name) is not None]
     if name == "error":
         dashes = ' stroke-dasharray="3 2"'
-        values += [(color, c.error_band, dashes) for _, color, c in lines if c.error_band is not None]
-    top = _axis_top([v for _, v, _ in values])
-    trained = WIDE / REACH
-    x = np.linspace(0.0, WIDE, len(lines[0][2].times)) if lines else np.zeros(0)
-    curves = "".join(
-        f'<path d="{_path(x, HIGH - np.clip(v / top, 0.0, 1.05) * HIGH)}" fill="none" '
-        f'stroke="rgb{color}" stroke-width="1.4"{dashes}/>'
-        for color, v, dashes in values
-    )
-    return (
-        f'<g transform="translate({WIDTH * index + LEFT},{TOP})">'
-        f'<rect width="{WIDE}" height="{HIGH}" fill="#fff"/>'
-        f'<rect x="{trained:.1f}" width="{WIDE - trained:.1f}" height="{HIGH}" fill="#f3e3d3"/>'
-        f'<path d="M0 0V{HIGH}H{WIDE}" fill="none" stroke="#999"/>'
-        f'<text x="0" y="-6" fill="#333">{title}</text>'
-        f'<text x="-4" y="8" text-anchor="end" fill="#666">{top:.3g}</text>'
-        f'<text x="-4" y="{HIGH}" text-anchor="end" fill="#666">0</text>'
-        f'<text x="0" y="{HIGH + 12}" fill="#666">{window.start:g}</text>'
-        f'<text x="{trained:.1f}" y="{HIGH + 12}" text-anchor="middle" fill="#666">{window.stop:g} s</text>'
-        f'<text x="{WIDE}" y="{HIGH + 12}" text-anchor="end" fill="#666">{end:.3g}</text>'
-        f"{curves}</g>"
-    )
+        out += [(c, color, c.error_band, dashes) for _, color, c in lines if c.error_band is not None]
+    return out
 
 
-def _axis_top(values: list[Floats]) -> float:
-    """A round number above all values; 1 if there are none."""
-    largest = max((float(np.nanmax(v, initial=0.0)) for v in values), default=0.0)
+def _trained(times: Floats, window: Window) -> int:
+    """The number of `times` up to the end of the trained window."""
+    return int(np.searchsorted(times, window.stop + 0.5 / window.rate))
+
+
+def _axis(values: list[Floats]) -> tuple[float, float]:
+    """Round ends of an axis that holds all values and zero; 0 and 1 if there are none."""
+    high = _round_up(max((float(np.nanmax(v, initial=0.0)) for v in values), default=0.0))
+    low = 0.0 - _round_up(max((float(np.nanmax(-v, initial=0.0)) for v in values), default=0.0))
+    return low, high or (1.0 if low == 0.0 else 0.0)
+
+
+def _round_up(largest: float) -> float:
     if largest <= 0.0:
-        return 1.0
+        return 0.0
     power = 10.0 ** np.floor(np.log10(largest))
     return float(next(s * power for s in (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0) if s * power >= largest * (1 - 1e-9)))
 
 
-def _path(x: Floats, y: Floats) -> str:
-    """SVG path data, with gaps where y is not a number."""
+def _curve(curves: Curves, color: Color, values: Floats, dashes: str, low: float, high: float) -> str:
+    """A path that is cut off at the ends of the axis, with gaps where values are not known."""
+    span = curves.times[-1] - curves.times[0]
+    x = (curves.times - curves.times[0]) / span * WIDE
+    y = HIGH * (1.0 - np.clip((values - low) / (high - low), -0.02, 1.02))
     parts, pen = [], "M"
     for a, b in zip(x.tolist(), y.tolist(), strict=True):
         if b != b:
@@ -111,16 +143,4 @@ def _path(x: Floats, y: Floats) -> str:
             continue
         parts.append(f"{pen}{a:.1f} {b:.1f}")
         pen = "L"
-    return "".join(parts)
-
-
-def _values(curves: Curves, quantities: list[tuple[str, str]], index: float, y: int) -> str:
-    texts = [(column, _value(getattr(curves, name), index)) for column, (name, _) in enumerate(quantities)]
-    return "".join(f'<text x="{WIDTH * (column + 1) - 8}" y="{y}">{text}</text>' for column, text in texts if text)
-
-
-def _value(curve: Floats | None, index: float) -> str:
-    if curve is None:
-        return ""
-    value = curve[min(round(index), len(curve) - 1)]
-    return "–" if np.isnan(value) else f"{value:.3g}" if abs(value) >= 0.01 or value == 0.0 else "<0.01"
+    return f'<path class="curve" d="{"".join(parts)}" stroke="rgb{color}"{dashes}/>'

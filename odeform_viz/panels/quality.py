@@ -5,12 +5,14 @@ import json
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.frontier import cheapest_within_error, finest_within_budget
+from odeform_viz.browser.limits import set_limits
 from odeform_viz.page import Page, Panel
 from odeform_viz.state import PageState
 
 __all__ = ["QualityPanel", "quality_names"]
 
 TIME_BUDGET, ERROR_BUDGET = "time budget", "error budget"
+LIMITS = {TIME_BUDGET: (0.1, 1000.0), ERROR_BUDGET: (1e-6, 100.0)}  # ms, mm
 TRIALS = 5  # solves; the fastest gives the time of one evaluation on this machine
 
 
@@ -41,8 +43,10 @@ class QualityPanel(Panel):
         self._choice = gui.add_dropdown(
             "quality", self._names, initial_value="balanced", hint="accuracy of the ODE solver"
         )
-        self._budget_ms = gui.add_number("at most (ms)", 5.0, min=0.1, max=1000.0, step=0.1, visible=False)
-        self._budget_mm = gui.add_number("at most (mm)", 0.1, min=1e-6, max=100.0, step=1e-6, visible=False)
+        self._budget_ms = gui.add_number("at most (ms)", 5.0, step=0.1, visible=False)
+        self._budget_mm = gui.add_number("at most (mm)", 0.1, step=1e-6, visible=False)
+        set_limits(page.server, self._budget_ms, *LIMITS[TIME_BUDGET])
+        set_limits(page.server, self._budget_mm, *LIMITS[ERROR_BUDGET])
         for control in (self._choice, self._budget_ms, self._budget_mm):
             control.on_update(lambda _: self._changed())
         page.controls.quality = self.quality
@@ -55,8 +59,9 @@ class QualityPanel(Panel):
         if choice not in (TIME_BUDGET, ERROR_BUDGET):
             return choice
         budget = (self._budget_ms if choice == TIME_BUDGET else self._budget_mm).value
-        if not 0.0 < budget < float("inf"):
-            raise InputError(f"quality: expected a positive budget, got {budget}")
+        low, high = LIMITS[choice]
+        if not low <= budget <= high:
+            raise InputError(f"quality: expected a budget from {low:g} to {high:g}, got {budget:g}")
         frontier = self._predictor.frontier
         if choice == TIME_BUDGET:
             point = finest_within_budget(frontier, budget, self._measured_pace())

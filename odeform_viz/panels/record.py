@@ -21,7 +21,7 @@ class RecordPanel(Panel):
         self._page, gui = page, page.server.gui
         with gui.add_folder("Recording"):
             self._stem = f"odeform-{page.schema.scene}"
-            self._path = gui.add_text("file", f"{self._stem}.rrd", hint="on the machine that runs the viewer")
+            self._path = gui.add_text("file", f"{self._stem}.rrd", hint="in the viewer's --workspace folder")
             self._start = gui.add_button("Start recording", icon=viser.Icon.PLAYER_RECORD)
             self._stop = gui.add_button("Stop recording", icon=viser.Icon.PLAYER_STOP, visible=False)
             self._start.on_click(lambda _: self._begin())
@@ -31,7 +31,7 @@ class RecordPanel(Panel):
 
     def _begin(self) -> None:
         try:
-            self._page.recording.start(self._path.value)
+            self._page.recording.start(self._page.workspace.inside(self._path.value))
         except InputError as error:
             self.show(RecordingStatus("failed", error=str(error)))
         self._page.wake()

@@ -7,12 +7,14 @@ import viser
 
 from odeform.geometry.region import Box, Region, Sphere
 from odeform.geometry.shape import FittedShape, without_outliers
+from odeform_viz.browser.limits import set_limits
 from odeform_viz.panels.callbacks import LOCK, on_user_change, serialized
 from odeform_viz.rendering.gizmos import CameraFocus, RegionGizmo, half_extent
 
 __all__ = ["RegionEditor", "region_like"]
 
 KINDS: tuple[str, ...] = ("everything", "sphere", "box")
+EDGES = (0.1, 1000.0)  # %
 INITIAL = 30.0  # % of the shape's extent that a new region has
 
 
@@ -39,6 +41,7 @@ class RegionEditor:
             self._edges = gui.add_vector3(
                 "edges (%)", (INITIAL, INITIAL, INITIAL), step=0.5, hint="of the shape's extent"
             )
+            set_limits(server, self._edges, *EDGES)
             self._text = gui.add_markdown("")
             self._use = gui.add_button("Use this part")
             self._change = gui.add_button("Change the region", color="gray", hint="over the whole shape")
@@ -100,7 +103,9 @@ class RegionEditor:
         if isinstance(region, Sphere):
             self._gizmo.show(Sphere(region.centre, metres_per_percent * float(self._radius.value)))
         else:
-            self._gizmo.show(Box(region.centre, metres_per_percent * np.abs(self._edges.value), region.rotation))
+            self._gizmo.show(
+                Box(region.centre, metres_per_percent * np.clip(self._edges.value, *EDGES), region.rotation)
+            )
         self._count()
 
     def _edited(self) -> Region | None:

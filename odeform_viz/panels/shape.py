@@ -12,12 +12,13 @@ from odeform.errors import InputError
 from odeform.formats.bundled import bundled_shapes
 from odeform.geometry.region import Region
 from odeform.geometry.shape import FittedShape, fit_to
-from odeform.geometry.similarity import Similarity
+from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.fitting import MOST_POINTS, describe_fit, shape_from
+from odeform_viz.own_shapes import takes_own_bodies
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.alignment import Alignment
-from odeform_viz.panels.callbacks import LOCK, serialized
+from odeform_viz.panels.callbacks import LOCK, serialized, take_upload
 from odeform_viz.panels.region import RegionEditor
 from odeform_viz.state import PageState
 
@@ -42,16 +43,23 @@ class ShapePanel(Panel):
             upload = gui.add_upload_button(
                 "Load a shape...", color="gray", hint=f"a mesh, points or Gaussian splats, up to {MOST_POINTS:,} points"
             )
-            upload.on_upload(lambda event: self._guarded(lambda: self._upload(event.target.value)))
+            upload.on_upload(lambda event: self._guarded(lambda: self._upload(take_upload(event))))
             for name in bundled_shapes():
                 button = gui.add_button(f"Load the {name}", color="gray", hint="bundled Gaussian splats")
                 button.on_click(lambda _, name=name: self._guarded(lambda: self._load(name, name)))
+            self._keep = gui.add_button("Keep z up", color="gray", visible=False, hint="as it lies in the file")
+            self._keep.on_click(serialized(lambda: self._rotate(UPRIGHT["+z"])))
             self._region = RegionEditor(server, self._show_whole, self._use_region, page.wake)
             self._alignment = Alignment(server, self._rest, self._rotate, self._transform, page.wake)
             self._back = gui.add_button("Back to the trained body", color="gray", visible=False)
             self._back.on_click(serialized(lambda: self._adopt(None)))
         page.controls.arranging = lambda: self._region.editing or self._alignment.dragging
         self._show()
+
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        predictor = page.model.predictor
+        return predictor is None or not takes_own_bodies(predictor)
 
     def set(self, fit: FittedShape | None) -> None:
         """Another shape, or the same in another part or transform; None for the trained body."""
@@ -102,8 +110,11 @@ class ShapePanel(Panel):
         self._page.columns_changed()
 
     def _show(self) -> None:
-        self._text.content = describe_fit(self._fit, self._name, self._body) if self._fit else TRAINED
+        predictor, fit = self._page.model.predictor, self._fit
+        likeness = predictor.trust.likeness(fit.geometry) if predictor and fit else None
+        self._text.content = describe_fit(fit, self._name, likeness) if fit else TRAINED
         self._back.visible = self._fit is not None
+        self._keep.visible = self._fit is not None and bool(self._fit.upright)
         self._region.show(self._fit)
         self._alignment.show(self._fit, self._automatic_scale)
 

@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 
-from odeform.motion.base import Motion
+from odeform.models.base import Predictor
+from odeform.models.error_band import FEWEST
+from odeform.motion.base import Motion, SolveStats
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.view import ColumnFrame, Description
@@ -15,36 +17,60 @@ __all__ = ["StatusPanel", "describe_column"]
 def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> str:
     """Markdown: solver, work, solver error and model error of one column at `time` in seconds.
 
-    The solver error costs as much as the solution, so it is left open until the view has `settled`.
+    The solver error, and whether the motion stops later, take longer than the motion: they follow when the view has
+    `settled`.
     """
     column, stats = shown.column, shown.stats
     lines = [f"**{column.label}** · {len(column.geometry.points):,} points"]
     if column.predictor is None:
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
-        error = "…" if not settled else "unknown"
-        if settled and stats.solver_error_mm is not None:
-            error = f"{stats.solver_error_mm:.2g} mm"
         lines.append(f"{stats.solver} · {stats.evaluations} evaluations · {stats.wall_ms:.1f} ms")
-        lines.append(f"solver error ≈ {error} (estimated)")
+        lines.append(_solver_error(stats) if settled else "solver error: …")
     else:
         lines.append(f"{stats.solver} · no ODE · {stats.wall_ms:.1f} ms")
     if shown.error is not None:
         e = shown.error
         lines.append(f"error now: RMSE {e.rmse_mm:.2f}, MAE {e.mae_mm:.2f}, max {e.worst_mm:.2f} mm")
-    band = column.predictor.error_band(shown.motion.parameters, np.array([time]))
-    if band is not None:
-        median, most = band[0]
-        rough = " (extrapolated: rough)" if shown.motion.extrapolates(time) or shown.motion.outside else ""
-        lines.append(f"model error here ≈ {median:.2f} mm, 90 % below {most:.2f} mm{rough}")
-    score = column.predictor.checkpoint.scores.get("rmse_pooled_mm")
-    if score is not None:
-        lines.append(f"test error of the checkpoint: RMSE {score:.2f} mm")
-    if stats.status != "ok" and isinstance(shown.motion, Motion):
-        last = shown.motion.last_good
-        later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
-        lines.append(f"⚠ **{stats.status}**{later}")
+    lines += _model_error(shown, column.predictor, time)
+    if isinstance(shown.motion, Motion):
+        lines += _stops(shown.motion, time, settled)
     return "  \n".join(lines)
+
+
+def _solver_error(stats: SolveStats) -> str:
+    if stats.solver_error_mm is None:
+        return "solver error: unknown"
+    return f"solver error: RMS {stats.solver_error_mm:.2g} mm over the trained window, against a finer solution"
+
+
+def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[str]:
+    only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
+    if only is not None and abs(time - only) > 1e-6:
+        return [f"⚠ **only t = {only:.3g} s is predicted**: that state is shown, not this moment's"]
+    if shown.foreign and not predictor.knows_foreign_errors:
+        return ["model error: unknown, this shape was not trained"]
+    band = shown.error_band(np.array([time]))
+    if band is None:
+        lines = [f"model error here: unknown, with fewer than {FEWEST} validation sequences"]
+    else:
+        rough = " (extrapolated: rough)" if shown.motion.extrapolates(time) or shown.motion.outside else ""
+        lines = [f"model error here ≈ RMSE {band[0, 0]:.2f} mm, 90 % below {band[0, 1]:.2f} mm{rough}"]
+    if shown.foreign:
+        return [*lines, "as measured on other shapes that were not trained"]
+    score = predictor.checkpoint.scores.get("rmse_pooled_mm")
+    return lines if score is None else [*lines, f"test error of the checkpoint: RMSE {score:.2f} mm"]
+
+
+def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
+    """What is wrong with the solution, and from where on the motion is not physically possible."""
+    status, lines = motion.stats.status, []
+    if status != "ok":
+        last = motion.last_good
+        later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
+        lines.append(f"⚠ **{status}**{later}")
+    stop = motion.stop_at(time) or (motion.first_stop() if settled else None)
+    return lines if stop is None else [*lines, f"⚠ **stops at t = {stop.time:.3f} s**: {stop.reason} afterwards"]
 
 
 class StatusPanel(Panel):

@@ -4,18 +4,22 @@ import asyncio
 import threading
 from collections.abc import Mapping
 
+import numpy as np
 import viser
 
 from odeform.dataset.index import Entry
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Schema
+from odeform.schema import OBJECT, Schema
+from odeform.simulation.contacts import vector_of
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import MotionSequence
 from odeform_viz.columns import Column
+from odeform_viz.own_shapes import own_of
 from odeform_viz.page import Page, Panel
-from odeform_viz.runtime.jobs import Job, simulate_motion
+from odeform_viz.pushing import contacts_of
+from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_own_body
 from odeform_viz.view import Description
 
 __all__ = ["TruthPanel", "entry_label", "physics_difference"]
@@ -32,7 +36,11 @@ PHYSICS = (
 
 def entry_label(entry: Entry, schema: Schema) -> str:
     """The number of a sequence and its parameters."""
-    values = ", ".join(f"{p.name} {entry.parameters[p.name]:.3g}" for p in schema.learned)
+    if contacts_of(schema):
+        strength = float(np.linalg.norm(vector_of(entry.parameters, "force")))
+        values = f"{entry.parameters[OBJECT]}, {strength:.3g} N"
+    else:
+        values = ", ".join(f"{p.name} {entry.parameters[p.name]:.3g}" for p in schema.learned)
     return f"{entry.name.rsplit('_', 1)[-1].lstrip('0') or '0'}: {values}"
 
 
@@ -163,12 +171,16 @@ class TruthPanel(Panel):
         except InputError as error:
             self._page.notices.show("Simulation not started", str(error))
             return
-        arguments = (self._schema.scene, parameters, OVERSAMPLING * self._schema.window.rate)
+        rate, own = OVERSAMPLING * self._schema.window.rate, own_of(self._page.model.predictor)
+        if own is None:
+            work, arguments = simulate_motion, (self._schema.scene, parameters, rate)
+        else:
+            work, arguments = simulate_own_body, (own.item, parameters, rate)
         with self._starting:
             if self._job is not None and self._job.running:
                 return
             self._show_working(True)
-            self._job = Job(simulate_motion, arguments, self._simulated, self._failed, self._progress)
+            self._job = Job(work, arguments, self._simulated, self._failed, self._progress)
             self._job.start()
 
     def _simulated(self, sequence: MotionSequence) -> None:

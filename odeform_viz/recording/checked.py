@@ -25,6 +25,8 @@ class CheckedColumn:
     """Frames that show the column, but whose points are not in the file."""
     skipped: str = ""
     """Why the column cannot be computed again."""
+    note: str = ""
+    """What one has to know of it: that its shape was not trained."""
     problem: str = ""
     """Why it differs from the recording, regardless of its frames."""
 
@@ -53,4 +55,4 @@ class CheckedColumn:
             text += f", at most {self.off:.2g} m off (frame {self.frame}, t = {self.time:.4f} s, vertex {self.vertex})"
         if self.missing:
             text += f"; the points of {self.missing} more are missing"
-        return f"{text}; {self.problem}" if self.problem else text
+        return "; ".join(part for part in (text, self.note, self.problem) if part)

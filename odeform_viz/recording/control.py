@@ -26,17 +26,19 @@ class RecordingStatus:
 class RecordingControl:
     """Callbacks ask for a start or a stop; the worker carries it out, since Rerun's clock belongs to one thread."""
 
-    def __init__(self, path: str | None = None) -> None:
-        """Records to `path` from the first frame on. `InputError` where nothing can be written."""
+    def __init__(self, path: str | Path | None = None, watched: Callable[[], bool] = lambda: True) -> None:
+        """Records to `path` from the first frame on, but only while the page is `watched` by anybody.
+
+        `InputError` where nothing can be written.
+        """
         self._requested = path
         self._recorder = Recorder(path) if path else None
+        self._watched, self._was_watched = watched, False
         self.report: Callable[[RecordingStatus], None] = lambda _: None
         """Called on the worker's thread whenever the status changes, frames included."""
 
-    def start(self, path: str) -> None:
-        """Ask for a recording. `InputError` for a name that is taken or has another suffix: nothing is overwritten."""
-        if Path(path).suffix != ".rrd" or Path(path).exists():
-            raise InputError(f"recording {path}: expected a name ending in .rrd of a file that does not exist yet")
+    def start(self, path: str | Path) -> None:
+        """Ask for a recording; `report` says whether it could be started. No file is overwritten."""
         self._requested = path
 
     def stop(self) -> None:
@@ -49,8 +51,10 @@ class RecordingControl:
         return self._recorder is not None
 
     def sync(self) -> bool:
-        """Start or stop as requested; whether a recording has just started."""
-        requested, recorder, started = self._requested, self._recorder, False
+        """Start or stop as requested; whether the frame on screen has to be recorded, although it is not new."""
+        requested, recorder = self._requested, self._recorder
+        watched = self._watched()
+        started, self._was_watched = watched and not self._was_watched and recorder is not None, watched
         try:
             if recorder is not None and requested is None:
                 self._recorder = None
@@ -65,8 +69,8 @@ class RecordingControl:
         return started
 
     def log(self, frame: Frame) -> None:
-        """Add a frame, if a recording is in progress."""
-        if self._recorder is not None:
+        """Add a frame, if a recording is in progress and anybody watches."""
+        if self._recorder is not None and self._watched():
             try:
                 self._recorder.log(frame)
             except InputError as error:
@@ -74,8 +78,12 @@ class RecordingControl:
 
     def close(self) -> None:
         """Complete the recording; call it when no more frames come."""
-        if self._recorder is not None:
-            self._recorder.close()
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            try:
+                recorder.close()
+            except InputError as error:  # the page is closed already
+                print(f"error: {error}", file=sys.stderr)
 
     def _fail(self, error: InputError) -> None:
         self._recorder = self._requested = None

@@ -1,4 +1,4 @@
-"""One column of a recording: its body, its pose, its numbers."""
+"""One column of a recording: its body, its pose, its arrows, its numbers."""
 
 import json
 
@@ -8,81 +8,139 @@ import rerun as rr
 from odeform.geometry.normals import vertex_normals
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint, Points
+from odeform.simulation.glyphs import Arrow
+from odeform.simulation.scenes.registry import find_scene
+from odeform.types import GaussianSplats, Mesh, Points
 from odeform_viz.colors import Color, color_of, paler
 from odeform_viz.columns import Column
-from odeform_viz.recording.entities import PROVENANCE, REST, STILL, WORLD
+from odeform_viz.recording.entities import COEFFICIENTS, MODES, POINTS, PROVENANCE, REST, WORLD
+from odeform_viz.recording.modes import ModeEncoder
 from odeform_viz.recording.provenance import provenance_of
+from odeform_viz.recording.shown_points import ShownBudget
+from odeform_viz.recording.surroundings import log_arrows, spheres
 from odeform_viz.view import ColumnFrame
 
-__all__ = ["PLOTS", "LoggedColumn", "log_still"]
+__all__ = ["PLOTS", "LoggedColumn"]
 
 TOLERANCE = 1e-6  # m; points whose deformation changed by less are not logged again
-PLOTS = {  # quantities by view; each quantity has an axis of its own
-    "curves": ("height_m", "deformation_mm"),
-    "errors": ("rmse_mm", "mae_mm", "worst_mm"),
-    "statistics": ("evaluations", "wall_ms", "solver_error_mm"),
+PLOTS = {  # quantities by the unit of their common plot
+    "m": ("curves/height_m",),
+    "mm": (
+        "curves/deformation_mm",
+        "errors/rmse_mm",
+        "errors/mae_mm",
+        "errors/worst_mm",
+        "statistics/solver_error_mm",
+    ),
+    "ms": ("statistics/wall_ms",),
+    "evaluations": ("statistics/evaluations",),
 }
 
 
 class LoggedColumn:
     """A column with one shape. What does not change is logged at once; the rest when it changes."""
 
-    def __init__(self, stream: rr.RecordingStream, column: Column, number: int) -> None:
-        """`number` counts the shapes that the column has had, from 0."""
+    def __init__(self, stream: rr.RecordingStream, column: Column, number: int, budget: ShownBudget) -> None:
+        """`number` counts the shapes that the column has had, from 0; `budget` limits the points that are shown."""
         # named by key: labels contain spaces and characters with a meaning in paths
         self.name = f"column_{column.key}/form_{number}"
         self.column, self.number = column, number
         self.frame = -1
         """The frame in which the current points were logged."""
-        self._stream = stream
+        self._stream, self._budget = stream, budget
+        self._rest = np.asarray(column.geometry.points, dtype=np.float32)
+        self._encoder = ModeEncoder(self._rest)
         self._motion: Motion | RecordedMotion | None = None
         self._points: Points | None = None
+        self._shown: Points | None = None
+        self._arrows: tuple[Arrow, ...] = ()
+        self._acting: tuple[bool, ...] = ()
         self._status = ""
         self._log_static()
 
     def forget(self) -> None:
         """Log everything again next time: the column is hidden now."""
-        self._points = self._motion = None
+        self._points = self._shown = self._motion = None
+        self._acting = ()
 
     def _log_static(self) -> None:
         column, name, color = self.column, self.name, color_of(self.column)
         facts = rr.TextDocument(json.dumps(provenance_of(column), indent=1))
         self._stream.log(f"{PROVENANCE}/{name}", facts, static=True)
-        points = np.asarray(column.geometry.points, dtype=np.float32)
+        points = self._rest
         self._stream.log(f"{REST}/{name}", rr.Points3D(points), static=True)
         body = f"{WORLD}/{name}/body"
         if isinstance(column.geometry, Mesh):
-            colors = _checkerboard(points, color)
+            colors = _checkerboard(points, color) if column.geometry.colors is None else _own_colors(column.geometry)
             mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=colors)
             self._stream.log(body, mesh, static=True)
         elif isinstance(column.geometry, GaussianSplats):
-            colors, radii = _spheres(column.geometry)
+            colors, radii = spheres(column.geometry)
             self._stream.log(body, rr.Points3D.from_fields(colors=colors, radii=radii), static=True)
         else:
             self._stream.log(body, rr.Points3D.from_fields(colors=_checkerboard(points, color)), static=True)
-        for view, quantities in PLOTS.items():
+        for unit, quantities in PLOTS.items():
             for quantity in quantities:
-                lines = rr.SeriesLines(names=column.label, colors=color)
-                self._stream.log(f"{view}/{quantity}/{name}", lines, static=True)
+                title = quantity.rpartition("/")[2].removesuffix(f"_{unit}").replace("_", " ")
+                lines = rr.SeriesLines(names=f"{column.label}: {title}", colors=color)
+                self._stream.log(f"{quantity}/{name}", lines, static=True)
 
     def log(self, shown: ColumnFrame, time: float, frame: int) -> None:
         """Log one moment, `time` in s, as `frame`."""
-        body, motion, pose = f"{WORLD}/{self.name}/body", shown.motion, shown.pose
+        motion, pose = shown.motion, shown.pose
         # deformations too small to see are logged as well: a replay compares more finely
         points = motion.deformed(time) if shown.points is None else shown.points
         if self._points is None or not np.abs(points - self._points).max() <= TOLERANCE:  # true also for NaN
             self._points, self.frame = points, frame
-            if isinstance(self.column.geometry, Mesh):
-                normals = vertex_normals(points, self.column.geometry.faces)
-                self._stream.log(body, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
-            else:
-                self._stream.log(body, rr.Points3D.from_fields(positions=points))
-        self._stream.log(body, rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+            self._log_points(points)
+        self._show_points(points)
+        transform = rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3])
+        self._stream.log(f"{WORLD}/{self.name}/body", transform)
         for quantity, value in self._numbers(shown, time).items():
             self._stream.log(f"{quantity}/{self.name}", rr.Scalars(value))
-        self._log_status(shown)
+        self._log_status(shown, time)
+        self._show_arrows(motion, time)
         self._motion = motion
+
+    def _log_points(self, points: Points) -> None:
+        """Log what a replay compares."""
+        encoded = self._encoder.encode(points)
+        if encoded is None:
+            self._stream.log(f"{POINTS}/{self.name}", rr.Points3D(points))
+            return
+        coefficients, mode = encoded
+        if mode is not None:
+            self._stream.log(f"{MODES}/{self.name}", rr.Points3D(mode))
+        # a value is always there: a row without any would not be told from none
+        self._stream.log(f"{COEFFICIENTS}/{self.name}", rr.Scalars(np.append(coefficients, 0.0)))
+
+    def _show_points(self, points: Points) -> None:
+        """Log what Rerun draws, if it is visibly different from what was drawn last."""
+        mesh = self.column.geometry if isinstance(self.column.geometry, Mesh) else None
+        size = points.nbytes * (2 if mesh else 1)
+        if self._shown is None:
+            self._budget.force(size)
+        elif not self._budget.allows(float(np.abs(points - self._shown).max()), size):
+            return
+        self._shown = points
+        body = f"{WORLD}/{self.name}/body"
+        if mesh:
+            normals = vertex_normals(points, mesh.faces)
+            self._stream.log(body, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
+        else:
+            self._stream.log(body, rr.Points3D.from_fields(positions=points))
+
+    def _show_arrows(self, motion: Motion | RecordedMotion, time: float) -> None:
+        """Log the arrows that act now, when a motion begins and when one of them begins or ends to act."""
+        changed = motion is not self._motion
+        if changed:
+            scene = find_scene(motion.schema.scene) if isinstance(motion, Motion) else None
+            self._arrows = scene.glyphs(motion.parameters, self._rest) if scene is not None else ()
+        acting = tuple(arrow.begin <= time <= arrow.end for arrow in self._arrows)
+        if acting != self._acting or (changed and any(acting)):
+            arrows = [arrow for arrow, acts in zip(self._arrows, acting, strict=True) if acts]
+            log_arrows(self._stream, f"{WORLD}/{self.name}/arrows", arrows, float(np.ptp(self._rest, axis=0).max()))
+        self._acting = acting
 
     def _numbers(self, shown: ColumnFrame, time: float) -> dict[str, float]:
         motion, stats, pose, error = shown.motion, shown.stats, shown.pose, shown.error
@@ -103,27 +161,26 @@ class LoggedColumn:
                 numbers["statistics/solver_error_mm"] = solver_error
         return numbers
 
-    def _log_status(self, shown: ColumnFrame) -> None:
-        status = f"{self.column.label}: {shown.stats.solver}, {shown.stats.status}"
+    def _log_status(self, shown: ColumnFrame, time: float) -> None:
+        problems = [shown.stats.status] if shown.stats.status != "ok" else []
+        if shown.foreign and shown.likeness:
+            problems.append(shown.likeness.describe())
+        if stop := shown.stop_at(time):
+            problems.append(f"stopped at t = {stop.time:.3f} s: {stop.reason} afterwards")
+        status = f"{self.column.label}: {shown.stats.solver}, {'; '.join(problems) or 'ok'}"
         if status != self._status:
-            level = rr.TextLogLevel.INFO if shown.stats.status == "ok" else rr.TextLogLevel.WARN
+            level = rr.TextLogLevel.WARN if problems else rr.TextLogLevel.INFO
             self._stream.log(f"status/{self.name}", rr.TextLog(status, level=level))
             self._status = status
 
 
-def log_still(stream: rr.RecordingStream, still: Geometry | None) -> None:
-    """Log the part of a scene that does not move, in place of the previous one; None for nothing."""
-    stream.log(STILL, rr.Clear(recursive=True))
-    if isinstance(still, Mesh):
-        stream.log(f"{STILL}/mesh", rr.Mesh3D(vertex_positions=still.points, triangle_indices=still.faces))
-    elif still is not None:
-        colors, radii = _spheres(still) if isinstance(still, GaussianSplats) else (None, None)
-        stream.log(f"{STILL}/points", rr.Points3D(still.points, colors=colors, radii=radii))
-
-
-def _spheres(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
-    """Colors (N, 3), and radii (N,) in m of spheres of the same size: Rerun draws no Gaussians."""
-    return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)
+def _own_colors(mesh: Mesh) -> np.ndarray:
+    """Vertex colors (N, 3) of a mesh that has colors: the mean of those at the corners of its faces."""
+    assert mesh.colors is not None
+    corners = np.asarray(mesh.faces).ravel()
+    sums, counts = np.zeros((len(mesh.points), 3)), np.bincount(corners, minlength=len(mesh.points))
+    np.add.at(sums, corners, mesh.colors.reshape(-1, 3))
+    return np.round(sums / np.maximum(counts, 1)[:, None]).astype(np.uint8)
 
 
 def _checkerboard(points: Points, color: Color) -> np.ndarray:

@@ -1,11 +1,14 @@
 """Where a column comes from, as plain values: enough to load it again elsewhere, and to notice if it has changed."""
 
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from odeform.checkpoint import bundled_checkpoints, resolve_checkpoint
 from odeform.dataset.folder import INDEX
+from odeform.models.mechanical.own_body import OwnBodyPredictor
+from odeform.motion.base import Motion
 from odeform.types import GaussianSplats, Geometry, Mesh
 from odeform_viz.columns import Column
 from odeform_viz.fitting import fit_to_json
@@ -25,19 +28,32 @@ def versions() -> dict[str, str]:
 
 
 def provenance_of(column: Column) -> dict[str, Any]:
-    """Label, origin, pinned parameters and shape of a column; its model's checkpoint, or the truth's parameters."""
+    """Label, origin, pinned parameters and shape of a column; its model's checkpoint, or the truth's parameters.
+
+    `own_body` says whether a mechanical model has made a body of the shape. `likeness` says how far the shape is from
+    the trained body, in metres, and `distance` how far that body is, relative to its size; the scores are those of the
+    trained body, and left out for other shapes.
+    """
     truth = column.truth
+    own = column.predictor if isinstance(column.predictor, OwnBodyPredictor) else None
     common = {
         "label": column.label,
         "origin": origin_of(column),
         "pinned": None if column.pinned is None else dict(column.pinned),
         "geometry": _kind(column.geometry),
         "shape": column.fit and fit_to_json(column.fit),
+        "own_body": own is not None,
+        "distance": own and own.distance,
     }
     if truth is not None:
         return {**common, "truth": True, "parameters": dict(truth.parameters)}
+    if isinstance(column.source, Motion):
+        return {**common, "truth": False, "parameters": dict(column.source.parameters)}
     assert column.predictor is not None
     checkpoint = column.predictor.checkpoint
+    likeness = column.predictor.trust.likeness(column.geometry)
+    foreign = likeness is not None and not likeness.same
+    scores = {} if foreign else {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"}
     return {
         **common,
         "truth": False,
@@ -45,7 +61,8 @@ def provenance_of(column: Column) -> dict[str, Any]:
         "sha256": checkpoint.sha256,
         "schema": checkpoint.schema.to_json(),
         "provenance": checkpoint.provenance,
-        "scores": {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"},
+        "scores": scores,
+        "likeness": likeness and {"trained": likeness.same, **asdict(likeness)},
     }
 
 

@@ -13,12 +13,28 @@ from rerun.chunk import Chunk, RrdReader
 
 from odeform.errors import InputError
 from odeform.types import Faces, Floats, Points
-from odeform_viz.recording.entities import END, FORMAT, FRAME, HEADER, OLD_REQUEST, PROVENANCE, REQUEST, REST, WORLD
+from odeform_viz.recording.entities import (
+    COEFFICIENTS,
+    END,
+    FORMAT,
+    FRAME,
+    HEADER,
+    MODES,
+    OLD_FORMAT,
+    OLD_REQUEST,
+    POINTS,
+    PROVENANCE,
+    REQUEST,
+    REST,
+    WORLD,
+)
+from odeform_viz.recording.modes import decode
 
 __all__ = ["Recording", "read_recording"]
 
 TEXT = "TextDocument:text"
 POSITIONS = ("Mesh3D:vertex_positions", "Points3D:positions")
+SCALARS = "Scalars:scalars"
 
 
 @dataclass(eq=False)
@@ -39,16 +55,26 @@ class Recording:
     """(N, 3) m: the points of each column at rest."""
     faces: dict[str, Faces] = field(default_factory=dict)
     """(F, 3): the faces of columns that are meshes."""
+    modes: dict[str, dict[int, Points]] = field(default_factory=dict)
+    """For each column, by the frame in which it was added, a mode (N, 3) of its deformations; see `recording.modes`."""
+    coefficients: dict[tuple[str, int], Floats] = field(default_factory=dict)
+    """(M,) in m, of the first M modes: the points of a column in a frame."""
     poses: dict[tuple[str, int], Floats] = field(default_factory=dict)
     """(4, 4), in m: the pose of a column in a frame."""
     frames: int | None = None
     """The number of frames; None if the recording was not closed."""
 
     def points(self) -> Iterator[tuple[str, int, Points]]:
-        """Column, frame and points (N, 3) in m before the pose, read one by one: they may not fit into memory."""
+        """Column, frame and points (N, 3) in m before the pose, one by one: they may not fit into memory."""
+        modes = {name: np.array([some[frame] for frame in sorted(some)]) for name, some in self.modes.items()}
+        for name, frame in sorted(self.coefficients, key=lambda key: (key[1], key[0])):
+            coefficients, known = self.coefficients[name, frame], modes.get(name, np.zeros((0, 1, 3)))
+            if len(coefficients) <= len(known):  # the last ones of a killed process may be lost
+                yield name, frame, decode(self.rest[name], known, coefficients)
+        kind = WORLD if self.header["odeform_recording"] == OLD_FORMAT else POINTS
         for chunk in _chunks(self.path, list(POSITIONS)):
-            kind, _, name = chunk.entity_path.strip("/").partition("/")
-            if kind == WORLD and not chunk.is_static:
+            found, _, name = chunk.entity_path.strip("/").partition("/")
+            if found == kind and not chunk.is_static:
                 batch = chunk.to_record_batch()
                 for component in set(POSITIONS) & set(batch.schema.names):
                     for frame, row in _rows(batch, component):
@@ -103,7 +129,13 @@ def _read_chunk(recording: Recording, chunk: Chunk) -> None:
         recording.columns[name] = json.loads(_text(batch.column(TEXT)[0]))
     elif kind == REST:
         recording.rest[name] = _floats(batch.column(POSITIONS[1])[0], 3)
-    elif kind == WORLD and "Mesh3D:triangle_indices" in components:
+    elif kind == MODES:
+        rows = _rows(batch, POSITIONS[1])
+        recording.modes.setdefault(name, {}).update({frame: _floats(row, 3) for frame, row in rows})
+    elif kind == COEFFICIENTS:
+        rows = _rows(batch, SCALARS)
+        recording.coefficients.update({(name, frame): row.values.to_numpy()[:-1] for frame, row in rows})
+    elif kind == WORLD and name.endswith("/body") and "Mesh3D:triangle_indices" in components:
         faces = batch.column("Mesh3D:triangle_indices")[0].values.flatten().to_numpy()
         recording.faces[name.removesuffix("/body")] = faces.astype(np.int64).reshape(-1, 3)
     elif kind == WORLD and "Transform3D:mat3x3" in components:
@@ -117,9 +149,11 @@ def _read_chunk(recording: Recording, chunk: Chunk) -> None:
 
 def _header(path: Path, header: Mapping[str, Any]) -> Mapping[str, Any]:
     found = header.get("odeform_recording")
-    if found != FORMAT:
+    if found not in (OLD_FORMAT, FORMAT):
         made_by = header["versions"].get("odeform")
-        raise _refused(path, f"expected format {FORMAT}, got format {found!r}, written by odeform {made_by}")
+        raise _refused(
+            path, f"expected format {OLD_FORMAT} or {FORMAT}, got format {found!r}, written by odeform {made_by}"
+        )
     return header
 
 

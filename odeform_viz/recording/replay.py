@@ -114,6 +114,9 @@ def _load_columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Ch
             simulated = bool(facts["truth"])
             result.skipped = "it was simulated in the viewer" if simulated else "its model was not loaded from a file"
             continue
+        if facts.get("own_body"):
+            result.skipped = "the body that was made of its shape is in no file"
+            continue
         try:
             column = _load_column(recording, name, facts, models)
         except (InputError, OSError) as error:
@@ -121,6 +124,8 @@ def _load_columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Ch
             continue
         if column.predictor is not None:
             result.problem = _changed(column, str(facts["sha256"]))
+            likeness = column.predictor.trust.likeness(column.geometry)
+            result.note = "" if likeness is None or likeness.same else likeness.describe()
         if not result.problem:
             columns[name] = column
     return columns, checked
@@ -139,10 +144,11 @@ def _load_column(recording: Recording, name: str, facts: Mapping[str, Any], mode
 
 
 def _changed(column: Column, recorded: str) -> str:
-    """What to say if the checkpoint has changed; empty if not."""
+    """What to say if the checkpoint has changed; empty if not, or if only what motions do not depend on has."""
     assert column.predictor is not None
-    found = column.predictor.checkpoint.sha256
-    if recorded == found:
+    checkpoint = column.predictor.checkpoint
+    found = checkpoint.sha256
+    if recorded in (found, *checkpoint.provenance.get("same_motions_as", ())):
         return ""
     return f"checkpoint {column.origin} has changed: expected SHA-256 {recorded[:16]}…, got {found[:16]}…"
 

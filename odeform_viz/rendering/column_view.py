@@ -6,14 +6,18 @@ import viser.transforms as vtf
 
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import Floats
+from odeform.types import Floats, Points, Pose
 from odeform_viz.colors import Color
 from odeform_viz.columns import Column
-from odeform_viz.rendering.error_colors import NearestInterpolation
+from odeform_viz.pushing import ShownPush, push_shown
+from odeform_viz.rendering.disc import FloorDisc
+from odeform_viz.rendering.ghost import show_ghost
 from odeform_viz.rendering.glyphs import GlyphView
+from odeform_viz.rendering.look import Colors, Look
 from odeform_viz.rendering.path import show_path
+from odeform_viz.rendering.push import Pull, PushView
 from odeform_viz.rendering.shapes import show_shape
-from odeform_viz.view import INVISIBLE, ColumnFrame
+from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions
 
 __all__ = ["ColumnView"]
 
@@ -25,27 +29,35 @@ class ColumnView:
     carried the whole motion, a body that the camera follows would jitter.
     """
 
-    def __init__(self, server: viser.ViserServer, column: Column, color: Color) -> None:
-        self._server, self._column, self._color = server, column, color
+    def __init__(self, server: viser.ViserServer, column: Column, color: Color, pull: Pull | None = None) -> None:
+        """`pull` is called while the arrow of a force is dragged; None: it cannot be."""
+        self._server, self._geometry, self._color = server, column.geometry, color
         self.root = f"/world/column_{column.key}"
         points = np.asarray(column.geometry.points, dtype=float)
         self._rest, self._centre = points.astype(np.float32), points.mean(axis=0)
         self._extent = float(np.ptp(points, axis=0).max())
-        self._lane = server.scene.add_frame(self.root, show_axes=False)
+        self._place = server.scene.add_frame(self.root, show_axes=False)
+        # what lies on the floor moves with it, past a body that is followed
+        self._ground = server.scene.add_frame(f"{self.root}/ground", show_axes=False)
         self._body = server.scene.add_frame(f"{self.root}/body", show_axes=False)
-        self._shape = show_shape(server, f"{self.root}/body", column.geometry, color)
-        # the title's own position would lag behind the body; that of its parent does not
-        self._above = server.scene.add_frame(f"{self.root}/above", show_axes=False)
-        self._glyphs = GlyphView(server, self.root, self._rest)
+        on_floor = column.fit is None or column.fit.static is None  # a captured scene has shadows of its own
+        self._shape = show_shape(server, f"{self.root}/body", column.geometry, color, shadow=on_floor)
+        self._glyphs = GlyphView(server, f"{self.root}/ground", self._rest)
+        self._push_view = PushView(server, f"{self.root}/ground", f"{self.root}/body", pull)
+        self._push: ShownPush | None = None
+        self._disc: FloorDisc | None = None
+        self._path: viser.LineSegmentsHandle | None = None
+        self._path_visible = True
+        self._drawn: Motion | RecordedMotion | None = None  # whose path is drawn
         self._label: viser.LabelHandle | None = None
         self._motion: Motion | RecordedMotion | None = None
-        self._interpolation: tuple[RecordedMotion, NearestInterpolation] | None = None
-        self._undeformed = True
+        self._ghost: viser.SceneNodeHandle | None = None
+        self._shift = np.zeros(3)
 
     @property
-    def lane(self) -> float:
-        """Metres along y by which the column stands beside the others."""
-        return float(self._lane.position[1])
+    def offset(self) -> Floats:
+        """(3,) m: where the column stands."""
+        return np.asarray(self._place.position)
 
     def centre(self, frame: ColumnFrame) -> Floats:
         """(3,) m: where the pose takes the centre of the body."""
@@ -57,65 +69,93 @@ class ColumnView:
 
     def hide(self) -> None:
         """Hide the column until it is shown again."""
-        self._lane.visible = False
+        self._place.visible = False
 
     def remove(self) -> None:
         """Remove all nodes of the column."""
-        self._lane.remove()
+        self._place.remove()
 
-    def show(
-        self,
-        frame: ColumnFrame,
-        lane: float,
-        opacity: float | None,
-        truth: ColumnFrame | None,
-        error_scale: float | None,
-    ) -> None:
-        """Show one moment at `lane`, metres along y. Errors are colored on a scale up to `error_scale` mm, if given."""
-        self._lane.visible = True
-        self._lane.position = (0.0, lane, 0.0)
+    def stand(self, offset: Floats, stage: float | None, follow: bool, frame: ColumnFrame) -> None:
+        """Place the column at `offset` (3,) m, on a disc of radius `stage` m or on the floor of all (None).
+
+        With a disc the floor passes under a body that is followed; without one the whole world does.
+        """
+        self._place.visible = True
+        self._place.position = offset
+        if self._disc is not None and self._disc.radius != stage:
+            self._disc.remove()
+            self._disc = None
+        if self._disc is None and stage is not None:
+            self._disc = FloorDisc(self._server, self.root, stage)
+        self._shift = np.zeros(3)
+        if self._disc is not None and follow:
+            # in invisible steps, so that a body that falls straight down moves nothing
+            self._shift[:2] = -np.round(self.displacement(frame)[:2] / INVISIBLE) * INVISIBLE
+            self._disc.scroll(*self._shift[:2])
+        self._ground.position = self._shift
+        # a path would run across the neighbours
+        self._path_visible = stage is None
+        if self._path is not None:
+            self._path.visible = self._path_visible
+
+    def show(self, frame: ColumnFrame, options: DisplayOptions, opacity: float | None, colors: Colors | None) -> None:
+        """Show one moment, in `colors` (N, 3) or the body's own (None)."""
         # invisible rotations are dropped, so that a body that falls without rotating sends a position only
         step = 0.5 * INVISIBLE / self._extent
         self._body.wxyz = np.round(vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz / step) * step
-        self._body.position = frame.pose[:3, 3]
-        self._shape.fade(opacity)
-        points = self._rest if frame.points is None else frame.points
-        if error_scale is not None and frame.error is not None and truth is not None:
-            self._shape.paint(points, self._interpolate(truth, 1e3 * frame.error.distances), error_scale)
-            self._undeformed = False
-        elif frame.points is not None or not self._undeformed:
-            self._shape.move(points, frame.covariances)
-            self._undeformed = frame.points is None
+        self._body.position = frame.pose[:3, 3] + self._shift
+        look = Look(colors, opacity, options.wireframe)
+        self._shape.show(self._deformed(frame, options.exaggeration), frame.covariances, look)
+        self._show_ghost(options.ghost)
 
-    def _interpolate(self, truth: ColumnFrame, values: Floats) -> Floats:
-        """Values at the truth's vertices (N,), carried to the points (M,) of this column."""
-        record = truth.motion
-        assert isinstance(record, RecordedMotion)
-        if self._interpolation is None or self._interpolation[0] is not record:
-            self._interpolation = (record, NearestInterpolation(record.geometry.points, self._rest))
-        return self._interpolation[1](values)
+    def _deformed(self, frame: ColumnFrame, exaggeration: float) -> Points | None:
+        """The body before its pose, (N, 3) m; None at rest."""
+        if frame.points is None or exaggeration == 1.0:
+            return frame.points
+        return self._rest + np.float32(exaggeration) * (frame.points - self._rest)
 
-    def title(self, text: str | None, frame: ColumnFrame) -> None:
-        """Show a text above the body; None for no text."""
-        if text is not None:
-            self._above.position = self.centre(frame)
+    def _show_ghost(self, visible: bool) -> None:
+        if visible and self._ghost is None:
+            self._ghost = show_ghost(self._server, f"{self.root}/body/ghost", self._geometry)
+        if self._ghost is not None:
+            self._ghost.visible = visible
+
+    def title(self, text: str | None, position: Floats) -> None:
+        """Show a text under `position` (3,) m from where the column stands; None for no text."""
         if text is None:
             if self._label is not None:
                 self._label.remove()
                 self._label = None
-        elif self._label is None:
-            self._label = self._server.scene.add_label(
-                f"{self.root}/above/label", text, position=(0.0, 0.0, 0.75 * self._extent), anchor="bottom-center"
-            )
-        elif self._label.text != text:
+            return
+        if self._label is None:
+            self._label = self._server.scene.add_label(f"{self.root}/title", text, anchor="top-center")
+        self._label.position = position
+        if self._label.text != text:
             self._label.text = text
 
-    def annotate(self, motion: Motion | RecordedMotion) -> None:
-        """Draw what belongs to a whole motion, its path and its arrows; sent only when the motion changes."""
-        if motion is self._motion:
-            return
-        self._motion = motion
+    def annotate(self, frame: ColumnFrame, time: float, options: DisplayOptions) -> None:
+        """Draw the path of a motion, sent only when it changes, and what acts on the body at `time` s."""
+        motion = frame.motion
+        if motion is not self._motion:
+            self._motion, self._push = motion, push_shown(frame.column, motion)
+        # a pushed body moves by less than its size, and its path would take longer than its motion
+        if self._push is None and self._path_visible and self._drawn is not motion:
+            self._drawn = motion
+            # not in `atomic`, which would hold back the frame until the path is computed
+            self._path = show_path(self._server, f"{self.root}/ground", motion, self._centre, self._color)
         with self._server.atomic():
-            show_path(self._server, self.root, motion, self._centre, self._color)
-            if isinstance(motion, Motion):
-                self._glyphs.show(motion.schema.scene, motion.parameters)
+            if self._push is not None:
+                self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
+            elif isinstance(motion, Motion):
+                self._glyphs.show(motion.schema.scene, motion.parameters, time)
+
+    def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
+        """(N, 3) m: the body as it is drawn, before its pose."""
+        points = self._deformed(frame, options.exaggeration)
+        return self._rest if points is None else points
+
+    def placement(self, frame: ColumnFrame) -> Pose:
+        """(4, 4): the pose of the body in the world's node, as it is drawn."""
+        pose = np.array(frame.pose)
+        pose[:3, 3] += self.offset + self._shift
+        return pose

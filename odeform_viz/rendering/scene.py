@@ -1,51 +1,125 @@
-"""Shows frames in viser's scene: columns side by side under one camera."""
+"""Shows frames in viser's scene: columns on a grid in the plane of the view, or all in one place."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import viser
 
+from odeform.types import Floats, Points, Pose, Vector
+from odeform_viz.coloring.scale import colors_of
 from odeform_viz.colors import color_of
 from odeform_viz.columns import Column
+from odeform_viz.pushing import picked
+from odeform_viz.rendering.cameras import Cameras
 from odeform_viz.rendering.column_view import ColumnView
+from odeform_viz.rendering.framing import Framing, Viewport, frame_columns
+from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
-from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions, Frame
+from odeform_viz.rendering.titles import title_of
+from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, Frame
 
 __all__ = ["SceneView"]
 
 OVERLAID = 0.45  # opacity of all but the first of columns that overlap
-SPACING = 1.6  # between columns, in sizes of the body
+MOMENTS = 60  # of a motion that are looked at to find how high it rises
 
 
 class SceneView:
     """Everything in the viewport."""
 
-    def __init__(self, server: viser.ViserServer, extent: float, columns: int) -> None:
-        """`extent` is the size of a body in metres; the initial camera shows `columns` of them side by side."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        extent: float,
+        wake: Callable[[], None],
+        pick: Callable[[Column | None, Vector], None] | None = None,
+        pull: Pull | None = None,
+    ) -> None:
+        """`extent` is the size of a body in metres; `wake` asks for the frame again, because a browser was resized.
+
+        `pick` is called with the column that was clicked, and the point (3,) m of its shape at rest; with None for a
+        click beside all of them. `pull` is called while the arrow of a force is dragged.
+        """
         self._server, self._extent = server, extent
         self._views: dict[int, tuple[Column, ColumnView]] = {}
-        self._stage = Stage(server, extent, columns)
+        self._stage = Stage(server, extent)
+        self._cameras = Cameras(server, wake)
+        self._pick, self._pull = pick, pull
+        self._pickable: tuple[_DrawnBody, ...] = ()
+        if pick is not None:
+            server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
+        self._framed: object = None  # what the framing was made for
+        self._framing = frame_columns(1, extent, extent, self.viewport, together=True, level=False)
 
-    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
-        """Send one frame; clients never see it half. Paths and arrows follow it.
+    @property
+    def viewport(self) -> Viewport:
+        """Size of the largest browser's canvas, in px."""
+        return self._cameras.viewport
 
-        Errors against the truth are colored on a scale up to `error_scale` mm, if given.
+    def fit(self) -> None:
+        """Aim all cameras as they were before users turned them."""
+        self._cameras.aim(self._framing)
+
+    def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
+        """Send one frame, in the bodies' own colors without a `coloring`; clients never see it half.
+
+        Paths and arrows follow it.
         """
         with self._server.atomic():
-            self._update_views(frame)
-            self._stage.show(frame)
             row = [column.key for column in frame.request.columns if column.visible]
-            several = len(row) > 1
+            together = options.overlay or len(row) < 2
+            discs = not together and frame.still is None
+            framing = self._frame_columns(frame, row, options, together)
+            self._update_views(frame)
+            self._stage.show(frame, discs)
             for shown in frame.columns:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
-                # from left to right as seen from the initial camera
-                lane = 0.0 if options.overlay else SPACING * self._extent * (0.5 * (len(row) - 1) - index)
-                view.show(shown, lane, OVERLAID if options.overlay and index else None, frame.truth, error_scale)
+                view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
+                values = coloring.values.get(shown.column.key) if coloring else None
+                colors = colors_of(values, coloring.scale) if coloring and values is not None else None
+                view.show(shown, options, OVERLAID if options.overlay and index else None, colors)
                 if shown.column.fit and shown.column.fit.static is not None:
-                    self._stage.place_background(shown.column.fit.static, lane)
-                view.title(title_of(shown) if several and not options.overlay else None, shown)
-            self._stage.shift(*self._offset(frame, options))
+                    self._stage.place_background(shown.column.fit.static, framing.offsets[index])
+                view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
+            self._stage.shift(*self._offset(frame, options, discs))
         self._server.flush()
         for shown in frame.columns:
-            self._views[shown.column.key][1].annotate(shown.motion)
+            self._views[shown.column.key][1].annotate(shown, frame.request.time, options)
+        if self._pick is not None:
+            self._pickable = tuple(self._drawn_body(shown, options) for shown in frame.columns)
+
+    def _drawn_body(self, shown: ColumnFrame, options: DisplayOptions) -> "_DrawnBody":
+        view = self._views[shown.column.key][1]
+        pose = view.placement(shown)
+        pose[:3, 3] += self._stage.position
+        return _DrawnBody(shown.column, view.points(shown, options), pose)
+
+    async def _clicked(self, event: viser.SceneClickEvent) -> None:
+        # a coroutine: clicks are answered in their order
+        assert self._pick is not None
+        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        hits = [hit for body in self._pickable if (hit := body.hit(origin, direction)) is not None]
+        _, column, point = min(hits, key=lambda hit: hit[0], default=(0.0, None, np.zeros(3)))
+        self._pick(column, point)
+
+    def _frame_columns(self, frame: Frame, row: list[int], options: DisplayOptions, together: bool) -> Framing:
+        """Where columns stand. The cameras are aimed only when that changes, or the body does."""
+        shapes = [id(shown.column.geometry) for shown in frame.columns]
+        reasons = (row, shapes, together, options.viewport, frame.still is None)
+        if frame.columns and self._framed != reasons:
+            self._framed = reasons
+            height, extent = max(_height(c) for c in frame.columns), max(self._size(c) for c in frame.columns)
+            level = frame.still is not None
+            self._framing = frame_columns(len(row), extent, height, options.viewport, together, level)
+            self._cameras.aim(self._framing)
+        return self._framing
+
+    def _size(self, shown: ColumnFrame) -> float:
+        """Metres: that of the trained body, or in scenes with several of the one that is shown."""
+        if not shown.motion.schema.objects:
+            return self._extent
+        return float(np.ptp(np.asarray(shown.column.geometry.points), axis=0).max())
 
     def _update_views(self, frame: Frame) -> None:
         """Make a view for each visible column, hide hidden ones, and remove those of removed columns."""
@@ -59,12 +133,13 @@ class SceneView:
                 view.hide()
         for shown in frame.columns:
             if shown.column.key not in self._views:
-                view = ColumnView(self._server, shown.column, color_of(shown.column))
+                free = shown.column.predictor is not None and shown.column.pinned is None
+                view = ColumnView(self._server, shown.column, color_of(shown.column), self._pull if free else None)
                 self._views[shown.column.key] = (shown.column, view)
 
-    def _offset(self, frame: Frame, options: DisplayOptions) -> tuple[float, float]:
+    def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> tuple[float, float]:
         """The shift of the world, in m, that keeps the first body in front of the camera."""
-        if not options.follow or not frame.columns:
+        if discs or not options.follow or not frame.columns:
             return (0.0, 0.0)
         first = frame.columns[0]
         # in invisible steps, so that a body that falls straight down moves nothing
@@ -72,8 +147,27 @@ class SceneView:
         return (-float(x), -float(y))
 
 
-def title_of(shown: ColumnFrame) -> str:
-    """The text above a column: its name, its error, and a warning."""
-    error = f" · {shown.error.rmse_mm:.2f} mm" if shown.error else ""
-    sunk = " · below the floor" if shown.below_floor else ""
-    return f"{shown.column.label}{error}{sunk}"
+@dataclass(frozen=True, eq=False)
+class _DrawnBody:
+    """A body as it stands in the viewport."""
+
+    column: Column
+    points: Points
+    """(N, 3) m, before the pose."""
+    pose: Pose
+    """(4, 4) to the world of the viewport."""
+
+    def hit(self, origin: Floats, direction: Floats) -> tuple[float, Column, Vector] | None:
+        """Where a ray meets the body: its distance, the column, and the point (3,) m at rest."""
+        turn, shift = self.pose[:3, :3], self.pose[:3, 3]
+        found = picked(self.column.geometry, self.points, (origin - shift) @ turn, direction @ turn)
+        return None if found is None else (found[1], self.column, found[0])
+
+
+def _height(shown: ColumnFrame) -> float:
+    """Metres above the floor that a body reaches within the trained window."""
+    window = shown.motion.schema.window
+    poses = shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
+    points = np.asarray(shown.column.geometry.points, dtype=float)
+    centre, half = points.mean(axis=0), 0.5 * float(np.ptp(points, axis=0).max())
+    return half + float((poses[:, 2, :3] @ centre + poses[:, 2, 3]).max())

@@ -20,6 +20,7 @@ class Clock:
         self._anchor_wall, self._anchor = now(), start
         self._speed = 1.0
         self._playing = False
+        self._slow: tuple[float, float, float] | None = None  # from, to, and the speed in between
         self.loop = True
 
     @property
@@ -35,17 +36,40 @@ class Clock:
     def _time(self) -> float:
         if not self._playing:
             return self._anchor
-        current = self._anchor + self._speed * (self._now() - self._anchor_wall)
+        current = self._advanced(self._now() - self._anchor_wall)
         # a user may seek beyond `stop`; playback then ends where they went
         end = max(self.stop, self._anchor)
         if current < end:
             return current
         if not self.loop:
-            self._playing, self._anchor = False, end
+            self._playing, self._anchor, self._slow = False, end, None
             return end
+        self._slow = None
         span = max(self.stop - self.start, 1e-9)
         self._set(self.start + (current - end) % span)
         return self._anchor
+
+    def _advanced(self, elapsed: float) -> float:
+        """The time of the motion `elapsed` seconds after the anchor, were there no end."""
+        if self._slow is None or self._anchor >= self._slow[1]:
+            return self._anchor + self._speed * elapsed
+        start, stop, speed = self._slow
+        start = max(start, self._anchor)
+        lead, through = (start - self._anchor) / self._speed, (stop - start) / speed
+        if elapsed < lead:
+            return self._anchor + self._speed * elapsed
+        if elapsed < lead + through:
+            return start + speed * (elapsed - lead)
+        return stop + self._speed * (elapsed - lead - through)
+
+    def slow_down_once(self, start: float, stop: float, seconds: float) -> None:
+        """Take `seconds` from `start` to `stop`, in s of the motion, the next time they are played.
+
+        Anything that the user does with the clock ends this.
+        """
+        with self._lock:
+            self._set(self._time())
+            self._slow = (start, stop, min((stop - start) / seconds, self._speed)) if stop > start else None
 
     def _set(self, current: float) -> None:
         self._anchor, self._anchor_wall = current, self._now()
@@ -61,15 +85,16 @@ class Clock:
         """Stop at the current time."""
         with self._lock:
             self._anchor = self._time()
-            self._playing = False
+            self._playing, self._slow = False, None
 
     def seek(self, time: float) -> None:
         """Jump to `time` in s, which may lie beyond `stop`; playback goes on if it was playing."""
         with self._lock:
             self._set(time)
+            self._slow = None
 
     def set_speed(self, speed: float) -> None:
         """Set the seconds of motion per second of wall-clock time, without a jump."""
         with self._lock:
             self._set(self._time())
-            self._speed = speed
+            self._speed, self._slow = speed, None

@@ -1,6 +1,9 @@
 """Long work in a process of its own, with progress, result and cancellation. The page stays responsive meanwhile."""
 
+import contextlib
 import multiprocessing
+import os
+import signal
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,46 +12,57 @@ from typing import Any
 
 import numpy as np
 
+from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
-from odeform.types import MotionSequence
+from odeform.identification.identify import Identification
+from odeform.identification.observation import Observation
+from odeform.models.base import Predictor
+from odeform.types import Geometry, MotionSequence
 
-__all__ = ["Job", "Report", "simulate_motion", "stability_image"]
+__all__ = ["Job", "Report", "fit_parameters", "own_body_of", "simulate_motion", "simulate_own_body", "stability_image"]
 
-Report = Callable[[float], None]
-"""Called with the fraction of the work that is done, 0 to 1."""
+Report = Callable[[Any], None]
+"""Called with the progress of the work: the fraction that is done, 0 to 1, or what else the work says it is."""
 
 
 @dataclass
 class Job:
     """Runs `work(report, *args)` in a new process; `work` must be importable, its arguments and result picklable.
 
-    `progress` is called with the fraction done, then one of `done` with the result or `failed` with a message of one
-    line. All are called from a thread of the job, and not after `cancel`.
+    `progress` is called with what the work reports, mostly the fraction done, then one of `done` with the result or
+    `failed` with a message of one line. All are called from a thread of the job, and not after `cancel`.
     """
 
     work: Callable[..., Any]
     args: tuple[Any, ...]
     done: Callable[[Any], None]
     failed: Callable[[str], None]
-    progress: Callable[[float], None] = lambda _: None
+    progress: Callable[[Any], None] = lambda _: None
     running: bool = field(default=False, init=False)
     """Until the result has arrived or the job is cancelled."""
     _cancelled: threading.Event = field(default_factory=threading.Event, init=False)
 
     def start(self) -> None:
-        """Start the process; returns at once."""
+        """Start the process; returns at once. `failed` is called if the system has no room for another process."""
         self.running = True
         # spawn, not fork: this process has threads, and a fork would copy their locks in any state
         context = multiprocessing.get_context("spawn")
         self._inbox, outbox = context.Pipe(duplex=False)
         self._process = context.Process(target=_run, args=(outbox, self.work, self.args), daemon=True)
-        self._process.start()
+        try:
+            self._process.start()
+        except OSError as error:
+            self.running = False
+            self.failed(f"no process could be started: {error.strerror}")
+            return
         outbox.close()
         self._thread = threading.Thread(target=self._listen, name="odeform-job", daemon=True)
         self._thread.start()
 
     def cancel(self) -> None:
         """Terminate the process. No callback follows."""
+        if not self.running:
+            return
         self._cancelled.set()
         self._process.terminate()
         self.running = False
@@ -60,9 +74,9 @@ class Job:
         while kind == "progress":
             try:
                 kind, value = self._inbox.recv()
-            except EOFError:
+            except (EOFError, OSError):  # ended between two messages, or within one
                 self._process.join(timeout=5.0)
-                kind, value = "failed", f"the process ended with exit code {self._process.exitcode}"
+                kind, value = "failed", f"the process {_ending(self._process.exitcode)}"
             if self._cancelled.is_set():
                 return
             self.running = kind == "progress"
@@ -70,11 +84,35 @@ class Job:
         self._process.join(timeout=5.0)
 
 
+def _ending(code: int | None) -> str:
+    if code is None or code >= 0:
+        return f"ended with exit code {code}"
+    name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
+    hint = ", perhaps for lack of memory" if -code == signal.SIGKILL else ""
+    return f"was ended by {name}{hint}"
+
+
 def _run(outbox: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
+    threading.Thread(target=_end_with_viewer, name="odeform-parent", daemon=True).start()
+    with contextlib.suppress(BrokenPipeError):  # the viewer was killed
+        _send_result(outbox, work, args)
+
+
+def _end_with_viewer() -> None:
+    """End this process as soon as the viewer is gone, also one that was killed."""
+    viewer = multiprocessing.parent_process()
+    assert viewer is not None
+    viewer.join()
+    os._exit(1)
+
+
+def _send_result(outbox: Connection, work: Callable[..., Any], args: tuple[Any, ...]) -> None:
     try:
         result = work(lambda fraction: outbox.send(("progress", fraction)), *args)
     except KeyboardInterrupt:
         return
+    except BrokenPipeError:
+        raise
     except Exception as error:
         outbox.send(("failed", f"{error}" if isinstance(error, InputError | RuntimeError) else f"{error!r}"))
     else:
@@ -86,6 +124,34 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
     from odeform.simulation.scenes.registry import get_scene
 
     return get_scene(scene).simulate(parameters, rate=rate, report=report)
+
+
+def simulate_own_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
+    """Like `simulate_motion`, for a soft object (`SoftObject`) that is none of the scene's."""
+    from odeform.simulation.scenes.contact_force import simulate_object
+
+    return simulate_object(item, parameters, rate, report=report)
+
+
+def own_body_of(_: Report, geometry: Geometry, name: str) -> Any:
+    """A shape as a soft body (`OwnBody`)."""
+    from odeform.models.mechanical.own_body import own_body
+
+    return own_body(geometry, name)
+
+
+def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoint, seen: Observation) -> Identification:
+    """Estimate the parameters of an observed motion.
+
+    Reports the fraction of a calibration that is done, then for each step its parameters and misfit.
+    """
+    from odeform.identification.identify import identify
+    from odeform.identification.known import known_discrepancy
+
+    predictor = model(checkpoint)
+    misfits: list[float] = []
+    discrepancy = known_discrepancy(predictor, report)
+    return identify(predictor, seen, discrepancy, lambda theta: report((theta, misfits[-1])), misfits.append)
 
 
 def stability_image(report: Report, checkpoint: str) -> np.ndarray:

@@ -2,18 +2,25 @@
 
 import asyncio
 import contextlib
+import http
 import io
 import socket
 import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
 
 import viser
+import websockets.asyncio.server as websockets_server
 
 from odeform.errors import InputError
 from odeform_viz.colors import HANDLE
+from odeform_viz.runtime.access import Access
 
-__all__ = ["open_server", "stop_server"]
+__all__ = ["open_server", "set_theme", "stop_server"]
 
 SWITCH_INTERVAL = 2e-4  # s after which a waiting thread gets the GIL
+STARTING = threading.Lock()
 
 
 class _LoopEvent(asyncio.Event):
@@ -29,23 +36,58 @@ class _LoopEvent(asyncio.Event):
             super().set()
 
 
-def open_server(host: str, port: int, title: str) -> viser.ViserServer:
-    """Start a server. `InputError` if the port cannot be used; port 0 takes a free one."""
-    _require_free(host, port)
+def open_server(access: Access, port: int, title: str) -> viser.ViserServer:
+    """Start a server that answers what `access` allows. `InputError` if the port cannot be used; 0 takes a free one."""
+    _require_free(access.host, port)
     # a worker's many short numpy calls would keep the GIL from the socket's thread for 5 ms at a time
     sys.setswitchinterval(SWITCH_INTERVAL)
-    with contextlib.redirect_stdout(io.StringIO()):  # viser prints a banner
-        server = viser.ViserServer(host=host, port=port, verbose=False)
+    with contextlib.redirect_stdout(io.StringIO()), _guarded(access):  # viser prints a banner
+        server = viser.ViserServer(host=access.host, port=port, verbose=False)
     server._websock_server.get_message_buffer().message_event = _LoopEvent()
-    server.gui.configure_theme(
+    set_theme(server.gui)
+    server.gui.set_panel_label(title)
+    return server
+
+
+def set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
+    """Set the theme of the page, of all clients or of one."""
+    gui.configure_theme(
         titlebar_content=None,
         control_width="medium",
+        dark_mode=dark,
         show_logo=False,
         show_share_button=False,
         brand_color=HANDLE,
     )
-    server.gui.set_panel_label(title)
-    return server
+
+
+@contextlib.contextmanager
+def _guarded(access: Access) -> Iterator[None]:
+    """The server that starts meanwhile refuses what `access` does not allow, before it sends anything.
+
+    viser 1.1 has no option for that. It calls websockets' `serve` while it is constructed, on a thread of its own.
+    """
+    guarded = []
+
+    def serve(*args: Any, process_request: Any, **more: Any) -> Any:
+        def process(connection: websockets_server.ServerConnection, request: Any) -> Any:
+            why = access.refusal(request.headers.get_all("Host"), request.headers.get_all("Origin"))
+            if why:
+                return connection.respond(http.HTTPStatus.FORBIDDEN, f"{why}\n")
+            return process_request(connection, request)
+
+        guarded.append(access)
+        return original(*args, process_request=process, **more)
+
+    with STARTING:
+        original = websockets_server.serve
+        websockets_server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield
+        finally:
+            websockets_server.serve = original
+    if not guarded:
+        raise RuntimeError("viser started its server in an unknown way, without a check of Host and Origin")
 
 
 def stop_server(server: viser.ViserServer) -> None:
@@ -56,9 +98,10 @@ def stop_server(server: viser.ViserServer) -> None:
 
 def _require_free(host: str, port: int) -> None:
     """Refuse a port in use: viser would silently take the next one."""
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
+    try:
+        family = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            raise InputError(f"port {port} on {host} cannot be used ({error}); choose another with --port") from None
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise InputError(f"port {port} on {host} cannot be used ({error}); choose another with --port") from None

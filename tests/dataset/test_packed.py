@@ -1,4 +1,5 @@
 import hashlib
+import json
 import lzma
 import zipfile
 from collections.abc import Callable
@@ -7,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pushes import body, pushes
 from safetensors.numpy import save
 
 from odeform.dataset.folder import folder_reader, save_sequence
 from odeform.dataset.index import Dataset, Entry
-from odeform.dataset.packed import _expand, _squeeze, open_packed, pack
+from odeform.dataset.integers import expanded, squeezed
+from odeform.dataset.packed import open_packed, pack
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.simulation.scenes.registry import get_scene
@@ -135,6 +138,40 @@ def test_a_looser_tolerance_takes_less_space(tmp_path: Path) -> None:
     assert sizes[0] > sizes[1] > sizes[2]
 
 
+def test_every_object_has_its_own_mesh_and_modes(tmp_path: Path) -> None:
+    made = pushes(10)
+    took = pack(made, tmp_path / "a.odp", TOLERANCE)
+    packed = open_packed(tmp_path / "a.odp")
+    assert packed.objects == made.objects
+    for name in made.objects:
+        pairs = list(zip(made.sequences("all", name), packed.sequences("all", name), strict=True))
+        assert max(largest(true, read) for true, read in pairs) <= TOLERANCE
+        assert all(np.array_equal(read.faces, body(name).faces) for _, read in pairs)
+        assert {len(read.times) for _, read in pairs} == {11, 41}
+    assert set(took["bodies"]) == set(made.objects)
+    assert 0.0 < took["rmse_m"] < took["largest_rmse_m"] < took["largest_error_m"] <= TOLERANCE
+    with zipfile.ZipFile(tmp_path / "a.odp") as file:
+        assert json.loads(lzma.decompress(file.read("dataset.json")))["codec"] == took
+
+
+def test_a_vertex_that_modes_miss_is_corrected(tmp_path: Path) -> None:
+    """One vertex leaves its neighbours for a single frame."""
+    made = [tumbling(seed) for seed in range(4)]
+    made[2].vertices[7, 3] += np.float32(0.01)
+    pack(holding(*made), tmp_path / "a.odp", TOLERANCE)
+    for true, read in zip(made, open_packed(tmp_path / "a.odp").sequences("all"), strict=True):
+        assert largest(true, read) <= TOLERANCE
+
+
+def test_a_later_version_is_refused(small: Path) -> None:
+    with zipfile.ZipFile(small) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    with zipfile.ZipFile(small, "w") as file:
+        for name, data in edited(members, b'"version": 2', b'"version": 3').items():
+            file.writestr(name, data)
+    assert "expected version 2 of the format, got 3" in refused(small)
+
+
 def test_beyond_the_precision_of_the_data(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="tolerance is too small"):
         pack(holding(*map(tumbling, range(3))), tmp_path / "a.odp", 1e-12)
@@ -172,7 +209,7 @@ def test_failed_sequences_stay_listed(tmp_path: Path) -> None:
     assert packed.entries[1] == failed
     assert [s.name for s in packed.sequences("all")] == ["s0", "s2"]
     with zipfile.ZipFile(tmp_path / "a.odp") as file:
-        assert file.namelist() == ["dataset.json", "common.safetensors", "s0", "s2"]
+        assert file.namelist() == ["dataset.json", "common", "s0", "s2"]
 
 
 def test_sequences_are_read_independently(small: Path) -> None:
@@ -253,19 +290,19 @@ def blob(content: bytes) -> Callable[[dict[str, bytes]], dict[str, bytes]]:
 
 DAMAGE: dict[str, Callable[[dict[str, bytes]], dict[str, bytes]]] = {
     "no index": lambda members: {k: v for k, v in members.items() if k != "dataset.json"},
-    "no common part": lambda members: {k: v for k, v in members.items() if k != "common.safetensors"},
+    "no common part": lambda members: {k: v for k, v in members.items() if k != "common"},
     "no sequence": lambda members: {k: v for k, v in members.items() if k != "s0"},
     "nothing": lambda members: {},
     "index is not compressed": lambda members: {**members, "dataset.json": lzma.decompress(members["dataset.json"])},
     "index is no JSON": lambda members: {**members, "dataset.json": lzma.compress(b"{")},
     "index of a folder": lambda members: edited(members, b"codec", b"x"),
     "quantum of nothing": lambda members: edited(members, b'"quantum_m": ', b'"quantum_m": -'),
-    "common part is no safetensors": lambda members: {**members, "common.safetensors": b"hello"},
-    "common part of another": lambda members: {**members, "common.safetensors": save({"points": np.zeros((3, 3))})},
+    "common part is no safetensors": lambda members: {**members, "common": b"hello"},
+    "common part of another": lambda members: {**members, "common": save({"points": np.zeros((3, 3))})},
     "sequence of nothing": blob(b""),
     "sequence of text": blob(b"hello"),
-    "sequence without a rate": blob(_squeeze(np.zeros((5, 18), dtype=np.int64), 0.0)),
-    "sequence of another shape": blob(_squeeze(np.zeros((5, 3), dtype=np.int64), 120.0)),
+    "sequence without a rate": blob(squeezed(np.zeros((5, 18), dtype=np.int64), 0.0)),
+    "sequence of another shape": blob(squeezed(np.zeros((5, 3), dtype=np.int64), 120.0)),
 }
 
 
@@ -345,7 +382,7 @@ SERIES: dict[str, np.ndarray] = {
 @pytest.mark.parametrize("kind", SERIES)
 def test_integers_come_back_exactly(kind: str) -> None:
     values = SERIES[kind].astype(np.int64)
-    again, rate = _expand(_squeeze(values, 123.25))
+    again, rate = expanded(squeezed(values, 123.25))
     assert np.array_equal(again, values)
     assert rate == 123.25
 
@@ -354,4 +391,4 @@ def test_smooth_series_take_little_space() -> None:
     """The cheapest order of differences is chosen: the third difference of a slow sine nearly vanishes."""
     smooth = SERIES["smooth"][:, :1]
     shuffled = np.random.default_rng(0).permutation(smooth)
-    assert len(_squeeze(smooth, 120.0)) < 0.5 * len(_squeeze(shuffled, 120.0))
+    assert len(squeezed(smooth, 120.0)) < 0.5 * len(squeezed(shuffled, 120.0))

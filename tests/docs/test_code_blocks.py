@@ -11,7 +11,7 @@ from commands import MAINS, command_lines, parser_of
 from files import make_files
 
 PROGRAMS = {*MAINS, "git", "lint-imports", "mkdocs", "pip", "pre-commit", "pyright", "pytest", "python", "ruff"}
-LANGUAGES = {"bash", "bibtex", "csv", "diff", "json", "python", "text", "toml", "yaml"}
+LANGUAGES = {"bash", "bibtex", "csv", "diff", "json", "nginx", "python", "text", "toml", "yaml"}
 BLOCKS = [block for page in pages() for block in blocks_of(page)]
 WORKED = ROOT / "docs" / "extending.md"  # its blocks are files of an extension: test_extending.py
 

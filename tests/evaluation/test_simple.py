@@ -8,8 +8,10 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
-from odeform.evaluation.simple import ballistic, evaluate_simple, hold_last, spline_through
+from odeform.dataset.training_data import prepare
+from odeform.evaluation.simple import ballistic, continued, evaluate_simple, hold_last, spline_through
 from odeform.schema import Schema, Window
+from odeform.training.continuation import fit_dynamics
 from odeform.types import MotionSequence
 
 
@@ -47,3 +49,13 @@ def test_a_spline_is_right_where_it_sees(dataset: Dataset, stagger: bool) -> Non
     assert every["rmse_pooled_mm"] == 0.0
     assert some["rmse_pooled_mm"] > 0.1
     assert some["per_frame_rmse_mm"][95] < 1e-9 or stagger
+
+
+def test_a_continuation_needs_little_of_the_truth(dataset: Dataset) -> None:
+    data = prepare(dataset, None, FrameSubsampling((0, 60)))
+    dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.gyration_radius)
+    predictors = continued(60, dynamics, data.space, data.schema), ballistic(60), hold_last(60)
+    ahead, flown, held = (evaluate_simple(p, dataset, "test", (60, 70))["rmse_pooled_mm"] for p in predictors)
+    assert ahead < min(flown, held)
+    known = evaluate_simple(predictors[0], dataset, "test", (0, 60))
+    assert known["rmse_pooled_mm"] == 0.0

@@ -45,8 +45,8 @@ def test_points_and_splats(rival: Predictor, tmp_path: Path) -> None:
     splats = GaussianSplats(points, covariances, np.random.default_rng(1).normal(size=(8, 4, 3)), np.full(8, 0.7))
     times = np.array([0.0, 0.3])
     for shape, keys in (
-        (PointCloud(points), {"times", "parameters", "vertices", "faces"}),
-        (splats, {"times", "parameters", "centers", "covariances"}),
+        (PointCloud(points), {"times", "parameters", "notes", "vertices", "faces"}),
+        (splats, {"times", "parameters", "notes", "centers", "covariances"}),
     ):
         motion = rival.solve(shape)
         write_motion(motion, times, tmp_path / "a.npz")

@@ -57,7 +57,7 @@ def test_the_command(
 
 def test_too_few_sequences_to_calibrate_on_are_rejected(few: Dataset) -> None:
     with pytest.raises(InputError, match="at least 8"):
-        identify_split(load("mass-elastic"), replace(few, entries=few.entries[5:]))
+        identify_split(load("mass-elastic/pod-rbf"), replace(few, entries=few.entries[5:]))
 
 
 def test_an_empty_split_is_rejected(few: Dataset) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from odeform.models.error_band import ErrorBand
+from odeform.models.error_band import FEWEST, ErrorBand, error_band
 from odeform.types import Arrays
 
 TIMES = np.linspace(0.0, 1.0, 41)
@@ -56,3 +56,10 @@ def test_beyond_the_window_it_grows_as_the_continuation_did() -> None:
     beyond = continued.at(theta, TIMES[-1] + frame * np.array([10.0, 20.0, 90.0]))
     np.testing.assert_allclose(beyond[:2], np.quantile(later[:, [9, 19]], [0.5, 0.9], axis=0).T)
     assert (beyond[2] >= beyond[1]).all()
+
+
+def test_too_few_validation_sequences_make_no_band() -> None:
+    assert FEWEST == 8
+    assert error_band({}) is None
+    assert error_band(residuals(FEWEST - 1, 0)) is None
+    assert error_band(residuals(FEWEST, 0)) is not None

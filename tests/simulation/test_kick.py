@@ -1,10 +1,11 @@
 import numpy as np
+import pytest
 import trimesh
 
 from odeform.dataset.index import Dataset
 from odeform.geometry.rigid import rotation_z
 from odeform.simulation.objects.ball import RADIUS
-from odeform.simulation.scenes.kick import PULSE, pulse_direction, pulse_weights
+from odeform.simulation.scenes.kick import ARROW, PULSE, pulse_direction, pulse_weights
 from odeform.simulation.scenes.registry import get_scene
 
 
@@ -58,9 +59,20 @@ def test_the_arrow_of_the_pulse_is_as_long_as_it_is_strong() -> None:
     parameters = scene.schema.complete({"force": 75.0, "azimuth": 0.5 * np.pi, "elevation": 0.6})
     (arrow,) = scene.glyphs(parameters, rest)
     direction = np.array([0.0, np.cos(0.6), np.sin(0.6)])
-    assert np.allclose(arrow.vector, 0.5 * 2.0 * RADIUS * direction, atol=1e-9)
-    assert np.allclose(arrow.start, [0.0, 0.0, RADIUS] + 0.55 * 2.0 * RADIUS * direction, atol=1e-9)
+    assert np.allclose(arrow.vector, 0.5 * ARROW * 2.0 * RADIUS * direction, atol=1e-9)
+    assert np.allclose(arrow.start + arrow.vector, [0.0, 0.0, RADIUS] - RADIUS * direction, atol=1e-9)
     assert (arrow.label, arrow.begin, arrow.end) == ("75 N", 0.0, PULSE)
+
+
+@pytest.mark.parametrize("elevation", [0.5, 0.6, 0.785, 0.842])
+def test_the_arrow_begins_above_the_floor(elevation: float) -> None:
+    """For all that sliders reach: they go beyond the trained range by a fifth."""
+    scene = get_scene("kick")
+    parameters = scene.schema.complete({"force": 160.0, "elevation": elevation})
+    points = np.asarray(scene.rest_mesh().points)
+    for shape in (points, points * [1.0, 1.0, 0.3]):
+        (arrow,) = scene.glyphs(parameters, shape)
+        assert arrow.start[2] >= -1e-9
 
 
 def test_no_arrow_without_the_parameters_of_a_pulse() -> None:

@@ -65,7 +65,7 @@ def toy(monkeypatch: pytest.MonkeyPatch) -> Scene:
 
 
 def test_the_registry_knows_every_scene_by_its_own_name(toy: Scene) -> None:
-    assert known_scenes() == ("mass-elastic", "kick", "slide")
+    assert known_scenes() == ("mass-elastic", "kick", "contact-force", "slide")
     assert [get_scene(name).schema.scene for name in known_scenes()] == list(known_scenes())
     assert get_scene("slide") is toy
 

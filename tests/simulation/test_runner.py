@@ -99,6 +99,29 @@ def test_what_failed_is_listed_and_left_alone(tmp_path: Path, monkeypatch: pytes
     assert len(tried) == 3
 
 
+def test_an_unexpected_error_ends_one_sequence_and_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    broken = True
+
+    def fragile(parameters: Parameters, rate: float, step: float) -> MotionSequence:
+        if broken and parameters == first:
+            raise ZeroDivisionError("no time at all")
+        return MotionSequence(np.arange(3) / rate, np.zeros((3, 4, 3)), np.array([[0, 1, 2]]), np.full(4, 0.25))
+
+    first = kick.SCENE.sample(3, 0)[0]
+    monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=fragile))
+    command = ["simulate", "kick", "--out", str(tmp_path), "--count", "3", "--workers", "1"]
+    assert main(command) == 1
+    output = capsys.readouterr()
+    assert "kick_00000 failed: unexpected ZeroDivisionError: no time at all (test_runner.py:" in output.out
+    assert "1 sequences ended with an unexpected error" in output.err
+    assert len(open_dataset(tmp_path).select("all")) == 2
+    broken = False
+    assert main(command) == 0
+    assert len(open_dataset(tmp_path).select("all")) == 3
+
+
 def test_output_that_is_not_a_motion_fails_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

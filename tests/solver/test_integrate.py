@@ -10,8 +10,9 @@ from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.registry import METHODS
 from odeform.solver.solution import Solution, Status
 
+EXPLICIT = [name for name in METHODS if name != "limex"]  # that one steps fields of its own kind
 QUALITIES = [
-    *(SolverSettings(name, step=0.05) for name in METHODS),
+    *(SolverSettings(name, step=0.05) for name in EXPLICIT),
     SolverSettings("bosh3", tolerance=1e-5),
     SolverSettings("dopri5", tolerance=1e-7),
 ]
@@ -42,7 +43,7 @@ def same(one: Solution, two: Solution, nodes: int) -> bool:
     ) and np.array_equal(one.middles[: nodes - 1], two.middles[: nodes - 1])
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", EXPLICIT)
 def test_order_at_the_nodes(name: str) -> None:
     steps = [2.0**-k for k in (range(3, 7) if name == "dopri5" else range(4, 9))]
     errors = []
@@ -66,7 +67,7 @@ def test_extended_precision_is_kept(name: str) -> None:
     assert errors[1] < {"rk4": 1e-10, "bosh3": 1e-7, "dopri5": 3e-14}[name]
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", EXPLICIT)
 def test_order_between_the_nodes(name: str) -> None:
     """The cubic between nodes is of fourth order: no method of up to that order loses by it."""
     steps = [2.0**-k for k in range(4, 9)]

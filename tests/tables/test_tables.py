@@ -10,9 +10,11 @@ from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.models.registry import load
+from odeform.simulation.objects.catalog import OBJECTS
+from odeform.tables.cells import _led
 from odeform.tables.page import page
-from odeform.tables.plan import AHEAD, FRAMES, IMPACT, INTERVALS, UNTIL, plan
-from odeform.tables.runs import KEPT, Result, Run, complete_runs
+from odeform.tables.plan import AHEAD, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform.tables.runs import ALONE, KEPT, Result, Run, complete_runs
 
 
 @pytest.fixture(scope="module")
@@ -79,11 +81,16 @@ def test_sparse_frames_score_worse(run: Run, folder: Path) -> None:
 def test_the_page_shows_every_model_and_leaves_missing_entries_empty() -> None:
     def result(run: Run) -> Result:
         scores = {f"{a}:{b}": dict.fromkeys(KEPT, 1.0 + run.seed) for a, b in run.scored}
+        if run.scene == FORCE:
+            objects = {name: dict.fromkeys(KEPT, 0.25 + index) for index, name in enumerate(OBJECTS)}
+            scores = {span: {**values, "objects": objects} for span, values in scores.items()}
+        elif run.until and run.model in ("odeform", "gp"):
+            scores |= {f"{span}{ALONE}": dict.fromkeys(KEPT, 30.0) for span in scores}
         return {"command": run.name, "sha256": "", "parameters": 7, "seconds": 1.0, "scores": scores}
 
     some = dict.fromkeys(KEPT, 0.5)
     spans = [*FRAMES.items(), ("mass-elastic", IMPACT)]
-    simple = [f"{name} {u}:{u + AHEAD}" for name in ("hold-last", "ballistic") for u in UNTIL]
+    simple = [f"{name} {u}:{u + AHEAD}" for name in ("continued", "hold-last", "ballistic") for u in UNTIL]
     simple += [f"spline {k}{way}" for k in INTERVALS for way in ("", " staggered")]
     runs = {table: {one: result(one) for one in of if one.scene != "kick"} for table, of in plan().items()}
     one = {"mae_normalised": 0.01, "coverage_90": None}
@@ -96,11 +103,32 @@ def test_the_page_shows_every_model_and_leaves_missing_entries_empty() -> None:
             "identified": {"mass-elastic": {"parameters": {"mass": one, "bending": one}, "seconds": 1.0}},
         }
     )
-    for table, of in plan().items():
-        part = text.split(f"## {table}. ")[1].split("\n## ")[0]
+    for table in ("II", "III", "IV"):
+        of, part = plan()[table], text.split(f"## {table}. ")[1].split("\n## ")[0]
         for one in of:
-            assert f"| {one.model} |" in part or f"| **{one.model}** |" in part
+            assert f"| {one.model} |" in part
+    ablations = text.split("## Ablations")[1].split("\n## ")[0]
+    assert "| nothing | 2 ± 1 | 200 ± 1e+02 | – | – |" in ablations
+    assert "| – the clock of the decoders, – the parameters of the decoders |" in ablations
+    curve = text.split("## Learning curve")[1].split("\n## ")[0]
+    assert "| mass-elastic | 44, RMSE | 44, deformation, % | 88, RMSE |" in curve
+    assert "| gp | 1 | 100 | 1 | 100 | 1 | 100 | 1 | 100 |" in curve
+    extrapolated = text.split("## III. ")[1].split("\n## ")[0]
+    for name in ("odeform", "gp"):
+        assert f"| {name} without continuation | 30 | 30 | 30 | 30 | – | – |" in extrapolated
+    assert "rnn without continuation" not in extrapolated
+    assert "| the true frames of the window, continued | 0.5 | 0.5 | 0.5 | 0.5 | – | – |" in extrapolated
     spread = f"2 ± {np.std([1.0, 2.0, 3.0], ddof=1):.2g}"
-    assert text.count(f"| **odeform** | 7 | {spread}") == 1
-    assert all(row.endswith("| – | – | – |") for row in text.splitlines() if row.startswith("| **odeform** | 7"))
+    assert text.count(f"| odeform | 7 | {spread}") == 1
+    assert all("| – | – | – |" in row for row in text.splitlines() if row.startswith("| odeform | 7"))
+    objects = text.split("## I. ")[1].split("\n## ")[0]
+    assert "| bottle | 0.25 | 0.25 | 0.25 | 25 % |" in objects
+    assert "| mean | 3.25 | 3.25 | 3.25 | 325 % |" in objects
     assert "| mass-elastic | mass | 0.0100 | – | 1.0 s | 0.113 |" in text
+
+
+def test_only_a_lead_beyond_the_spread_is_bold() -> None:
+    assert _led([[1.0, 1.2], [1.5], []]) == ["**1.1 ± 0.14**", "1.5", "–"]
+    assert _led([[1.0, 1.2], [1.2]]) == ["1.1 ± 0.14", "1.2"]
+    assert _led([[0.4341], [0.4344]]) == ["0.434", "0.434"]
+    assert _led([[0.0], []]) == ["0", "–"]

@@ -75,11 +75,11 @@ def test_what_does_not_foretell_is_not_kept(
     monkeypatch.setattr(continuation, "fit_dynamics", falling)
     assert predicted_errors(model, data) is None
     assert counts == [round(len(data.times) / 1.5)]  # fitted without the held-out part
-    assert with_continuation(model.checkpoint, data) is model.checkpoint
+    assert with_continuation(model, data) is model.checkpoint
     # a criterion that passes whatever is kept
     errors = np.full((len(data.theta["val"]), 40), 3.0)
     monkeypatch.setattr(continuation, "predicted_errors", lambda *_: errors)
-    kept = with_continuation(model.checkpoint, data)
+    kept = with_continuation(model, data)
     assert kept.schema.window.reach > 0.0
     assert np.array_equal(kept.arrays["val.later_mm"], errors.astype(np.float32))
     assert counts[-1] == len(data.times)

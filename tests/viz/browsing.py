@@ -5,6 +5,8 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,9 +17,10 @@ from odeform_viz.app import App
 from odeform_viz.columns import Column
 from odeform_viz.screenshots import CHROMIUM, FLAGS
 
-__all__ = ["Tab", "needs_chromium", "open_tab", "until"]
+__all__ = ["PHONE", "Tab", "needs_chromium", "open_tab", "until"]
 
 VIEW = {"width": 800, "height": 480}
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium on the PATH (Debian: chromium)")
 
@@ -83,18 +86,19 @@ def until(holds: Callable[[], bool], seconds: float = 60.0) -> bool:
     return holds()
 
 
-def open_tab(*columns: Column) -> Iterator[Tab]:
-    """A tab with these columns, for a fixture to yield from."""
-    app = App(columns, port=0)
+def open_tab(*columns: Column, workspace: str | Path = ".", control: str = "mass (kg)", **device: Any) -> Iterator[Tab]:
+    """A tab with these columns and a `control`, for a fixture to yield from. `device` are options of a browser's
+    context."""
+    app = App(columns, port=0, workspace=workspace)
     try:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-            tab = Tab(browser.new_page(viewport=VIEW), app)
+            tab = Tab(browser.new_page(**{"viewport": VIEW, **device}), app)
             tab.page.on("console", lambda message: tab.errors.append(message.text) if message.type == "error" else None)
             tab.page.on("pageerror", lambda error: tab.errors.append(str(error)))
             tab.page.goto(app.url)
             tab.page.wait_for_selector("canvas", timeout=60_000)
-            tab.page.get_by_text("mass (kg)").wait_for(timeout=60_000)
+            tab.page.get_by_text(control).wait_for(state="attached", timeout=60_000)
             yield tab
             browser.close()
     finally:

@@ -35,12 +35,15 @@ def drop() -> Predictor:
 
 
 @pytest.fixture
-def serve(port: int, capfd: pytest.CaptureFixture[str]) -> Iterator[Serve]:
-    """Opens a viewer with these columns, paused at `moment`, and a client. The viewer must not print a traceback."""
+def serve(port: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Serve]:
+    """Opens a viewer with these columns, paused at `moment`, and a client. The viewer must not print a traceback.
+
+    Its workspace is `tmp_path`.
+    """
     with ExitStack() as stack:
 
         def start(*columns: Column, moment: float = 0.03) -> tuple[App, LoopbackClient]:
-            app = App(columns, port=port)
+            app = App(columns, port=port, workspace=tmp_path)
             stack.callback(app.close)
             client = stack.enter_context(LoopbackClient(port))
             client.set("time (s)", moment)
@@ -84,6 +87,7 @@ def record() -> Record:
     ) -> list[Frame]:
         schema = columns[0].source.schema
         session, shown = Session(schema), Columns.of(columns).all
+        path.unlink(missing_ok=True)
         recorder = Recorder(path)
         requests = [
             ViewRequest(schema.complete(parameters or {"mass": 0.6}), time, "balanced", shown) for time in times

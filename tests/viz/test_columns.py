@@ -59,7 +59,7 @@ def test_there_is_one_truth(kick: Predictor, dataset: Dataset) -> None:
 
 def test_a_sweep_covers_the_trained_range(kick: Predictor) -> None:
     mass = kick.schema.parameters[0]
-    swept = sweep(_column(kick), kick.schema.complete({"force": 130.0}), kick.schema, mass)
+    swept = sweep(_column(kick), kick.schema.complete({"force": 130.0}), kick.schema, "mass")
     values = [c.pinned["mass"] for c in swept if c.pinned]
     assert values[0] == pytest.approx(mass.low)
     assert values[-1] == pytest.approx(mass.high)

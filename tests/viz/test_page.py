@@ -92,7 +92,7 @@ def test_another_shape_is_moved_a_broken_one_refused(kicked: Tab, tmp_path: Path
     broken.write_text("ply\n")
     good.write_text(TETRAHEDRON)
     page.get_by_role("button", name=re.compile("^Shape")).or_(page.get_by_text("Shape", exact=True)).first.click()
-    for path, said in ((broken, "broken.ply"), (good, "the model never saw such a shape")):
+    for path, said in ((broken, "broken.ply"), (good, "Shape not trained")):
         with page.expect_file_chooser() as chooser:
             kicked.button("Load a shape...").click()
         chooser.value.set_files(path)

@@ -41,7 +41,7 @@ def test_all_side_by_side_with_the_truth(models: dict[str, Predictor], truth: Re
         assert column.stats.status == "ok"
         curves = session.curves(column, request)
         assert np.isfinite(curves.deformation).all()
-        assert curves.error_band is not None
+        assert curves.error_band is None, "fewer than eight validation sequences tell nothing of nine in ten"
         assert session.frame(request).columns[1].motion is frame.columns[1].motion
 
 
@@ -81,4 +81,4 @@ def test_who_takes_long_holds_up_no_other(models: dict[str, Predictor], monkeypa
     moved = replace(request, parameters={**request.parameters, "mass": 0.6})
     assert not first.differs_in_time_only(moved)
     # the motion that took least is slow now too
-    assert session.frame(moved, include_slow=False).pending == ("fast", "node")
+    assert session.frame(moved, include_slow=False).pending == ("node",)

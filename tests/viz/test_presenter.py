@@ -15,7 +15,7 @@ from odeform_viz.columns import Column, Columns
 from odeform_viz.presenter import SETTLE, TICK, Presenter
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import Session
-from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest
 
 
 @dataclass
@@ -46,8 +46,8 @@ class Loop:
     def kinds(self) -> list[str]:
         return [kind for kind, _ in self.events]
 
-    def publish(self, frame: Frame, options: DisplayOptions, error_scale: float | None) -> None:
-        self.events.append(("publish", error_scale))
+    def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
+        self.events.append(("publish", coloring))
 
     def describe(self, description: Description) -> None:
         self.events.append(("describe", description))
@@ -127,7 +127,7 @@ def test_slow_columns_follow_the_others(loop: Loop, monkeypatch: pytest.MonkeyPa
     assert loop.serve() == 0.0
     frame = loop.presenter.frame
     assert frame is not None
-    assert frame.pending == ("model 0", "model 1")
+    assert frame.pending == ("model 1",)
     loop.ask(time=0.3)
     loop.serve()
     assert loop.presenter.frame is not None
@@ -172,13 +172,15 @@ def test_a_frame_that_was_shown_is_recorded_even_if_it_is_no_longer_wanted(loop:
     assert loop.kinds[:2] == ["publish", "log"]
 
 
-def test_the_error_scale_is_one_for_the_whole_motion_and_none_without_colours() -> None:
+def test_the_scale_is_that_of_the_errors_and_none_without_colours() -> None:
     model = StubPredictor()
     record = RecordedMotion(model.schema, recorded(model, {"mass": 0.5}))
     loop = _loop([Column("stub", model, model.rest), Column("truth", record, record.geometry)])
     loop.ask(parameters=model.schema.complete({"mass": 0.5}))
     loop.serve()
-    assert loop.presenter.error_scale == 2.0  # mm; the error is 1 mm along z at each frame
-    loop.options = DisplayOptions(error_colors=False)
-    loop.serve()
-    assert loop.presenter.error_scale is None
+    assert loop.presenter.scale is not None
+    assert 1.0 <= loop.presenter.scale.top <= 1.5  # mm; the error is 1 mm along z
+    for options in (DisplayOptions(color_by="own colours"), DisplayOptions(overlay=True)):
+        loop.options = options
+        loop.serve()
+        assert loop.presenter.scale is None

@@ -1,10 +1,13 @@
 """What is computed, and what is not."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from stubs import PEAK, StubPredictor
 
+import odeform
 from odeform import InputError
 from odeform.dataset.index import Dataset
 from odeform.geometry.shape import fit_to
@@ -183,7 +186,13 @@ def test_status_names_solver_error_as_such(session: Session, view_request: ViewR
     text = describe_column(shown, view_request.time)
     assert "solver error" in text
     assert "test error of the checkpoint" in text
-    assert f"{shown.stats.evaluations} evaluations" in text
+    assert re.search(r"\d+ evaluations", text)
+    assert "model error here: unknown, with fewer than 8 validation sequences" in text
+
+
+def test_status_says_how_far_off_the_model_is() -> None:
+    session, view_request = _alone(odeform.load("kick"))
+    text = describe_column(session.frame(view_request).columns[0], view_request.time)
     assert "model error here ≈" in text
     assert "extrapolated: rough" not in text
     later = replace(view_request, time=1.2 * session.schema.window.stop)
@@ -193,3 +202,12 @@ def test_status_names_solver_error_as_such(session: Session, view_request: ViewR
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:
     session, view_request = _alone(kick, 0.0)
     assert 0.005 < session.largest_deformation(view_request) < 0.03
+
+
+def test_the_first_impact_is_around_the_first_large_deformation() -> None:
+    stub = StubPredictor()
+    session, columns = Session(stub.schema), Columns.of([Column("stub", stub, stub.rest)]).all
+    request = ViewRequest(stub.schema.complete({}), 0.0, "balanced", columns)
+    start, stop = session.first_impact(request)
+    assert start < PEAK < stop
+    assert session.first_impact(replace(request, columns=())) == (0.0, 0.0)

@@ -68,7 +68,7 @@ def test_the_still_part_is_sent_once_for_all_columns(
     monkeypatch.setattr(viser.GaussianSplatHandle, "set_gaussians", lambda handle, *arrays: moved.append(handle))
     fit = shape_from("volleyball", kick.rest)
     columns = Columns.of([Column(name, kick, fit.geometry, fit=fit) for name in ("a", "b")])
-    session, view = Session(kick.schema), SceneView(server, 0.2, 2)
+    session, view = Session(kick.schema), SceneView(server, 0.2, lambda: None)
     request = ViewRequest(session.schema.complete({}), 0.01, "balanced", columns.all)
     for time in (0.01, 0.02):
         view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
@@ -81,7 +81,10 @@ def test_the_still_part_is_sent_once_for_all_columns(
     assert not view._stage._floor.visible
     # back to the trained body: it goes, and the floor of the viewer is there again
     columns.set_shape(None)
-    view.publish(session.frame(replace(request, columns=columns.all)), DisplayOptions(), None)
+    back = session.frame(replace(request, columns=columns.all))
+    view.publish(back, DisplayOptions(), None)
+    assert not view._stage._floor.visible  # each column has its own
+    view.publish(back, DisplayOptions(overlay=True), None)
     assert view._stage._background is None
     assert view._stage._floor.visible
 
@@ -105,7 +108,7 @@ def test_small_splats_keep_their_size_as_float16(
         splats = GaussianSplats(kick.rest.points, covariances, np.ones((count, 1, 3)), np.ones(count))
         session, columns = Session(kick.schema), Columns.of([Column("splats", kick, splats)]).all
         request = ViewRequest(session.schema.complete({}), 0.0, "balanced", columns)
-        SceneView(server, 0.2, 1).publish(session.frame(request), DisplayOptions(), None)
+        SceneView(server, 0.2, lambda: None).publish(session.frame(request), DisplayOptions(), None)
         shown, scale = sent[-1]
         assert np.allclose(
             scale**2 * shown.astype(np.float16).astype(float), covariances, rtol=1e-3, atol=1e-3 * sigma**2
@@ -200,7 +203,7 @@ def test_too_many_points_are_refused_or_thinned_out_with_a_word(
     monkeypatch.setattr("odeform_viz.fitting.MOST_POINTS", 30_000)
     fit = shape_from("volleyball", kick.rest)
     assert len(fit.source.points) == 30_000
-    assert "the 30,000 most visible of 51,482 splats" in describe_fit(fit, "volleyball", kick.rest)
+    assert "the 30,000 most visible of 51,482 splats" in describe_fit(fit, "volleyball", None)
     cloud = PointCloud(np.random.default_rng(0).normal(size=(30_001, 3)))
     monkeypatch.setattr("odeform_viz.fitting.read_shape", lambda _: (cloud, None))
     with pytest.raises(ValueError, match="30,001 points; expected at most 30,000"):

@@ -36,7 +36,7 @@ def view_request() -> ViewRequest:
 
 
 def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
-    looks = DisplayOptions(overlay=True, error_colors=False)
+    looks = DisplayOptions(overlay=True, color_by="strain", exaggeration=2.5, ghost=True)
     state = state_from_json(state_to_json(capture(SCENE, view_request, looks)), SCENE)
     columns = columns_of(state, view_request.columns[0].source.schema)
     again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks)
@@ -127,7 +127,7 @@ def test_a_wrong_shape_is_refused(view_request: ViewRequest, wrong: dict) -> Non
 def test_an_older_state_file_opens(kick: Predictor) -> None:
     state = state_from_json((Path(__file__).parent / "state-0.1.json").read_bytes(), "kick")
     assert state.time == 0.02
-    assert state.display == DisplayOptions(overlay=True, error_colors=True, follow=False)
+    assert state.display == DisplayOptions(overlay=True, color_by="error", follow=False)
     columns = columns_of(state, kick.schema)
     assert [(column.label, column.visible) for column in columns] == [("odeform", True), ("heavy", True)]
     assert columns[1].pinned == kick.schema.complete({"mass": 0.9})

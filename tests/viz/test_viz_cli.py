@@ -29,6 +29,8 @@ DEADLINE = 120.0  # s, for a busy machine
         (["--sequence", "mass-elastic/none"], "mass-elastic/none"),
         (["--device", "cuda"], "expected cpu, got cuda"),
         (["--port", "70000"], "70000"),
+        (["--host", "0.0.0.0"], "add --expose"),
+        (["--allow-origin", "*"], "--allow-origin"),
         (["--record", "/proc/nowhere/session.rrd"], "session.rrd"),
     ],
 )
@@ -85,6 +87,7 @@ def test_serves_the_bundled_model_and_completes_its_recording(tmp_path: Path) ->
             assert page.status == 200
         with LoopbackClient(port) as client:
             assert client.until(lambda: "/world/column_0/body/part_0" in client.nodes, DEADLINE)
+            assert client.until(lambda: record.stat().st_size > 100_000, DEADLINE)  # frames, and not the header alone
         process.send_signal(signal.SIGINT)
         printed, errors = process.communicate(timeout=DEADLINE)
         assert process.returncode == 0, errors

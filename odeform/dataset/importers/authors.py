@@ -5,7 +5,6 @@
 <root>/<seq>/xyz_meshes/<seq>_<k>.xyz, <seq>_<k>.ply           vertices in the body's frame; the mesh, for its faces
 """
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,16 +12,19 @@ from typing import Any
 
 import numpy as np
 
+from odeform.budget import read_limited
 from odeform.dataset.importers.natural_order import naturally_sorted, subfolders
 from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
+from odeform.io import parse_json
 from odeform.types import Faces, Floats, Frames, Mesh
 
 __all__ = ["AUTHORS_CONTACT_FORCE", "AUTHORS_MASS_ELASTIC", "authors_source", "is_authors_layout"]
 
 AUTHORS_MASS_ELASTIC, AUTHORS_CONTACT_FORCE = "released-mass-elastic", "released-contact-force"
 PARAMETERS, OFFSETS, SHAPES = "params.json", "metadata.json", "xyz_meshes"
+LARGEST_JSON = 1 << 26  # bytes
 SPLITS = ("train", "val", "test")
 
 
@@ -135,11 +137,9 @@ def _splits(root: Path, names: list[str]) -> dict[str, str]:
 
 def _json(path: Path) -> Mapping[str, Any]:
     try:
-        content = json.loads(path.read_bytes())
+        content = parse_json(read_limited(path, f"import {path}", LARGEST_JSON), f"import {path}")
     except OSError as error:
         raise InputError(f"import {path}: {error.strerror}") from None
-    except ValueError:
-        raise InputError(f"import {path}: not valid JSON") from None
     if not isinstance(content, dict):
         raise InputError(f"import {path}: expected a JSON object, got {type(content).__name__}")
     return content

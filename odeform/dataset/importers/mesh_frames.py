@@ -6,21 +6,23 @@ same in all rows) are optional. `parameters.json` is a list of such rows as obje
 """
 
 import csv
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from odeform.budget import read_limited
 from odeform.dataset.importers.natural_order import naturally_sorted, subfolders
 from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
+from odeform.io import parse_json
 from odeform.types import Faces, Frames, Mesh
 
 __all__ = ["has_table", "mesh_source"]
 
+LARGEST = 1 << 26  # bytes of a table
 ENDINGS = (".obj", ".ply")
 TABLES = ("parameters.csv", "parameters.json")
 SEQUENCE, SPLIT, RATE = "sequence", "split", "rate"
@@ -54,12 +56,21 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
         for column, value in row.items():
             if column not in (SEQUENCE, SPLIT, RATE):
                 parameter, _, unit = column.partition("(")
-                units[parameter.strip()] = unit.rstrip(") ")
-                parameters[parameter.strip()] = _number(value, f"import {table}: {name}: {column}")
+                parameter = parameter.strip()
+                if parameter in parameters:
+                    raise InputError(f"import {table}: two columns of the parameter {parameter!r}")
+                units[parameter] = unit.rstrip(") ")
+                parameters[parameter] = _number(value, f"import {table}: {name}: {column}")
         files = naturally_sorted(path for path in folders[name].iterdir() if path.suffix.lower() in ENDINGS)
         sequences.append(SourceSequence(name, parameters, len(files), lambda files=files: _read(files), split))
     if len({found.name for found in sequences}) != len(sequences):
         raise InputError(f"import {table}: expected each sequence only once")
+    without = [found.name for found in sequences if not found.split]
+    if 0 < len(without) < len(sequences):
+        raise InputError(
+            f"import {table}: expected a split for every sequence or for none, got none for {without[0]}"
+            + (f" and {len(without) - 1} more" if len(without) > 1 else "")
+        )
     made = {"imported": root.name, "layout": "meshes"}
     return Source(f"imported-{root.name}", _rate(rows, table, rate), tuple(sequences), units, provenance=made)
 
@@ -70,15 +81,21 @@ def _table(root: Path) -> Path | None:
 
 def _rows(table: Path) -> list[Row]:
     try:
-        text = table.read_text(encoding="utf-8-sig")
+        text = read_limited(table, f"import {table}", LARGEST).decode("utf-8-sig")
         if table.suffix == ".json":
-            rows = json.loads(text)
+            rows = parse_json(text, f"import {table}")
             if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
                 raise ValueError("expected a list of objects, one per sequence")
         else:
-            rows: list[Row] = [*csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)]
+            reader = csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)
+            names = list(reader.fieldnames or ())
+            if doubled := [name for name in names if names.count(name) > 1]:
+                raise ValueError(f"two columns {doubled[0]!r}")
+            rows: list[Row] = [*reader]
             if any(None in row or None in row.values() for row in rows):
                 raise ValueError("expected the same number of cells in every row")
+    except InputError:
+        raise
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(f"import {table}: cannot be read: {error}") from None
     if not rows or not all(SEQUENCE in row for row in rows):
@@ -100,7 +117,7 @@ def _rate(rows: list[Row], table: Path, given: float | None) -> float:
 def _number(value: Any, where: str) -> float:
     try:
         return float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: expected a number, got {value!r}") from None
 
 

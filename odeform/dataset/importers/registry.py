@@ -38,6 +38,8 @@ def import_dataset(source: str | Path, out: str | Path, rate: float | None = Non
     for a layout that none recognises, for an inconsistent one, and if no sequence can be read.
     """
     root, to = Path(source), Path(out)
+    if seed < 0:
+        raise InputError(f"import: expected a seed of at least 0, got {seed}")
     if not root.is_dir():
         raise InputError(f"import {root}: no such folder")
     if to.resolve() == root.resolve():

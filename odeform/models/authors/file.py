@@ -5,12 +5,14 @@ The kind of network follows from the shapes of its weights; `args` only says whi
 
 import hashlib
 import io
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from odeform.budget import require_memory
 from odeform.checkpoint import Checkpoint, checkpoint_bytes
 from odeform.dataset.importers.authors import AUTHORS_CONTACT_FORCE, AUTHORS_MASS_ELASTIC
 from odeform.errors import InputError
@@ -25,6 +27,7 @@ ENDING = ".pth"
 MODEL = "released"
 PARTS = {"global": "model1_state_dict", "local": "model2_state_dict"}
 MOST_FRAMES = 10_000
+NUMBER_BYTES = 12  # of memory while reading
 RADIUS, SEGMENTS = 0.1, 8  # of the ball that serves as body: metres, and edges per side of an octant
 
 SCENES = {1: AUTHORS_MASS_ELASTIC, 3: AUTHORS_CONTACT_FORCE}
@@ -51,7 +54,7 @@ def read_authors_checkpoint(path: str | Path) -> Checkpoint:
         networks = Networks.read(arrays)
         scene = SCENES[networks.offsets]
         first, count, rate = _frames(content.get("args"), scene)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError) as error:
         raise InputError(f"checkpoint {path}: not one of the released networks: missing or wrong {error}") from None
     ball = octasphere(RADIUS, SEGMENTS)
     return Checkpoint(
@@ -68,6 +71,7 @@ def read_authors_checkpoint(path: str | Path) -> Checkpoint:
 def _loaded(data: bytes, path: Path) -> Mapping[str, Any]:
     import torch
 
+    _require_stored(data, path)
     try:
         content = torch.load(io.BytesIO(data), map_location="cpu", weights_only=True)
     except Exception:
@@ -80,6 +84,17 @@ def _loaded(data: bytes, path: Path) -> Mapping[str, Any]:
     return content
 
 
+def _require_stored(data: bytes, path: Path) -> None:
+    """`InputError` for an archive whose members are compressed: they could be of any size."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+    except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError):
+        return  # the older format, or damaged: PyTorch says so
+    if any(member.compress_type != zipfile.ZIP_STORED for member in members):
+        raise InputError(f"checkpoint {path}: expected stored members, as PyTorch writes, got compressed ones")
+
+
 def _arrays(state: Any, path: Path, key: str) -> Arrays:
     """A state dict as float32 arrays; its counters of batches are left out."""
     import torch
@@ -87,11 +102,14 @@ def _arrays(state: Any, path: Path, key: str) -> Arrays:
     if not isinstance(state, Mapping) or not state:
         raise InputError(f"checkpoint {path}: expected a dict of weights at {key}, got {type(state).__name__}")
     arrays: Arrays = {}
+    total = sum(value.numel() for value in state.values() if isinstance(value, torch.Tensor))
+    # views of one number, with strides of zero, may claim any size
+    require_memory(f"checkpoint {path}", f"{total:,} numbers at {key}", NUMBER_BYTES * total)
     for name, value in state.items():
         if not isinstance(value, torch.Tensor) or value.layout != torch.strided or value.is_quantized:
             raise InputError(f"checkpoint {path}: {key}: expected a dense tensor at {name!r}")
         if value.is_floating_point():
-            arrays[str(name)] = value.detach().to(torch.float32).numpy()
+            arrays[str(name)] = value.detach().to(torch.float32).contiguous().numpy()
             if not np.isfinite(arrays[str(name)]).all():
                 raise InputError(f"checkpoint {path}: {key}: {name!r} contains numbers that are not finite")
     return arrays

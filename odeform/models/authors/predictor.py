@@ -19,7 +19,7 @@ from odeform.motion.base import SolveStats
 from odeform.motion.recent import Recent
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Frames, GaussianSplats, Geometry, MotionSequence
+from odeform.types import Frames, GaussianSplats, Geometry, Mesh, MotionSequence
 
 __all__ = ["AuthorsModel"]
 
@@ -48,6 +48,11 @@ class AuthorsModel(Predictor):
         if (np.diff(self._times) <= 0.0).any():
             raise ValueError(f"frames at least 10 ms apart, at {self.schema.window.rate:g} per second")
         self._in_body_frame: Recent[tuple[Geometry, Geometry]] = Recent(CACHED)
+
+    @property
+    def bodies(self) -> tuple[Mesh, ...]:
+        """None: the file does not hold the body that was trained."""
+        return ()
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         """A body at rest in the scene, in its own frame: without the initial offset. The last few are kept."""

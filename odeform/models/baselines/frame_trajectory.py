@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from odeform.errors import InputError
 from odeform.motion.base import SolveStats
 from odeform.types import Floats
 
@@ -16,9 +17,16 @@ class FrameTrajectory:
     """Reduced coordinates at frames, a cubic spline between them, and the last frame held beyond."""
 
     def __init__(self, name: str, times: Floats, predict: Callable[[], Floats]) -> None:
-        """`predict` returns (T, 6 + K) at the (T,) `times` in seconds; its run time goes into `stats`."""
+        """`predict` returns (T, 6 + K) at the (T,) `times` in seconds; its run time goes into `stats`.
+
+        Raises `InputError` where that is not finite: the model's file is damaged.
+        """
         begin = time.perf_counter()
-        self._spline = CubicSpline(times, predict(), axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):
+            frames = predict()
+        if not np.isfinite(frames).all():
+            raise InputError(f"{name}: the checkpoint predicts numbers that are not finite")
+        self._spline = CubicSpline(times, frames, axis=0)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         self._name, self._times = name, times
         self._origin = self._spline(times[0])

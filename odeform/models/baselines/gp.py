@@ -1,40 +1,28 @@
 """Kernel ridge regression over the parameters: the posterior mean of a Gaussian process, and a strong rival.
 
 Matern 5/2 kernel with a length scale for each parameter (Rasmussen and Williams 2006, 4.2 and 2.2), on the POD
-coefficients of whole trajectories. Length scales and ridge minimise the error on validation.
+coefficients of whole trajectories. Length scales and ridge minimise the error on validation. In scenes with a contact
+and a force it works in the contact's frame (`odeform.models.contact.regression`).
 """
 
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.baselines.frame_trajectory import FrameTrajectory
 from odeform.models.baselines.trajectory_pod import fit_trajectory_pod
+from odeform.models.contact.inputs import contact_inputs, has_contact
+from odeform.models.contact.kernel import matern
+from odeform.models.contact.regression import ContactRegression, fit_contact_regression
+from odeform.models.kernel_search import Ridge, search_ridge
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
 
-__all__ = ["GaussianProcess", "matern"]
-
-STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
-RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0
-EVALUATIONS = 150  # of the validation error, from each start
-BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
-
-
-def matern(
-    one: Float[np.ndarray, "rows parameters"], other: Float[np.ndarray, "columns parameters"]
-) -> Float[np.ndarray, "rows columns"]:
-    """(1 + r + r^2 / 3) exp(-r), r = sqrt(5) times the distance of inputs that are divided by their length scales."""
-    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
-    r = np.sqrt(5.0 * np.maximum(squares, 0.0))
-    return (1.0 + r + r**2 / 3.0) * np.exp(-r)
+__all__ = ["GaussianProcess"]
 
 
 class GaussianProcess(FittedModel):
@@ -45,49 +33,46 @@ class GaussianProcess(FittedModel):
     def _read(self, checkpoint: Checkpoint) -> None:
         super()._read(checkpoint)
         arrays = checkpoint.arrays
+        self._contact = ContactRegression(arrays, checkpoint.config) if "blend" in checkpoint.config else None
+        if self._contact is not None:
+            self._times = arrays["times"]
+            return
         self._times, self._mean, self._modes = arrays["times"], arrays["pod.mean"], arrays["pod.modes"]
         self._scales = np.array(checkpoint.config["length_scales"], dtype=float)
+        if not (np.isfinite(self._scales) & (self._scales > 0.0)).all():
+            raise ValueError(f"length_scales: expected positive numbers, got {self._scales}")
         self._inputs, self._weights = arrays["theta"] / self._scales, arrays["gp.weights"]
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
         """Length scales and ridge by Nelder-Mead on the RMS displacement on validation, from several starts."""
+        if has_contact(data.schema):
+            known, asked = (contact_inputs(data.schema, data.theta[split], data.space) for split in ("train", "val"))
+            return fit_contact_regression(known, asked, data.times, data.reduced["train"], data.reduced["val"])
         pod = fit_trajectory_pod(data)
         train, val = data.theta["train"], data.theta["val"]
 
-        def weights(settings: Floats) -> Floats:
-            scales, ridge = np.exp(settings[:-1]), np.exp(settings[-1])
-            kernel = matern(train / scales, train / scales) + ridge * np.eye(len(train))
-            return cho_solve(cho_factor(kernel), pod.coefficients)
+        def error(ridge: Ridge) -> float:
+            return pod.error(ridge.predict(val, train, pod.coefficients), data.reduced["val"])
 
-        def error(settings: Floats) -> float:
-            scales = np.exp(settings[:-1])
-            try:
-                predicted = matern(val / scales, train / scales) @ weights(settings)
-            except np.linalg.LinAlgError:
-                return float("inf")  # the kernel matrix is singular to rounding
-            return pod.error(predicted, data.reduced["val"])
+        found = search_ridge(train.shape[1], error)
+        weights = found[0].weights(train, pod.coefficients)
+        arrays = {"times": data.times, "theta": train, "gp.weights": weights, **pod.arrays()}
+        trials = [{**_named(trial), "val": trial.error} for trial in found]
+        return arrays, {**_named(found[0]), "modes": len(pod.modes), "trials": trials}
 
-        length, ridge = BOUNDS
-        bounds = [*[length] * train.shape[1], ridge]
-        starts = [np.log([*[scale] * train.shape[1], RIDGE]) for scale in STARTS]
-        limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
-        found = [minimize(error, start, method="Nelder-Mead", bounds=bounds, options=limits) for start in starts]
-        best = min(found, key=lambda trial: trial.fun)
-        arrays = {"times": data.times, "theta": train, "gp.weights": weights(best.x), **pod.arrays()}
-        trials = [{**_named(trial.x), "val": trial.fun} for trial in found]
-        return arrays, {**_named(best.x), "modes": len(pod.modes), "trials": trials}
-
-    def _trajectory(
+    def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> FrameTrajectory:
         def predict() -> Floats:
+            if self._contact is not None:
+                return self._contact.predict(contact_inputs(self.schema, theta[None], self.space))[0]
             coefficients = matern(theta[None] / self._scales, self._inputs)[0] @ self._weights
             return (self._mean + coefficients @ self._modes).reshape(len(self._times), -1)
 
         return FrameTrajectory("kernel ridge regression", self._times, predict)
 
 
-def _named(settings: Floats) -> dict[str, Any]:
-    """Length scales and ridge from their logarithms, as a checkpoint holds them."""
-    return {"length_scales": np.exp(settings[:-1]).tolist(), "ridge": float(np.exp(settings[-1]))}
+def _named(ridge: Ridge) -> dict[str, Any]:
+    """The settings as a checkpoint holds them."""
+    return {"length_scales": ridge.scales.tolist(), "ridge": ridge.ridge}

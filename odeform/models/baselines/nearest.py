@@ -34,7 +34,7 @@ class Nearest(FittedModel):
         arrays = {"pose": pose.astype(np.float32), "local": local.astype(np.float16)}
         return {"times": data.times, "theta": data.theta["train"], **arrays}, {}
 
-    def _trajectory(
+    def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> FrameTrajectory:
         row = int(((self._theta - theta) ** 2).sum(axis=1).argmin())

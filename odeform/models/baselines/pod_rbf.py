@@ -35,11 +35,14 @@ class PodRbf(FittedModel):
         super()._read(checkpoint)
         arrays, config = checkpoint.arrays, checkpoint.config
         self._times, self._mean, self._basis = arrays["times"], arrays["pod.mean"], arrays["pod.modes"]
+        smoothing = float(config["smoothing"])
+        if not 0.0 <= smoothing < np.inf:
+            raise ValueError(f"smoothing: expected a finite number of 0 or more, got {smoothing:g}")
         self._interpolate = RBFInterpolator(
             arrays["theta"].astype(float),
             arrays["pod.coefficients"].astype(float),
             kernel=config["kernel"],
-            smoothing=config["smoothing"],
+            smoothing=smoothing,
         )
 
     @staticmethod
@@ -68,7 +71,7 @@ class PodRbf(FittedModel):
         trials = [{"kernel": k, "smoothing": g, "val": e} for (k, g), e in zip(candidates, errors, strict=True)]
         return arrays, {"kernel": kernel, "smoothing": smoothing, "modes": len(pod.modes), "trials": trials}
 
-    def _trajectory(
+    def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> FrameTrajectory:
         def predict() -> Floats:

@@ -19,7 +19,7 @@ from odeform.schema import Parameters, Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, GaussianSplats, Geometry, MotionSequence, Points
 
-__all__ = ["PointModel", "point_checkpoint"]
+__all__ = ["PREFIX", "PointModel", "frame_from_json", "frame_to_json", "point_checkpoint"]
 
 PREFIX = "net."
 
@@ -34,7 +34,7 @@ class PointModel(Predictor):
     trajectory: type[MomentaryPoints | FramedPoints]
 
     def _read(self, checkpoint: Checkpoint) -> None:
-        self.frame = _frame_from_json(checkpoint.config["frame"])
+        self.frame = frame_from_json(checkpoint.config["frame"])
         weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         for name, shape in layer_shapes(self.network.sizes(len(self.schema.learned), checkpoint.config["width"])):
             if weights[name].shape != shape or not np.isfinite(weights[name]).all():
@@ -61,18 +61,24 @@ class PointModel(Predictor):
             raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
         rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
         moved, body = (self._trajectory(x, parameters, observed) for x in (rest, self._probes.points))
-        return PointMotion(self.schema, parameters, geometry, self.frame, self.mean, self._probes, moved, body)
+        frame, mean, probes = self.frame, self.mean, self._probes
+        return PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.trust)
 
 
-def _frame_to_json(frame: PointFrame) -> dict[str, Any]:
-    """Files call the radius of gyration `arm`."""
+def frame_to_json(frame: PointFrame) -> dict[str, Any]:
+    """The frame as JSON. Files call the radius of gyration `arm`."""
     values = asdict(frame)
     return {"arm": values.pop("gyration_radius"), **values}
 
 
-def _frame_from_json(data: Mapping[str, Any]) -> PointFrame:
+def frame_from_json(data: Mapping[str, Any]) -> PointFrame:
+    """The frame of a file; `KeyError`, `TypeError` or `ValueError` where something is missing or wrong."""
     values = dict(data)
-    return PointFrame(tuple(values.pop("anchor")), values.pop("arm"), **values)
+    x, y, z = map(float, values.pop("anchor"))
+    sizes = {name: float(value) for name, value in values.items()}
+    if not np.isfinite([x, y, z]).all() or not all(0.0 < size < np.inf for size in sizes.values()):
+        raise ValueError(f"frame: expected a finite anchor and positive lengths, got {dict(data)}")
+    return PointFrame((x, y, z), sizes.pop("arm"), **sizes)
 
 
 def point_checkpoint(
@@ -81,4 +87,4 @@ def point_checkpoint(
     """The checkpoint of a point model, without the body that viewers show."""
     arrays = {PREFIX + name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
     arrays |= {"mean.times": mean.times, "mean.shifts": mean.shifts}
-    return Checkpoint(model, schema, {"frame": _frame_to_json(frame), **config}, arrays)
+    return Checkpoint(model, schema, {"frame": frame_to_json(frame), **config}, arrays)

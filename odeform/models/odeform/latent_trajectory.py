@@ -1,23 +1,27 @@
 """The latent state of an object over time: integrated once, decoded at any time."""
 
 import time
+from collections.abc import Callable, Mapping
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
+from odeform.cancellation import check_cancelled
 from odeform.models.odeform.inference import Decoder
 from odeform.motion.base import SolveStats
 from odeform.motion.recent import Recent
-from odeform.motion.reduced_space import small_motion
+from odeform.motion.reduced_space import motion_rmse
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Field
-from odeform.solver.registry import get_method
 from odeform.solver.solution import Solution, Status
 from odeform.types import Floats
 
 __all__ = ["LatentTrajectory"]
 
-ROUNDING_MM = 1e-3  # of states in single precision: `odeform stress` finds about half as much
+MOMENTS = 128  # times at which the error of the solver is measured
+FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in ((1e-6, 1e-4), (1e-9, 0.0))}
+"""The finer solutions that errors are measured against -> error in mm from which on each suffices."""
 RECENT = 4  # results that are kept: pose, deformation and gradient of a time are evaluated one after the other
 
 
@@ -36,8 +40,15 @@ class LatentTrajectory:
         fallback: SolverSettings,
         until: float,
         gyration_radius: float,
+        precise: Callable[[], tuple[Field, Floats]],
+        finer: Mapping[SolverSettings, float] = MappingProxyType(FINER),
     ) -> None:
-        """Integrate from `start` (state,) at time 0 to `until` seconds."""
+        """Integrate from `start` (state,) at time 0 to `until` seconds.
+
+        `precise` returns the field and the start in double precision, to measure the error of the solution by `finer`
+        ones (`FINER`).
+        """
+        self._precise, self._finer = precise, finer
         self._field, self._decode, self._gyration_radius = field, decode, gyration_radius
         self._quality, self._fallback = quality, fallback
         begin = time.perf_counter()
@@ -87,27 +98,26 @@ class LatentTrajectory:
 
     @cached_property
     def _error_mm(self) -> float | None:
-        """Step doubling (Hairer, Norsett & Wanner, Solving ODEs I, II.4): largest error over the span, in RMS mm.
+        """RMS over coordinates, points and the span, in mm: the difference from a finer solution in double precision.
 
-        The same integration with twice the step, or ten times the tolerance, differs from this one by a multiple of
-        its error: 2^p - 1 or 9 in the limit of small steps, less where the field bends within a step, at the kick and
-        at landings. Divided by 2 (Euler: 1) or 6, it overestimates rather than underestimates the error of such
-        motions. Rounding in single precision, which both share, is added.
+        Where that difference is so small that the finer solution's own error matters, an even finer one is computed.
         """
-        quality = self._quality
-        if quality.step is not None:
-            coarse = SolverSettings(quality.method, step=2.0 * quality.step)
-            share = min(2.0, 2.0 ** get_method(quality.method).order - 1.0)
-        else:
-            coarse, share = SolverSettings(quality.method, tolerance=10.0 * (quality.tolerance or 0.0)), 6.0
-        with np.errstate(all="ignore"):
-            other = integrate(self._field, self._solution.states[0], coarse, self._span)
-        if other.status is not Status.OK or self._solution.status is not Status.OK:
+        if self._last.status is not Status.OK or self._rest is not None:
             return None
-        times = np.linspace(0.0, self._span, 129)[1:]
-        difference = self._decode(times, self._solution.sample(times)) - self._decode(times, other.sample(times))
-        rounding = ROUNDING_MM if quality.dtype == "float32" else 0.0
-        return float(1e3 * small_motion(difference, self._gyration_radius).max() / share) + rounding
+        field, start = self._precise()
+        times = np.linspace(0.0, self._span, MOMENTS + 1)[1:]
+        mine = self._decode(times, self._solution.sample(times))
+        error = None
+        for finer, enough in self._finer.items():
+            with np.errstate(all="ignore"):
+                other = integrate(field, start, finer, self._span, before_step=check_cancelled)
+            if other.status is not Status.OK:
+                break
+            truth = self._decode(times, other.sample(times))
+            error = 1e3 * motion_rmse(mine, truth, self._gyration_radius)
+            if error >= enough:
+                break
+        return error
 
     @property
     def stats(self) -> SolveStats:

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.continuation import ContinuedTrajectory, Dynamics
 from odeform.models.frontier import FrontierPoint
 from odeform.models.odeform.config import ModelConfig
+from odeform.models.odeform.correction import Correction
 from odeform.models.odeform.inference import Decoder, Field, make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.odeform.sensitivity import Sensitivities, make_sensitivities
@@ -16,7 +16,6 @@ from odeform.models.odeform.weights import check_weights
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
-from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
@@ -43,8 +42,8 @@ class ODeform(ReducedModel):
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
-        coordinates = POSE + self.config.modes
-        self.dynamics = Dynamics.from_arrays(checkpoint.arrays, coordinates, self.config.parameters)
+        coordinates = self.space.basis.modes + POSE
+        self.correction = Correction.from_arrays(checkpoint.arrays, coordinates, self.config.parameters)
         self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
     def _pool(self, evaluated: EvaluatedBasis) -> list[Floats]:
@@ -54,20 +53,19 @@ class ODeform(ReducedModel):
 
         return self._pooled.get(id(evaluated), pooled)[1]
 
-    def _trajectory(
+    def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
-    ) -> Trajectory:
+    ) -> LatentTrajectory:
         assert settings is not None
-        if self.dynamics is None:
-            return self.integrate(theta, evaluated, settings, until)
-        window = self.schema.window
-        solved = self.integrate(theta, evaluated, settings, min(until, window.stop))
-        return ContinuedTrajectory(solved, self.dynamics, theta, window)
+        return self.integrate(theta, evaluated, settings, until)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
         """The initial value problem for theta (P,) in [-1, 1]: the field dz/dt = f(t, z), the state at time 0, and the
         decoder of states."""
-        return self._fields[dtype](theta), self._encode(self._pool(evaluated), theta, dtype), self._decoder(theta)
+        decode, correction = self._decoder(theta), self.correction
+        if correction is not None:
+            decode = _corrected(decode, correction, theta)
+        return self._fields[dtype](theta), self._encode(self._pool(evaluated), theta, dtype), decode
 
     def integrate(
         self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float
@@ -75,14 +73,26 @@ class ODeform(ReducedModel):
         """The latent motion for theta (P,) in [-1, 1], solved to `until` seconds."""
         field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
         fallback = SolverSettings("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
-        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius)
+
+        def precise() -> tuple[Field, Floats]:
+            return self.problem(theta, evaluated, np.float64)[:2]
+
+        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius, precise)
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Float[np.ndarray, "jet times y"]:
         """(1 + P, T, 6 + K): the motion y of the trained body under theta (P,) in [-1, 1] at (T,) seconds, and its
         derivatives by each parameter. It does not include what continues the motion beyond the window."""
         body = self.evaluate_basis(self.rest, 0.0)
-        return self._sensitivities(self._pool(body), theta, quality, self.schema.window.soft_clamped(times))
+        clock = self.schema.window.soft_clamped(times)
+        jet = self._sensitivities(self._pool(body), theta, quality, clock)
+        correction = self.correction
+        return jet if correction is None else correction.shares * jet + correction.jet(theta)(clock)
 
     @cached_property
     def _sensitivities(self) -> Sensitivities:
         return make_sensitivities(self.weights, self.config)
+
+
+def _corrected(decode: Decoder, correction: Correction, theta: Floats) -> Decoder:
+    rest = correction.over_time(theta)
+    return lambda times, states: correction.shares * decode(times, states) + rest(times)

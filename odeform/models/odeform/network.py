@@ -105,6 +105,8 @@ class ODeformNet(nn.Module):
 
     gains: torch.Tensor
     time_scale: torch.Tensor
+    flow: torch.Tensor
+    visible_conditions: torch.Tensor
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -120,6 +122,9 @@ class ODeformNet(nn.Module):
         self.local_decoder = Decoder(sizes)
         self.register_buffer("gains", torch.ones(POSE + config.modes))
         self.register_buffer("time_scale", torch.ones(()))
+        # factors of the fields and of the conditions of decoders, which an ablation sets to zero
+        self.register_buffer("flow", torch.ones(()), persistent=False)
+        self.register_buffer("visible_conditions", torch.ones(1 + config.parameters), persistent=False)
 
     def widen(self, count: int) -> None:
         """Make room for `count` random features in each decoder, in place."""
@@ -156,7 +161,7 @@ class ODeformNet(nn.Module):
             first, second, last = (layer for layer in field if isinstance(layer, nn.Linear))
             inputs = first.in_features - self.config.parameters
             weight, bias = first.weight[:, :inputs], first.bias + theta @ first.weight[:, inputs:].T
-            rate = 1.0 / self.time_scale
+            rate = self.flow / self.time_scale
             branches.append(
                 Branch(inputs, state, weight, bias, second.weight, second.bias, last.weight * rate, last.bias * rate)
             )
@@ -166,7 +171,7 @@ class ODeformNet(nn.Module):
         """(T,) seconds, (B, P) -> (T, B, 1 + P): the clock and the parameters, for the decoders."""
         clock = 2.0 * times / (times + self.config.clock) - 1.0
         shape = len(times), len(theta), -1
-        return torch.cat([clock[:, None, None].expand(*shape), theta.expand(*shape)], dim=-1)
+        return self.visible_conditions * torch.cat([clock[:, None, None].expand(*shape), theta.expand(*shape)], dim=-1)
 
     def decode(self, states: torch.Tensor, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
         """(T, B, state) at (T,) seconds, (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""

@@ -26,10 +26,12 @@ from odeform.simulation.scene import Scene
 from odeform.simulation.stepping import run
 from odeform.types import Floats, MotionSequence, Points
 
-__all__ = ["PULSE", "SCENE", "glyphs", "simulate"]
+__all__ = ["ARROW", "PULSE", "SCENE", "glyphs", "simulate"]
 
 PULSE = 0.020  # s
 SPREAD = math.radians(25.0)  # angular width of the pulse around the struck point
+ARROW = 0.32  # length of the arrow at the highest force, in sizes of the body
+ABOVE = 0.9  # of the way from the struck point back to the floor, which a steep arrow may take
 
 SCHEMA = Schema(
     scene="kick",
@@ -87,17 +89,21 @@ def simulate(
 
 
 def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
-    """The pulse, on the side towards which it drives the body, with a length in proportion to its force.
+    """The pulse, as an arrow whose tip is at the struck point, with a length in proportion to its force.
 
-    It acts on the far side, low at the back, where the floor would hide most of an arrow.
+    The steeper of them are shorter, so that they begin above the floor.
     """
     if not {"force", "elevation"} <= set(parameters):
         return ()
     force, size = parameters["force"], float(np.ptp(rest_points, axis=0).max())
     direction = rotation_z(parameters.get("azimuth", 0.0)) @ pulse_direction(parameters["elevation"])
-    start = 0.5 * (rest_points.min(axis=0) + rest_points.max(axis=0)) + 0.55 * size * direction
+    struck = 0.5 * (rest_points.min(axis=0) + rest_points.max(axis=0)) - 0.5 * size * direction
     high = next(p.high for p in SCHEMA.parameters if p.name == "force")
-    return (Arrow(start, size * max(force, 0.0) / high * direction, f"{force:.0f} N", 0.0, PULSE),)
+    floor = 0.5 / max(float(direction[2]), 1e-6) - 0.5  # bodies stand on the floor
+    vector = min(ARROW, ABOVE * floor) * size * max(force, 0.0) / high * direction
+    # a flat shape is struck further up than a ball, for the same reason
+    struck[2] += max(float(rest_points[:, 2].min()) - (struck - vector)[2], 0.0)
+    return (Arrow(struck - vector, vector, f"{force:.0f} N", 0.0, PULSE),)
 
 
 SCENE = Scene(

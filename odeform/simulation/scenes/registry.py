@@ -10,6 +10,7 @@ __all__ = ["SCENES", "find_scene", "get_scene", "known_scenes"]
 SCENES: dict[str, str] = {
     "mass-elastic": "odeform.simulation.scenes.mass_elastic:SCENE",
     "kick": "odeform.simulation.scenes.kick:SCENE",
+    "contact-force": "odeform.simulation.scenes.contact_force:SCENE",
 }
 """Scene name to "module:attribute", imported when the scene is first asked for."""
 

@@ -5,7 +5,8 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
-from odeform.models.baselines.gp import GaussianProcess, matern
+from odeform.models.baselines.gp import GaussianProcess
+from odeform.models.contact.kernel import matern
 
 
 @pytest.fixture(scope="module")

@@ -174,7 +174,7 @@ def test_damaged_weights_are_refused(point_models: dict[str, Path], model: str, 
     for wrong in ({name: np.full_like(checkpoint.arrays[name], np.nan)}, {name: np.zeros((2, 2), np.float32)}):
         broken = replace(checkpoint, arrays={**checkpoint.arrays, **wrong})
         write_checkpoint(tmp_path / "broken.safetensors", broken)
-        with pytest.raises(InputError, match="finite numbers of shape"):
+        with pytest.raises(InputError, match=r"not finite|finite numbers of shape"):
             load(tmp_path / "broken.safetensors")
 
 

@@ -1,5 +1,6 @@
-"""Hundreds of random inputs to all panels; `python -m odeform_viz.benchmark --soak` sends thousands."""
+"""Hundreds of random inputs and all scripts; `python -m odeform_viz.benchmark --soak` goes on for an hour."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -7,33 +8,56 @@ import pytest
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform.types import MotionSequence
 from odeform_viz.app import App
-from odeform_viz.benchmark.soak import soak
+from odeform_viz.benchmark.soak import Soak, soak
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels import truth
 from odeform_viz.runtime import jobs
+
+FRAMES = 600  # of a stub of a simulation, over its whole window
 
 
 @pytest.mark.slow
 def test_random_input_to_all_panels_breaks_nothing(
     drop: Predictor, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(truth, "simulate_motion", _refuse)
+    monkeypatch.setattr(truth, "simulate_motion", at_rest)
     rival = load("mass-elastic/pod-rbf")
     columns = [
         Column("odeform", drop, drop.rest, origin="mass-elastic"),
         Column("pod-rbf", rival, rival.rest, origin="mass-elastic/pod-rbf"),
         truth_column("mass-elastic/mass-elastic_00001"),
     ]
-    app = App(columns, port=0)
+    app = App(columns, port=0, workspace=tmp_path)
     try:
-        result = soak(app, 300, tmp_path, parts=2)
+        result = soak(app, 200, tmp_path, parts=1)
     finally:
         app.close()
     assert result.errors == ()
     assert np.isfinite(result.newest_s).all()
-    assert result.requests == 300
+    assert result.requests > 200
 
 
-def _refuse(report: jobs.Report, *_: object) -> None:
-    raise RuntimeError("no simulator in this test")
+def at_rest(report: jobs.Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:
+    """In place of a simulation; in this module, for the job's process to find it."""
+    rest = load(scene).rest
+    frames = np.tile(rest.points, (FRAMES, 1, 1))
+    weights = np.full(len(rest.points), 1.0 / len(rest.points), dtype=np.float32)
+    time.sleep(2.0)  # there is something to cancel
+    return MotionSequence(np.arange(FRAMES) / rate, frames, rest.faces, weights, parameters)
+
+
+@pytest.mark.parametrize(
+    ("errors", "newest", "resident", "passed"),
+    [
+        ((), (0.1, 0.1), (500.0, 505.0, 510.0), True),
+        (("fit: expected within 60 s: estimates",), (0.1,), (500.0,), False),
+        ((), (0.1, np.inf), (500.0, 500.0), False),
+        ((), (0.1, 0.1), (500.0, 500.0, 530.0), False),
+    ],
+)
+def test_a_soak_passes_within_its_bars(
+    errors: tuple[str, ...], newest: tuple[float, ...], resident: tuple[float, ...], passed: bool
+) -> None:
+    assert Soak(100, 0, errors, newest, resident, 1.0).passed is passed

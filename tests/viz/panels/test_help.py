@@ -1,5 +1,7 @@
 """Help: for each client alone, and it names every key."""
 
+import pytest
+
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.help import TABS
@@ -9,7 +11,12 @@ def test_help_names_tabs_and_keys(kicked: tuple[App, LoopbackClient]) -> None:
     _, client = kicked
     text = client.text()
     assert all(f"**{tab}**" in text for tab in TABS)
-    assert all(f"**{key}**" in text for key in "KJL0POCH")
+    assert all(f"**{key}**" in text for key in ("Space", "←", "→", *"KJL0POCBGH"))
+
+
+def test_no_key_does_two_things(stubbed: tuple[App, LoopbackClient]) -> None:
+    with pytest.raises(ValueError, match="hot key K: expected one that is free"):
+        stubbed[0].page.add_hotkey("X K", "nothing", lambda: None)
 
 
 def test_help_opens_for_who_asks_and_closes_again(kicked: tuple[App, LoopbackClient], port: int) -> None:

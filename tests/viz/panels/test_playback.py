@@ -13,7 +13,7 @@ FRAME = 1.0 / 120.0
 
 def test_steps_lie_on_frames_by_button_and_by_key(kicked: Kicked) -> None:
     app, client = kicked  # at 0.03 s, between frames 3 and 4
-    for way, frame in (("▶", 5), ("▶", 6), ("◀", 5)):
+    for way, frame in (("next", 5), ("next", 6), ("prev", 5)):
         client.set("go to", way)
         assert client.until(lambda frame=frame: app.clock.time() == pytest.approx(frame * FRAME))
     for key, frame in (("Next frame", 6), ("Previous frame", 5), ("Go to the start", 0), ("Previous frame", 0)):
@@ -54,7 +54,10 @@ def test_play_is_a_button_and_a_key_and_says_what_it_would_do(kicked: Kicked) ->
     app, client = kicked
     client.click("Play")
     assert client.until(lambda: app.clock.playing and "Pause" in client.controls)
-    client.press("Play or pause")
+    for command in ("Play or pause", "Play or pause (K)", "Play or pause"):
+        playing = app.clock.playing
+        client.press(command)
+        assert client.until(lambda playing=playing: app.clock.playing is not playing)
     assert client.until(lambda: not app.clock.playing and "Play" in client.controls)
 
 

@@ -6,15 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.columns import Column, Columns
+from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.panels.playback import PlaybackPanel
+from odeform_viz.panels.plot_legend import legend_html, values_html
 from odeform_viz.panels.plots import PlotPanel
-from odeform_viz.panels.plots_svg import Line, cursor_svg, plots_svg
+from odeform_viz.panels.plots_svg import WIDE, Line, cursor_css, plots_html, quantities_of
+from odeform_viz.panels.status import describe_column
+from odeform_viz.rendering.titles import title_of
 from odeform_viz.session import Session
-from odeform_viz.view import ViewRequest
+from odeform_viz.view import REACH, ViewRequest
 
 
 @pytest.fixture(scope="module")
@@ -24,36 +28,99 @@ def line(drop: Predictor) -> Line:
     return ("odeform", (206, 78, 26), session.curves(session.frame(request).columns[0], request))
 
 
-def test_there_is_a_plot_a_quantity_and_a_path_a_line(line: Line, drop: Predictor) -> None:
+def test_there_is_a_plot_per_quantity_and_a_curve_per_column(line: Line, drop: Predictor) -> None:
     line = (*line[:2], replace(line[2], error_band=None))
-    svg = plots_svg([line, line], drop.schema.window, rotates=False)
-    assert re.findall(r"height of the centre|rotation, degrees|deformation RMS|error RMS", svg) == [
+    html = plots_html([line, line], drop.schema.window, rotates=False)
+    assert re.findall(r"height of the centre|rotation, °|deformation RMS|error RMS", html) == [
         "height of the centre",
         "deformation RMS",
     ]
-    assert svg.count('stroke="rgb(206, 78, 26)"') == 4
-    assert "rotation, degrees" in plots_svg([line], drop.schema.window, rotates=True)
+    assert html.count('stroke="rgb(206, 78, 26)"') == 4
+    assert "rotation, °" in plots_html([line], drop.schema.window, rotates=True)
 
 
 def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, drop: Predictor) -> None:
     error = np.linspace(0.0, 2.0, len(line[2].times))
     error[50:] = np.nan
-    svg = plots_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, rotates=False)
-    assert "error RMS, mm" in svg
-    assert "nan" not in svg
-    cursor = cursor_svg([(*line[:2], replace(line[2], error=error))], drop.schema.window, False, 1.0)
-    assert "–" in cursor
+    html = plots_html([(*line[:2], replace(line[2], error=error))], drop.schema.window, rotates=False)
+    assert "error RMS" in html
+    assert "nan" not in html
 
 
 def test_the_expected_error_is_dashed(line: Line, drop: Predictor) -> None:
-    """The model's own truth apart: it is there without any."""
+    """It is there without a truth."""
     assert line[2].error is None
-    assert plots_svg([line], drop.schema.window, rotates=False).count("stroke-dasharray") == 1
+    assert plots_html([line], drop.schema.window, rotates=False).count("stroke-dasharray") == 1
+
+
+def test_the_trained_window_sets_the_axis_and_the_rest_is_cut_off(line: Line, drop: Predictor) -> None:
+    window = drop.schema.window
+    height = np.where(line[2].times <= window.stop, 0.4, 130.0)
+    html = plots_html([(*line[:2], replace(line[2], height=height, error_band=None))], window, rotates=False)
+    assert ">0.5</text>" in html
+    assert "to 130 ↑" in html
+    assert html.count("↑") == 1
+    y = [float(v) for v in re.findall(r"[ML][\d.]+ (-?[\d.]+)", html)]
+    assert min(y) >= -2.0
+
+
+def test_an_axis_reaches_below_zero_where_a_curve_does(line: Line, drop: Predictor) -> None:
+    sunk = replace(line[2], height=-0.3 * np.ones_like(line[2].times))
+    assert ">-0.3</text>" in plots_html([(*line[:2], sunk)], drop.schema.window, rotates=False)
 
 
 def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:
-    assert "<path d=" in plots_svg([], drop.schema.window, rotates=False)
-    assert "<text" not in cursor_svg([], drop.schema.window, False, 0.3)
+    assert 'class="curve"' not in plots_html([], drop.schema.window, rotates=False)
+    assert "<i " not in legend_html([], 0.3, large=False)
+
+
+def test_the_cursor_stands_at_the_time(drop: Predictor) -> None:
+    window = drop.schema.window
+    half = cursor_css(window, window.start + 0.5 * REACH * (window.stop - window.start))
+    assert f"translateX({0.5 * WIDE:.1f}px)" in half
+
+
+def test_the_legend_has_the_time_and_labels_and_below_large_plots_the_values(line: Line, drop: Predictor) -> None:
+    session, columns = Session(drop.schema), Columns.of([Column("<b>", drop, drop.rest)]).all
+    frame = session.frame(ViewRequest(session.schema.complete({}), 0.3, "balanced", columns))
+    named = ("<b>", *line[1:])
+    quantities = quantities_of([named], False)
+    for html in (legend_html([named], 0.3, large=True), values_html(frame.columns, [named], quantities, 0.3)):
+        assert "&lt;b&gt;" in html
+    assert "0.300 s" in legend_html([named], 0.3, large=False)
+    height = np.interp(0.3, line[2].times, line[2].height)
+    assert f"{height:.3f} m" in values_html(frame.columns, [named], quantities, 0.3)
+
+
+@pytest.mark.parametrize("time", [0.3137, 0.4021])
+def test_title_status_and_legend_say_the_same_at_any_moment(drop: Predictor, time: float) -> None:
+    """Between frames too, where the plotted curves have no sample."""
+    truth = truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}")
+    assert truth.truth is not None
+    session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest), truth]).all
+    parameters = drop.schema.complete(truth.truth.parameters)
+    frame = session.frame(ViewRequest(parameters, time, "balanced", columns))
+    shown = frame.columns[0]
+    lines = [(c.column.label, (0, 0, 0), session.curves(c, frame.request)) for c in frame.columns]
+    legend = values_html(frame.columns, lines, quantities_of(lines, False), time)
+    status = describe_column(shown, time, settled=False)
+    assert shown.error is not None
+    rmse = f"{shown.error.rmse_mm:.2f}"
+    assert f"{rmse} mm" in title_of(shown, 1e3)
+    assert f"RMSE {rmse}," in status
+    assert f">{rmse} mm" in legend
+    band = shown.error_band(np.array([time]))
+    assert band is not None
+    assert f"90 % below {band[0, 1]:.2f} mm" in status
+    assert f"90 %: {band[0, 1]:.2f} mm" in legend
+
+
+def test_a_turn_is_counted_past_half_and_whole_turns(kick: Predictor) -> None:
+    session, columns = Session(kick.schema), Columns.of([Column("odeform", kick, kick.rest)]).all
+    request = ViewRequest(session.schema.complete({}), 0.0, "balanced", columns)
+    rotation = session.curves(session.frame(request).columns[0], request).rotation
+    assert rotation[-1] > 400.0
+    assert np.abs(np.diff(rotation)).max() < 10.0  # degrees per frame: no fold, no jump
 
 
 def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App, LoopbackClient]) -> None:
@@ -68,12 +135,20 @@ def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App,
     assert client.until(lambda: "no column is visible" in client.text())
 
 
+def test_larger_plots_are_drawn_in_two_columns(dropped: tuple[App, LoopbackClient]) -> None:
+    _, client = dropped
+    client.press("Larger or smaller plots")
+    assert client.until(lambda: 'class="odeform-plots large"' in client.text())
+    client.press("Larger or smaller plots")
+    assert client.until(lambda: 'class="odeform-plots"' in client.text())
+
+
 def test_after_many_moments_the_numbers_are_of_the_last(dropped: tuple[App, LoopbackClient]) -> None:
     """They are sent ten times a second, however often the moment changes."""
     app, client = dropped
     for moment in np.linspace(0.3, 0.45, 31):
         client.set("time (s)", round(float(moment), 3))
     plots = app.panel(PlotPanel)
-    last = cursor_svg(plots._lines, app.session.schema.window, plots._rotates, 0.45)
+    last = cursor_css(app.session.schema.window, 0.45)
     assert client.until(lambda: plots._cursor.content == last)
     assert client.until(lambda: app.panel(PlaybackPanel)._time.value == 0.45)

@@ -56,7 +56,7 @@ def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: 
     assert app.request().quality == "draft"
     client.set("at most (mm)", -1.0)
     client.set("quality", ERROR_BUDGET)
-    assert client.until(lambda: "expected a positive budget" in client.text())
+    assert client.until(lambda: "expected a budget from 1e-06 to 100, got -1" in client.text())
 
 
 def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:

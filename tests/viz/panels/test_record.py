@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+import viser
 
 from odeform.dataset.store import open_dataset
 from odeform.formats.writing import shape_at, write_shape
@@ -66,6 +67,10 @@ def test_a_broken_state_changes_nothing(dropped: View, content: bytes) -> None:
     assert client.until(lambda: any(said.startswith("state:") for said in client.notifications))
     assert app.columns.all == before
     assert app.clock.time() == 0.3
+    handles = app.server.gui._gui_input_handle_from_uuid.values()
+    kept = [handle.value for handle in handles if isinstance(handle, viser.GuiUploadButtonHandle)]
+    assert kept
+    assert all(file.content == b"" for file in kept)
 
 
 def test_the_current_frame_and_the_whole_motion_as_files(dropped: View, drop: Predictor, tmp_path: Path) -> None:
@@ -82,6 +87,14 @@ def test_the_current_frame_and_the_whole_motion_as_files(dropped: View, drop: Pr
     assert client.until(lambda: zipfile.is_zipfile(io.BytesIO(client.downloads.get("motion.npz", b""))))
     arrays = np.load(io.BytesIO(client.downloads["motion.npz"]))
     assert arrays["vertices"].shape == (len(drop.schema.window.times), len(drop.rest.points), 3)
+    for suffix, start in ((".glb", b"glTF"), (".csv", b"time_s,")):
+        client.set("format", f"whole motion ({suffix})")
+        client.click("Download")
+        assert client.until(
+            lambda name=f"motion{suffix}", start=start: client.downloads.get(name, b"").startswith(start)
+        )
+    assert b'"animations"' in client.downloads["motion.glb"]
+    assert client.downloads["motion.csv"].count(b"\n") == 1 + len(drop.schema.window.times)
 
 
 def test_without_a_model_or_a_known_format_there_is_nothing_to_download(dropped: View) -> None:
@@ -112,3 +125,35 @@ def test_a_recording_starts_and_ends(dropped: View, tmp_path: Path) -> None:
     assert client.until(lambda: "cannot be written" in client.text())
     assert client.controls["Start recording"].visible
     assert not app.recording.active
+
+
+@pytest.mark.parametrize("name", ["../page.rrd", "/etc/page.rrd", "link/page.rrd", "\0.rrd"])
+def test_a_recording_stays_in_the_workspace(dropped: View, tmp_path: Path, name: str) -> None:
+    app, client = dropped
+    (tmp_path / "link").symlink_to("/tmp")
+    client.set("file", name)
+    client.click("Start recording")
+    assert client.until(lambda: "which confines the page" in client.text() or "not a path" in client.text())
+    assert not app.recording.active
+
+
+def test_a_recording_overwrites_nothing(dropped: View, tmp_path: Path) -> None:
+    app, client = dropped
+    for name, why in (("notes.rrd", "the file exists"), ("notes.txt", "ending in .rrd")):
+        (tmp_path / name).write_text("precious")
+        client.set("file", name)
+        client.click("Start recording")
+        assert client.until(lambda why=why: why in client.text())
+        assert (tmp_path / name).read_text() == "precious"
+    assert not app.recording.active
+
+
+def test_a_state_opens_no_file_outside_of_the_workspace(dropped: View, tmp_path: Path) -> None:
+    app, client = dropped
+    before, state = app.columns.all, json.loads(app.page.save())
+    for origin in ("/etc/passwd", "../model.safetensors"):
+        state["columns"][0]["origin"] = origin
+        client.upload("Restore state", "state.json", json.dumps(state).encode())
+        assert client.until(lambda origin=origin: any(origin in said for said in client.notifications))
+    assert all("which confines the page" in said for said in client.notifications)
+    assert app.columns.all == before

@@ -55,8 +55,8 @@ def test_a_test_sequence_moves_the_sliders_and_stands_beside_the_model(dropped: 
         expected = pytest.approx(entry.parameters)
         assert client.until(lambda expected=expected: app.panel(ParameterPanel).parameters() == expected)
     assert [c.label for c in app.columns.all] == ["odeform", "truth"]
-    assert client.until(lambda: "error now:" in client.text() and "mm from the truth" in client.text())
-    assert client.until(lambda: "error RMS, mm" in client.text())
+    assert client.until(lambda: "error now:" in client.text() and "distance from the truth" in client.text())
+    assert client.until(lambda: "error RMS (dashed: 90 %), mm" in client.text())
 
 
 def test_away_from_its_parameters_nothing_is_compared_and_there_is_a_way_back(dropped: View) -> None:
@@ -174,15 +174,16 @@ def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve:
 def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:
     app, client = dropped
     client.set("test sequence", entry_label(ENTRIES[0], app.session.schema))
-    assert client.until(lambda: any("/body/band_" in node for node in client.nodes))
-    assert app.presenter.error_scale is not None
+    assert client.until(lambda: any("/body/colored" in node for node in client.nodes))
     assert client.until(lambda: app.presenter.frame is not None and app.presenter.frame.columns[0].error is not None)
     assert app.presenter.frame is not None
-    error = app.presenter.frame.columns[0].error
+    error, scale = app.presenter.frame.columns[0].error, app.presenter.scale
     assert error is not None
-    assert 1e3 * np.median(error.distances) < app.presenter.error_scale
-    assert client.until(lambda: "mm from the truth" in client.text())
-    client.press("Error colours on or off")
-    assert client.until(lambda: "mm from the truth" not in client.text())
-    view = app.scene._views[app.columns.all[0].key][1]._shape
-    assert all(handle.visible for handle, _ in view._parts)  # pyright: ignore
+    assert scale is not None
+    assert 1e3 * np.median(error.distances) < scale.top
+    assert client.until(lambda: "distance from the truth, mm" in client.text())
+    client.press("Next colours")
+    assert client.until(lambda: "distance from the truth, mm" not in client.text())
+    part = app.server.scene.get_handle_by_name(f"/world/column_{app.columns.all[0].key}/body/part_0")
+    assert part is not None
+    assert part.visible

@@ -202,10 +202,10 @@ def test_missing_points_are_an_error_only_in_a_closed_recording(kick: Predictor,
 def test_a_recording_of_another_format_is_refused(
     kick: Predictor, path: Path, record: Record, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(writer, "FORMAT", 2)
+    monkeypatch.setattr(writer, "FORMAT", 3)
     record(path, [_column(kick)], [0.0])
     assert main(["--replay", str(path)]) == 2
-    assert "expected format 1, got format 2" in capsys.readouterr().err
+    assert "expected format 1 or 2, got format 3" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("damage", ["missing", "folder", "text", "empty", "truncated", "start", "foreign"])
@@ -237,3 +237,22 @@ def test_another_or_damaged_file_is_refused_in_one_line(
 def test_the_tolerance_is_positive(tolerance: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--replay", "any.rrd", "--tolerance", tolerance]) == 2
     assert "--tolerance" in capsys.readouterr().err
+
+
+def test_a_shape_that_was_not_trained_is_recorded_and_replayed_as_such(
+    kick: Predictor, path: Path, record: Record, capsys: pytest.CaptureFixture[str]
+) -> None:
+    box = Mesh(kick.rest.points * np.float32([1.0, 1.0, 0.6]), kick.rest.faces)
+    sinking = {"mass": 0.92, "bending": 0.39, "force": 141.4, "azimuth": 0.0, "elevation": 0.76}
+    record(path, [_column(kick, geometry=box), _column(kick, label="ball")], [0.0, 1.3], sinking)
+    recording = read_recording(path)
+    flat, ball = (facts for _, facts in sorted(recording.columns.items()))
+    assert flat["likeness"]["trained"] is False
+    assert flat["likeness"]["distance"] > 0.03
+    assert flat["scores"] == {}
+    assert ball["likeness"]["trained"] is True
+    assert ball["scores"]["rmse_pooled_mm"] > 0.0
+    assert main(["--replay", str(path)]) == 0
+    first, second = capsys.readouterr().out.splitlines()[1:3]
+    assert "this shape was not trained" in first
+    assert "not trained" not in second

@@ -2,9 +2,11 @@
 
 import json
 import resource
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,12 +15,17 @@ import rerun as rr
 from odeform import InputError
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
-from odeform.types import PointCloud
+from odeform.simulation.scenes.registry import find_scene
+from odeform.types import Mesh, PointCloud
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import shape_from
 from odeform_viz.recording import writer
+from odeform_viz.recording.blueprint import make_blueprint
+from odeform_viz.recording.control import RecordingControl
+from odeform_viz.recording.modes import EXACT
 from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.reader import read_recording
+from odeform_viz.recording.replay import check_recording
 from odeform_viz.recording.writer import Recorder
 from odeform_viz.session import Session
 from odeform_viz.view import Frame, ViewRequest
@@ -42,18 +49,58 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "session.rrd"
 
 
-def test_positions_parameters_and_provenance_read_back(kick: Predictor, path: Path, record: Record) -> None:
+def test_points_parameters_and_provenance_read_back(kick: Predictor, path: Path, record: Record) -> None:
     frames = record(path, [Column("odeform", kick, kick.rest, origin="kick")])
-    rows = _rows(path)
-    positions = next(v for k, v in rows.items() if "body" in k and "vertex_positions" in k)
-    for frame, logged in zip(frames, positions, strict=True):
+    points = {frame: points for _, frame, points in read_recording(path).points()}
+    for index, frame in enumerate(frames):
         expected = frame.columns[0].motion.deformed(frame.request.time)
-        np.testing.assert_array_equal(np.asarray(logged, dtype=np.float32), expected)
-    faces = next(v for k, v in rows.items() if "triangle_indices" in k)
+        np.testing.assert_allclose(points[index], expected, rtol=0.0, atol=EXACT)
+    rows = _rows(path)
+    faces = next(v for k, v in rows.items() if "column_0" in k and "triangle_indices" in k)
     assert len(faces) == 1  # static: once
     assert rows["/parameters/mass:Scalars:scalars"] == [[0.6]] * 3
     provenance = next(v for k, v in rows.items() if "provenance" in k and k.endswith(":text"))
     assert kick.checkpoint.sha256 in str(provenance)
+
+
+def test_the_floor_is_there_and_the_arrow_while_it_pushes(kick: Predictor, path: Path, record: Record) -> None:
+    frames = record(path, [Column("odeform", kick, kick.rest)], [0.0, 0.001, 0.5, 0.002])
+    motion = frames[0].columns[0].motion
+    (arrow,) = find_scene("kick").glyphs(motion.parameters, kick.rest.points)  # pyright: ignore[reportOptionalMemberAccess]
+    rows = _rows(path)
+    assert rows["/world/floor/plane:Mesh3D:vertex_positions"]
+    assert arrow.begin <= 0.0
+    assert arrow.end < 0.5
+    assert rows["/world/column_0/form_0/arrows:Arrows3D:labels"] == [[arrow.label]] * 2  # before and after 0.5 s
+    np.testing.assert_allclose(rows["/world/column_0/form_0/arrows:Arrows3D:vectors"][0][0], arrow.vector, rtol=1e-6)
+    assert "/world/column_0/form_0/arrows:Clear:is_recursive" in rows
+
+
+def test_each_unit_has_one_plot(kick: Predictor, path: Path, record: Record) -> None:
+    record(path, [Column("odeform", kick, kick.rest)])
+    columns = [SimpleNamespace(name="column_0/form_0", column=Columns.of([Column("odeform", kick, kick.rest)]).all[0])]
+    blueprint = make_blueprint(columns)  # pyright: ignore[reportArgumentType]
+    rows = blueprint.root_container.contents  # pyright: ignore[reportOptionalMemberAccess]
+    results, parameters = ([view.name for view in row.contents] for row in list(rows)[1:])
+    assert results == ["m", "mm", "ms", "evaluations"]
+    assert parameters[:4] == ["mass: kg", "bending: N m", "force: N", "azimuth, elevation: rad"]
+
+
+@pytest.mark.slow
+def test_a_minute_of_playback_stays_small(kick: Predictor, path: Path) -> None:
+    """Two seconds of it, after those in which all modes were added: the rest is more of the same."""
+    columns, sizes = Columns.of([Column("odeform", kick, kick.rest, origin="kick")]).all, []
+    session, recorder = Session(kick.schema), Recorder(path)
+    for times in (np.linspace(0.0, 1.0, 150), np.linspace(0.0, 1.0, 150)):
+        for time in times:
+            recorder.log(session.frame(ViewRequest(kick.schema.complete({}), float(time), "balanced", columns)))
+        recorder._write_taken()
+        sizes.append(path.stat().st_size)
+    recorder.close()
+    assert sizes[1] - sizes[0] < 150 * 11_000  # bytes per frame, for 20 MB in 60 s at 30 Hz
+    (checked,) = check_recording(read_recording(path))
+    assert checked.frames == 300
+    assert checked.off < 1e-6
 
 
 def test_requests_and_shapes_read_back_exactly(kick: Predictor, path: Path, record: Record) -> None:
@@ -179,9 +226,9 @@ def test_an_unwritable_path_is_refused_at_once(tmp_path: Path) -> None:
 
 @pytest.fixture
 def small_files() -> Iterator[None]:
-    """Limit files to 200 kB, as a full disk would."""
+    """Limit files to 400 kB, as a full disk would."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, hard))
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
@@ -205,6 +252,51 @@ def test_a_full_disk_is_reported_and_earlier_frames_read_back(
     assert recording.frames is None
 
 
+@pytest.mark.usefixtures("small_files")
+def test_a_disk_that_is_full_long_before_it_is_noticed_does_not_hang(kick: Predictor, path: Path) -> None:
+    columns = Columns.of([Column("odeform", kick, kick.rest)]).all
+    session, recorder = Session(kick.schema), Recorder(path)
+    recorder._written_at = float("inf")  # nothing is written until the end
+    for time in np.linspace(0.01, 0.9, 100):
+        recorder.log(session.frame(ViewRequest(kick.schema.complete({}), float(time), "balanced", columns)))
+    failed = []
+
+    def close() -> None:
+        with pytest.raises(InputError, match="File too large") as error:
+            recorder.close()
+        failed.append(error)
+
+    closing = threading.Thread(target=close, daemon=True)
+    closing.start()
+    closing.join(60.0)
+    assert failed
+    assert read_recording(path).requests == {}
+
+
+def test_nothing_is_overwritten(path: Path) -> None:
+    path.write_text("precious")
+    with pytest.raises(InputError, match="the file exists"):
+        Recorder(path)
+    with pytest.raises(InputError, match=r"ending in \.rrd"):
+        Recorder(path.with_suffix(".txt"))
+    assert path.read_text() == "precious"
+
+
+def test_only_what_somebody_watches_is_recorded(kick: Predictor, path: Path) -> None:
+    columns = Columns.of([Column("odeform", kick, kick.rest)]).all
+    frame = Session(kick.schema).frame(ViewRequest(kick.schema.complete({}), 0.1, "balanced", columns))
+    watched = False
+    control = RecordingControl(path, lambda: watched)
+    assert not control.sync()
+    control.log(frame)
+    watched = True
+    assert control.sync()  # the frame on screen has to be shown again
+    assert not control.sync()
+    control.log(frame)
+    control.close()
+    assert list(read_recording(path).requests) == [0]
+
+
 @pytest.mark.slow
 def test_the_still_part_of_a_scene_is_logged_once(kick: Predictor, path: Path, record: Record) -> None:
     fit = shape_from("volleyball", kick.rest)
@@ -215,3 +307,24 @@ def test_the_still_part_of_a_scene_is_logged_once(kick: Predictor, path: Path, r
     assert len(points) == len(fit.static.points)
     (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
     assert "volleyball" in shape
+
+
+def test_the_status_says_what_is_wrong_with_a_shape_and_a_motion(kick: Predictor, path: Path, record: Record) -> None:
+    flat = Mesh(kick.rest.points * np.float32([1.0, 1.0, 0.6]), kick.rest.faces)
+    sinking = {"mass": 0.92, "bending": 0.39, "force": 141.4, "azimuth": 0.0, "elevation": 0.76}
+    columns = [Column("flat", kick, flat), Column("ball", kick, kick.rest)]
+    record(path, columns, [0.0, 1.3], sinking)
+    rows = _rows(path)
+    said = {name: str(rows[f"/status/{name}/form_0:TextLog:text"]) for name in ("column_0", "column_1")}
+    assert "this shape was not trained" in said["column_0"]
+    assert "not trained" not in said["column_1"]
+    for text in said.values():
+        assert "stopped at t = 1.202 s: it sinks into the floor afterwards" in text
+
+
+def test_a_mesh_keeps_its_own_colors(kick: Predictor, path: Path, record: Record) -> None:
+    colors = np.tile(np.array([10, 20, 30], dtype=np.uint8), (len(kick.rest.faces), 3, 1))
+    fit = fit_to(Mesh(kick.rest.points, kick.rest.faces, colors), kick.rest)
+    record(path, [Column("odeform", kick, fit.geometry, fit=fit)])
+    ((rgba, *_),) = _rows(path)["/world/column_0/form_0/body:Mesh3D:vertex_colors"]
+    assert rgba == 0x0A141EFF

@@ -37,21 +37,28 @@ def _labels(server: viser.ViserServer) -> list[str]:
 
 
 def test_arrows_and_labels_follow_the_parameters(view: GlyphView, server: viser.ViserServer) -> None:
-    view.show("toy", {"wind": 2.0, "count": 2})
+    view.show("toy", {"wind": 2.0, "count": 2}, 0.5)
     node = server.scene.get_handle_by_name("/body/arrows")
     assert isinstance(node, viser.ArrowsHandle)
     np.testing.assert_allclose(node.points, [[[0, 0, 0], [2, 0, 0]], [[1, 0, 0], [3, 0, 0]]])
     assert _labels(server) == ["2 m", "2 m"]
-    view.show("toy", {"wind": 3.0, "count": 1})
+    view.show("toy", {"wind": 3.0, "count": 1}, 0.5)
     assert _labels(server) == ["3 m"]
     label = server.scene.get_handle_by_name("/body/arrow_label_0")
     assert label is not None
-    np.testing.assert_allclose(label.position, [3.0, 0.0, 0.0])
+    np.testing.assert_allclose(label.position, [0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(("scene", "count"), [("toy", 0), ("imported", 2)])
 def test_scenes_without_arrows_show_none(view: GlyphView, server: viser.ViserServer, scene: str, count: int) -> None:
-    view.show("toy", {"wind": 2.0, "count": 2})
-    view.show(scene, {"wind": 2.0, "count": count})
+    view.show("toy", {"wind": 2.0, "count": 2}, 0.5)
+    view.show(scene, {"wind": 2.0, "count": count}, 0.5)
     assert server.scene.get_handle_by_name("/body/arrows") is None
     assert _labels(server) == []
+
+
+def test_an_arrow_goes_when_its_cause_ends(view: GlyphView, server: viser.ViserServer) -> None:
+    for time, count in ((0.0, 1), (1.0, 1), (1.01, 0), (0.5, 1)):
+        view.show("toy", {"wind": 2.0, "count": 1}, time)
+        assert len(_labels(server)) == count
+        assert (server.scene.get_handle_by_name("/body/arrows") is not None) == bool(count)

@@ -24,7 +24,7 @@ def test_splats_are_sent_deformed_and_as_given_at_rest(
     session = Session(kick.schema)
     columns = Columns.of([Column("splats", kick, splats)]).all
     request = ViewRequest(session.schema.complete({}), 0.02, "balanced", columns)
-    view = SceneView(server, 0.2, 1)
+    view = SceneView(server, 0.2, lambda: None)
     for time in (0.02, 0.0):
         view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
     moved, resting = sent

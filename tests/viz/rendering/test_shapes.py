@@ -1,33 +1,66 @@
 """What is sent to the page for a shape."""
 
+from typing import Any
+
 import numpy as np
+import pytest
 import viser
 
 from odeform.models.base import Predictor
-from odeform.types import PointCloud
-from odeform_viz.rendering.error_colors import BANDS, band_indices
+from odeform.types import GaussianSplats, PointCloud
+from odeform_viz.rendering.look import Look
 from odeform_viz.rendering.shapes import show_shape
 
+COLOR = (206, 78, 26)
 
-def test_points_show_errors_and_then_their_own_color_again(server: viser.ViserServer, kick: Predictor) -> None:
+
+def _handle(server: viser.ViserServer, name: str) -> Any:
+    return server.scene.get_handle_by_name(name)
+
+
+def test_points_show_values_and_then_their_own_color_again(server: viser.ViserServer, kick: Predictor) -> None:
     points = kick.rest.points
-    view = show_shape(server, "/cloud", PointCloud(points), (206, 78, 26))
-    values = np.linspace(0.0, 2.0, len(points))
-    view.paint(points, values, 1.0)
-    cloud = view._cloud  # pyright: ignore
-    np.testing.assert_array_equal(cloud.colors, np.array(BANDS, dtype=np.uint8)[band_indices(values, 1.0)])
-    view.move(points + np.float32(0.1))
-    np.testing.assert_array_equal(cloud.colors, np.tile(np.array([206, 78, 26], dtype=np.uint8), (len(points), 1)))
-    np.testing.assert_array_equal(cloud.points, points + np.float32(0.1))
+    view = show_shape(server, "/cloud", PointCloud(points), COLOR)
+    colors = np.random.default_rng(0).integers(0, 256, points.shape).astype(np.uint8)
+    view.show(None, None, Look(colors))
+    np.testing.assert_array_equal(_handle(server, "/cloud/points").colors, colors)
+    view.show(points + np.float32(0.1), None, Look())
+    np.testing.assert_array_equal(_handle(server, "/cloud/points").colors, np.tile(np.uint8(COLOR), (len(points), 1)))
+    np.testing.assert_array_equal(_handle(server, "/cloud/points").points, points + np.float32(0.1))
 
 
-def test_an_overlaid_mesh_is_transparent_in_error_colors_too(server: viser.ViserServer, kick: Predictor) -> None:
-    view = show_shape(server, "/mesh", kick.rest, (206, 78, 26))
-    view.fade(0.45)
-    view.paint(kick.rest.points, np.full(len(kick.rest.points), 0.3), 1.0)
-    bands = [band for band in view._bands if band is not None]  # pyright: ignore
-    assert [band.opacity for band in bands] == [0.45]
-    assert not any(handle.visible for handle, _ in view._parts)  # pyright: ignore
-    view.move(kick.rest.points)
-    assert not bands[0].visible
-    assert all(handle.visible for handle, _ in view._parts)  # pyright: ignore
+def test_a_mesh_is_a_checkerboard_or_colored(server: viser.ViserServer, kick: Predictor) -> None:
+    view = show_shape(server, "/mesh", kick.rest, COLOR)
+    parts = [_handle(server, f"/mesh/part_{index}") for index in (0, 1)]
+    assert _handle(server, "/mesh/colored") is None  # sent only once it is needed
+    view.show(None, None, Look(np.zeros((len(kick.rest.points), 3), np.uint8), 0.45))
+    colored = _handle(server, "/mesh/colored")
+    assert b"0.45" in colored.glb_data
+    assert colored.visible
+    assert not any(part.visible for part in parts)
+    view.show(None, None, Look(opacity=0.45, wireframe=True))
+    assert not colored.visible
+    assert all(part.visible and part.opacity == 0.45 and part.wireframe for part in parts)
+
+
+def test_a_body_at_rest_sends_no_vertices(
+    server: viser.ViserServer, kick: Predictor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = show_shape(server, "/mesh", kick.rest, COLOR)
+    sent: list[str] = []
+    monkeypatch.setattr(viser.MeshHandle, "_queue_update", lambda _, name, value: sent.append(name), raising=False)
+    view.show(None, None, Look())
+    view.show(None, None, Look())
+    assert "vertices" not in sent
+
+
+@pytest.mark.parametrize("shadow", [True, False])
+def test_splats_cast_the_shadow_of_an_invisible_hull(server: viser.ViserServer, kick: Predictor, shadow: bool) -> None:
+    points = kick.rest.points
+    covariances, ones = np.tile(1e-6 * np.eye(3), (len(points), 1, 1)), np.ones((len(points), 1, 3))
+    show_shape(server, "/body", GaussianSplats(points, covariances, ones, np.ones(len(points))), COLOR, shadow)
+    hull = _handle(server, "/body/shadow")
+    assert (hull is not None) == shadow
+    if shadow:
+        assert hull.cast_shadow
+        assert b'"alphaMode":"BLEND"' in hull.glb_data

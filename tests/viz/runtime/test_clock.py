@@ -1,5 +1,7 @@
 """The playback clock."""
 
+from collections.abc import Callable
+
 import pytest
 
 from odeform_viz.runtime.clock import Clock
@@ -65,3 +67,29 @@ def test_seeking_beyond_the_window_is_allowed(wall: Wall) -> None:
     clock = Clock(0.0, 1.0, wall)
     clock.seek(1.4)
     assert clock.time() == 1.4
+
+
+def test_an_interval_is_played_slowly_once(wall: Wall) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.slow_down_once(0.2, 0.3, 2.0)
+    clock.play()
+    moments = []
+    for _ in range(6):
+        wall.now += 0.5
+        moments.append(clock.time())
+    assert moments == pytest.approx([0.215, 0.24, 0.265, 0.29, 0.6, 0.1], abs=1e-9)
+    wall.now += 0.3
+    assert clock.time() == pytest.approx(0.4)  # not slowly again
+
+
+@pytest.mark.parametrize(
+    "interrupt", [lambda c: c.seek(0.1), lambda c: c.set_speed(1.0), lambda c: (c.pause(), c.play())]
+)
+def test_what_the_user_does_ends_the_slow_interval(wall: Wall, interrupt: Callable[[Clock], object]) -> None:
+    clock = Clock(0.0, 1.0, wall)
+    clock.slow_down_once(0.0, 0.5, 50.0)
+    clock.play()
+    interrupt(clock)
+    before = clock.time()
+    wall.now += 0.4
+    assert clock.time() == pytest.approx(before + 0.4)

@@ -1,9 +1,14 @@
 """Jobs run in a process of their own."""
 
 import os
+import signal
+import struct
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,6 +33,12 @@ def fail(report: Report, message: str) -> None:
 
 def die(report: Report) -> None:
     os._exit(7)
+
+
+def die_in_a_message(report: Report) -> None:
+    outbox = report.__closure__[0].cell_contents  # pyright: ignore
+    os.write(outbox.fileno(), struct.pack("!i", 1000) + b"half")
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def sleep(report: Report) -> None:
@@ -66,6 +77,63 @@ def test_a_failure_and_a_crash_are_one_line() -> None:
     listeners = [_Listener(fail, "no such ball"), _Listener(die)]
     assert all(listener.ended.wait(DEADLINE) for listener in listeners)
     assert [listener.results for listener in listeners] == [["no such ball"], ["the process ended with exit code 7"]]
+
+
+def test_a_killed_process_says_so_at_any_moment() -> None:
+    listeners = [_Listener(sleep), _Listener(die_in_a_message)]
+    assert listeners[0].begun.wait(DEADLINE)
+    os.kill(listeners[0].job._process.pid or 0, signal.SIGKILL)
+    for listener in listeners:
+        assert listener.ended.wait(DEADLINE)
+        assert listener.results == ["the process was ended by SIGKILL, perhaps for lack of memory"]
+        assert not listener.job.running
+
+
+def test_a_process_that_cannot_be_started_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(_: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
+    listener = _Listener(count, 3)
+    assert listener.results == ["no process could be started: Resource temporarily unavailable"]
+    assert not listener.job.running
+    listener.job.cancel()
+
+
+VIEWER = """
+import os, signal, sys
+sys.path.insert(0, {folder!r})
+from test_jobs import sleep
+from odeform_viz.runtime.jobs import Job
+def begun(_):
+    print(job._process.pid, flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+if __name__ == "__main__":
+    job = Job(sleep, (), print, print, begun)
+    job.start()
+    job._thread.join()
+"""
+
+
+def test_a_job_ends_with_a_viewer_that_is_killed(tmp_path: Path) -> None:
+    script = tmp_path / "viewer.py"
+    script.write_text(VIEWER.format(folder=str(Path(__file__).parent)))
+    viewer = subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True)
+    assert viewer.stdout is not None
+    pid, end = int(viewer.stdout.readline()), time.monotonic() + DEADLINE
+    assert viewer.wait(DEADLINE) == -signal.SIGKILL
+    viewer.stdout.close()
+    while _runs(pid):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def _runs(pid: int) -> bool:
+    """A process without a parent may stay as a zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def test_a_cancelled_job_ends_without_a_callback() -> None:

@@ -8,12 +8,13 @@ import pytest
 import viser
 
 from odeform.errors import InputError
+from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import _LoopEvent, open_server
 
 
 @pytest.fixture
 def server() -> Iterator[viser.ViserServer]:
-    server = open_server("127.0.0.1", 0, "test")
+    server = open_server(Access(), 0, "test")
     yield server
     server.stop()
 
@@ -59,4 +60,4 @@ def test_many_threads_may_send(server: viser.ViserServer) -> None:
 
 def test_a_port_in_use_is_refused(server: viser.ViserServer) -> None:
     with pytest.raises(InputError, match="choose another with --port"):
-        open_server("127.0.0.1", server.get_port(), "test")
+        open_server(Access(), server.get_port(), "test")

@@ -1,0 +1,59 @@
+"""The arrays of a sequence in a file, checked before they are used: a data set may come from anywhere."""
+
+import io
+import zipfile
+import zlib
+
+import numpy as np
+
+from odeform.budget import require_memory
+from odeform.errors import InputError
+from odeform.types import MotionSequence
+
+__all__ = ["checked_sequence", "read_arrays"]
+
+ARRAYS = ("times", "vertices", "faces", "weights")
+FARTHEST = 1e9  # m
+COPIES = 4  # of its arrays that the use of a sequence takes
+
+
+def read_arrays(data: bytes, where: str) -> dict[str, np.ndarray]:
+    """Times, vertices, faces and weights of an `.npz` archive. `InputError`, which `where` leads, for other archives.
+
+    Sizes are checked before an array is read. Nothing is unpickled.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            size = sum(archive.getinfo(f"{name}.npy").file_size for name in ARRAYS)
+        require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in ARRAYS}
+    except InputError:
+        raise
+    except (KeyError, ValueError, TypeError, EOFError, OSError, MemoryError, OverflowError) as error:
+        raise InputError(f"{where}: damaged: {error}") from None
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, SyntaxError) as error:
+        raise InputError(f"{where}: damaged: {error}") from None
+
+
+def checked_sequence(sequence: MotionSequence, where: str) -> MotionSequence:
+    """The same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not finite."""
+    times, vertices, faces, weights = (np.asarray(getattr(sequence, name)) for name in ARRAYS)
+    if vertices.ndim != 3 or vertices.shape[2] != 3 or vertices.shape[1] < 2 or vertices.dtype.kind != "f":
+        raise InputError(f"{where}: expected vertices (T, N, 3), got {vertices.dtype} {vertices.shape}")
+    frames, count = vertices.shape[:2]
+    if times.shape != (frames,) or weights.shape != (count,) or frames < 2:
+        raise InputError(
+            f"{where}: expected at least 2 frames, with times ({frames},) and weights ({count},), got times "
+            f"{times.shape} and weights {weights.shape}"
+        )
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+        raise InputError(f"{where}: expected faces (F, 3) of integers, got {faces.dtype} {faces.shape}")
+    if faces.min(initial=0) < 0 or faces.max(initial=0) >= count:
+        raise InputError(f"{where}: faces refer to vertices that do not exist")
+    floats = (times, weights, vertices)
+    if not all(array.dtype.kind == "f" and np.isfinite(array).all() for array in floats):
+        raise InputError(f"{where}: expected finite times, weights and vertices")
+    if not (np.diff(times) > 0.0).all() or np.abs(vertices).max() > FARTHEST:
+        raise InputError(f"{where}: expected times that increase, and vertices within {FARTHEST:g} m")
+    return sequence

@@ -1,0 +1,147 @@
+"""Where a sphere touches a surface and a force pushes it inward: the contacts of the scene `contact-force`."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from odeform.errors import InputError
+from odeform.geometry.normals import vertex_normals
+from odeform.types import Faces, Floats, Mesh, Points, Vector
+
+__all__ = [
+    "CONE",
+    "RADIUS",
+    "SNAP",
+    "SurfacePoint",
+    "checked_contact",
+    "in_cone",
+    "nearest_on",
+    "projectile_centre",
+    "surface_point",
+    "touching_centre",
+]
+
+RADIUS = 0.020  # m, of the sphere: about a golf ball
+CONE = math.radians(45.0)  # largest angle between a force and the inward normal
+SNAP = 0.005  # m; a contact at most this far off the surface counts as its nearest point
+CREVICE = 0.001  # m by which a sphere may stand further off than its radius: more, and another part is in its way
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoint:
+    """A point of a mesh."""
+
+    point: Vector
+    """(3,) m."""
+    normal: Vector
+    """(3,) outward unit normal, interpolated between those of the vertices: continuous over the whole surface."""
+    face: int
+    """Index of the face."""
+    shares: Vector
+    """(3,) barycentric coordinates in that face."""
+    distance: float = 0.0
+    """Metres to the point that it is nearest to."""
+
+    def moved(self, vertices: Points, faces: Faces) -> Vector:
+        """(3,) m: where the point is once the vertices of the mesh are at `vertices` (N, 3) m."""
+        return self.shares @ np.asarray(vertices, dtype=float)[faces[self.face]]
+
+
+def surface_point(mesh: Mesh, face: int, shares: Floats, distance: float = 0.0) -> SurfacePoint:
+    """The point of a face with barycentric coordinates `shares` (3,)."""
+    vertices, corners = np.asarray(mesh.points, dtype=float), mesh.faces[face]
+    normal = np.asarray(shares) @ vertex_normals(vertices, mesh.faces)[corners]
+    size = float(np.linalg.norm(normal))
+    if size < 1e-9:
+        a, b, c = vertices[corners]
+        normal = np.cross(b - a, c - a)
+        size = max(float(np.linalg.norm(normal)), 1e-20)
+    return SurfacePoint(np.asarray(shares) @ vertices[corners], normal / size, int(face), np.asarray(shares), distance)
+
+
+def nearest_on(mesh: Mesh, point: Floats) -> SurfacePoint:
+    """The point of a mesh that is nearest to `point` (3,) m."""
+    corners = np.asarray(mesh.points, dtype=float)[mesh.faces]
+    distance = np.linalg.norm(mesh.points - point, axis=1)[mesh.faces].min(axis=1)
+    faces = np.flatnonzero(distance <= distance.min() + _longest(corners))  # no other can be as near
+    corners = corners[faces]
+    feet = trimesh.triangles.closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+    away = ((feet - point) ** 2).sum(axis=1)
+    near = int(away.argmin())
+    shares = trimesh.triangles.points_to_barycentric(corners[near : near + 1], feet[near : near + 1])[0]
+    shares = shares if np.isfinite(shares).all() else np.full(3, 1.0 / 3.0)
+    return surface_point(mesh, int(faces[near]), shares, float(np.sqrt(away[near])))
+
+
+def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
+    """(3,) m: centre of the sphere that touches the surface at a contact; None where it does not fit.
+
+    The centre lies on the outward normal, at the distance at which the sphere touches the faces: its radius on flat
+    and convex parts. It does not fit where another part of the surface or the floor z = 0 is in its way.
+    """
+    corners = np.asarray(mesh.points, dtype=float)[mesh.faces]
+    corners = corners[np.linalg.norm(corners - contact.point, axis=-1).min(axis=1) < 4.0 * RADIUS + _longest(corners)]
+    height = RADIUS
+    for _ in range(20):
+        centre = contact.point + height * contact.normal
+        feet = trimesh.triangles.closest_point(corners, np.broadcast_to(centre, (len(corners), 3)))
+        gap = RADIUS - float(np.linalg.norm(feet - centre, axis=1).min())
+        height += gap
+        if height > RADIUS + CREVICE or centre[2] < RADIUS:
+            return None
+        if abs(gap) < 1e-7:
+            break
+    return contact.point + height * contact.normal
+
+
+def _longest(corners: Floats) -> float:
+    """Length of the longest side of triangles (F, 3, 3)."""
+    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max())
+
+
+def in_cone(normal: Floats, force: Floats) -> bool:
+    """Whether a force (3,) pushes within 45 degrees of the inward normal; true of no force."""
+    size = float(np.linalg.norm(force))
+    return size == 0.0 or float(-np.dot(normal, force)) >= size * math.cos(CONE) - 1e-9
+
+
+def checked_contact(mesh: Mesh, point: Floats, force: Floats) -> tuple[SurfacePoint, Vector]:
+    """The contact nearest to `point` (3,) m, and the centre of the sphere there, for a `force` (3,) N.
+
+    A force outside of the cone is accepted, as long as it pushes inward; no force is, too.
+
+    Raises:
+        InputError: The point is more than 5 mm off the surface, the sphere does not fit there, or the force pulls away
+            from the surface.
+    """
+    contact = nearest_on(mesh, point)
+    if contact.distance > SNAP:
+        raise InputError(
+            f"contact: expected a point within {1e3 * SNAP:g} mm of the surface, "
+            f"got one {1e3 * contact.distance:.1f} mm off it"
+        )
+    if float(np.dot(contact.normal, force)) > 1e-9:
+        raise InputError(
+            "force: expected one that pushes into the surface at the contact, got one that pulls away from it; the "
+            f"inward normal is {', '.join(f'{x:.2f}' for x in -contact.normal)}"
+        )
+    centre = touching_centre(mesh, contact)
+    if centre is None:
+        raise InputError(
+            f"contact: a sphere of radius {1e3 * RADIUS:g} mm does not fit there: the floor or another part of the "
+            "body is in its way"
+        )
+    return contact, centre
+
+
+def projectile_centre(contact: SurfacePoint, centre: Floats, force: Floats, moved: Floats) -> Vector:
+    """(3,) m: where the sphere is while it pushes, once the surface at the contact is at `moved` (3,) m.
+
+    It starts at `centre` (3,) m, and a guide lets it move along the force (3,) only. It is taken to move as far as the
+    point that it touches.
+    """
+    size = float(np.linalg.norm(force))
+    direction = np.asarray(force, dtype=float) / size if size else -contact.normal
+    return np.asarray(centre, dtype=float) + float((np.asarray(moved) - contact.point) @ direction) * direction

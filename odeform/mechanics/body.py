@@ -1,0 +1,130 @@
+"""A body as reduced mechanics knows it: inertia, modes, and the points of its surface that may touch something."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from odeform.types import Faces, Floats, Ints, Perpoint, Points
+
+__all__ = ["ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
+
+SUPPORT = 96  # points spread over the surface, besides those near the floor, that may touch the floor
+NEAR_FLOOR, NEAREST = 0.004, 40  # metres, and how many of the vertices below are kept
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """S points of a surface, relative to the mass centre at rest."""
+
+    points: Points
+    """(S, 3) m."""
+    modes: Float[np.ndarray, "samples 3 modes"]
+    """Displacement by each mode, m per root kilogram."""
+    turns: Float[np.ndarray, "samples 3 modes"]
+    """Rotation of the surface there by each mode, rad per root kilogram."""
+    masses: Perpoint
+    """(S,) kg of the body that each stands for, by its share of the surface."""
+
+    @cached_property
+    def flat(self) -> Floats:
+        """(K, 3 S): the modes, for one product."""
+        return np.ascontiguousarray(self.modes.reshape(-1, self.modes.shape[2]).T)
+
+    @cached_property
+    def flat_turns(self) -> Floats:
+        """(K, 3 S): the turns, for one product."""
+        return np.ascontiguousarray(self.turns.reshape(-1, self.turns.shape[2]).T)
+
+    @cached_property
+    def tree(self) -> KDTree:
+        """For the nearest samples of a point."""
+        return KDTree(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """What a body is as a whole, at rest on the floor z = 0."""
+
+    mass: float
+    """kg"""
+    height: float
+    """m, of the mass centre above the floor."""
+    inertia: Float[np.ndarray, "3 3"]
+    """kg m^2 about the mass centre."""
+    damping: float
+    """Ratio of damping to stiffness, s."""
+
+
+def solid_of(positions: Points, masses: Perpoint, damping: float) -> Solid:
+    """From nodes (N, 3) m of `masses` (N,) kg that rest on the floor."""
+    mass = float(masses.sum())
+    centre = masses @ positions / mass
+    arms = positions - centre
+    squares = (arms**2).sum(axis=1)[:, None, None] * np.eye(3)
+    inertia = np.einsum("n,nij->ij", masses, squares - arms[:, :, None] * arms[:, None])
+    return Solid(mass, float(centre[2]), inertia, damping)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBody:
+    """A body as a whole, its modes, and where it may touch what is around it; in axes of the scene."""
+
+    solid: Solid
+    squares: Float[np.ndarray, " modes"]
+    """(K,) squared angular frequencies, 1/s^2."""
+    support: Samples
+    """Where it may touch the floor."""
+    surface: Samples
+    """Where something may touch it."""
+
+    def near(self, points: Float[np.ndarray, "batch 3"], count: int) -> Ints:
+        """(B, count) indices of the samples of the surface nearest to each point, m relative to the mass centre."""
+        return self.surface.tree.query(points, min(count, len(self.surface.points)))[1].reshape(len(points), -1)
+
+
+def spread(points: Points, count: int, first: int) -> Ints:
+    """Indices of `count` points (or all), each as far as possible from those before it."""
+    chosen, distance = [first], np.full(len(points), np.inf)
+    while len(chosen) < min(count, len(points)):
+        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        chosen.append(int(distance.argmax()))
+    return np.array(chosen)
+
+
+def reduce_body(
+    surface: Points,
+    faces: Faces,
+    modes: Float[np.ndarray, "modes points 3"],
+    turns: Float[np.ndarray, "points 3 modes"],
+    squares: Floats,
+    solid: Solid,
+) -> ReducedBody:
+    """From its surface (N, 3) m relative to the mass centre, the modes there in m per root kilogram, how they turn it
+    (`surface_turns`), and the rest."""
+    corners = surface[faces]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
+    shapes = modes.transpose(1, 2, 0)
+    areas *= 0.5 * solid.mass / areas.sum()
+    around *= 0.5 * solid.mass / around.sum()
+    everywhere = Samples(
+        np.concatenate([surface, corners.mean(axis=1)]),
+        np.concatenate([shapes, shapes[faces].mean(axis=1)]),
+        np.concatenate([turns, turns[faces].mean(axis=1)]),
+        np.concatenate([around, areas]),
+    )
+    return ReducedBody(solid, squares, _support(surface, shapes, turns, solid.mass), everywhere)
+
+
+def _support(points: Points, modes: Floats, turns: Floats, mass: float) -> Samples:
+    low = int(points[:, 2].argmin())
+    bottom = np.flatnonzero(points[:, 2] < points[low, 2] + NEAR_FLOOR)
+    kept = bottom[spread(points[bottom], NEAREST, int(np.flatnonzero(bottom == low)[0]))]
+    chosen = np.unique(np.concatenate([spread(points, SUPPORT, low), kept]))
+    owner = KDTree(points[chosen]).query(points)[1]
+    return Samples(
+        points[chosen], modes[chosen], turns[chosen], mass * np.bincount(owner, minlength=len(chosen)) / len(points)
+    )

@@ -1,0 +1,51 @@
+"""The floor z = 0 under a body: stiff springs under the samples of its support."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import minimize
+
+from odeform.mechanics.body import ReducedBody
+from odeform.mechanics.law import MechanicalLaw
+from odeform.types import Floats, Perpoint
+
+__all__ = ["Floor", "stand"]
+
+GRAVITY = 9.81  # m/s^2
+TOUCHING = 4.0  # inverse of the share of a body's surface that typically stands
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """A body's springs to the floor, in equilibrium with its weight where it rests."""
+
+    offset: Perpoint
+    """(S,) m added to the heights of the support's samples: with it, the springs balance weight and torque."""
+    stiffness: Perpoint
+    """(S,) N/m of each sample."""
+    preload: Float[np.ndarray, " modes"]
+    """(K,) modal force of the floor at rest, which the body's own stress balances."""
+
+
+def stand(body: ReducedBody, law: MechanicalLaw) -> Floor:
+    """The springs, and the height and tilt of the floor at which they carry the body without turning it.
+
+    The equilibrium is the minimum of the potential energy of the springs and the weight, which is convex.
+    """
+    x, y, z = body.support.points.T
+    weight, size = body.solid.mass * GRAVITY, float(np.sqrt((body.support.points**2).sum(axis=1).mean()))
+    stiffness = TOUCHING * weight / law.sink * body.support.masses / body.solid.mass
+    shape = np.stack([np.ones_like(x), x / size, y / size])
+    low = z - z.min()
+
+    def energy(plane: Floats) -> tuple[float, Floats]:
+        depth = np.maximum(law.sink * (plane @ shape) - low, 0.0)
+        value = 0.5 * stiffness @ depth**2 - weight * law.sink * plane[0]
+        slope = law.sink * (shape @ (stiffness * depth)) - weight * law.sink * np.eye(3)[0]
+        return value / (weight * law.sink), slope / (weight * law.sink)
+
+    plane = minimize(energy, np.array([1.0, 0.0, 0.0]), jac=True, method="BFGS", options={"gtol": 1e-10}).x
+    offset = -law.sink * (plane @ shape)
+    force = stiffness * np.maximum(-(low + offset), 0.0)
+    return Floor(offset - z.min() - body.solid.height, stiffness, np.einsum("s,sk->k", force, body.support.modes[:, 2]))

@@ -1,0 +1,195 @@
+"""Kernel regression of the motions of a body that is pushed at a point, in the contact's frame.
+
+Shift, rotation and deformation are regressed separately, each by several experts: in the axes of the body, in axes
+turned to the contact's azimuth, and in those of the contact itself, with and without a term that is linear in the
+force. Which of them is right depends on the body's symmetry. Their predictions are blended with non-negative weights
+that fit the validation motions best, and each training motion from all others (stacking; Breiman 1996).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import nnls
+
+from odeform.models.contact.inputs import ContactInputs
+from odeform.models.contact.kernel import Kernel, fit_kernel
+from odeform.motion.reduced_space import POSE
+from odeform.types import Arrays, Floats, Rotations
+
+__all__ = ["PARTS", "ContactRegression", "fit_contact_regression"]
+
+EXPERTS = (("body", False), ("body", True), ("azimuth", True), ("normal", True), ("normal", False))
+"""Frame of inputs and outputs, and whether a term is linear in the force."""
+PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(POSE, None)}
+ENERGY = 0.99999  # of deformations, in the modes of their trajectories
+INPUTS = ("contact", "normal", "force")
+MOST = 400  # training motions from which a kernel is chosen; all of them are regressed
+
+
+Motions = Float[np.ndarray, "sequences times y"]
+Asked = Float[np.ndarray, "asked times y"]
+
+
+@dataclass(frozen=True, eq=False)
+class _Scaling:
+    """Inputs of about unit size: positions and normals by mean and deviation, all else by its root mean square."""
+
+    frame: str
+    shift: Floats
+    scale: Floats
+    force: float
+
+    @classmethod
+    def of(cls, inputs: ContactInputs, frame: str) -> "_Scaling":
+        """The scaling under which the training inputs have unit size."""
+        groups, force = inputs.features(frame)
+        centred = 1 if frame == "body" else 2
+        shifts = [group.mean(axis=0) * (index < centred) for index, group in enumerate(groups)]
+        sizes = [np.sqrt(((g - s) ** 2).mean(axis=0)) for g, s in zip(groups, shifts, strict=True)]
+        scales = [s if index < centred else np.full(len(s), np.sqrt((s**2).mean())) for index, s in enumerate(sizes)]
+        scale = np.maximum(np.concatenate(scales), 1e-9)
+        return cls(frame, np.concatenate(shifts), scale, float(np.sqrt((force**2).mean())))
+
+    @property
+    def places(self) -> int:
+        """The number of first inputs that say where the contact is."""
+        return 3 if self.frame == "body" else 6
+
+    def __call__(self, inputs: ContactInputs) -> tuple[Floats, Floats]:
+        """Inputs (S, D) and forces (S, 3)."""
+        groups, force = inputs.features(self.frame)
+        return (np.concatenate(groups, axis=1) - self.shift) / self.scale, force / self.force
+
+
+@dataclass(frozen=True, eq=False)
+class _Expert:
+    """One regression: outputs (M,) in its frame, `weights` (S, M) of the training motions `known`, and their `mean`
+    (M,)."""
+
+    scaling: _Scaling
+    known: ContactInputs
+    kernel: Kernel
+    weights: Floats
+    mean: Floats
+
+    @cached_property
+    def _scaled(self) -> tuple[Floats, Floats]:
+        return self.scaling(self.known)
+
+    def predict(self, inputs: ContactInputs, turned: bool) -> Floats:
+        """(R, M) outputs; with `turned`, three-vectors, carried from the expert's frame to the axes of the body."""
+        values = self.kernel(*self.scaling(inputs), *self._scaled) @ self.weights + self.mean
+        return _turned_back(values, inputs.frames(self.scaling.frame)) if turned else values
+
+
+def _turned_back(values: Floats, frames: Rotations) -> Floats:
+    """Three-vectors (S, M) carried from frames (S, 3, 3) to the axes of the body."""
+    return np.einsum("sij,sti->stj", frames, values.reshape(len(values), -1, 3)).reshape(len(values), -1)
+
+
+def _fitted(
+    known: ContactInputs, outputs: Floats, frame: str, linear: bool, turned: bool
+) -> tuple[_Expert, Float[np.ndarray, "sequences outputs"]]:
+    """An expert on outputs (S, M) in the axes of the body, and its prediction of each from all others."""
+    scaling, frames = _Scaling.of(known, frame), known.frames(frame)
+    given = _turned_back(outputs, frames.swapaxes(1, 2)) if turned else outputs
+    mean = given.mean(axis=0)
+    x, force = scaling(known)
+    kernel = fit_kernel(x[:MOST], force[:MOST], (given - mean)[:MOST], scaling.places if linear else 0)
+    inverse = np.linalg.inv(kernel(x, force, x, force) + kernel.noise * np.eye(len(x)))
+    weights = inverse @ (given - mean)
+    others = given - weights / np.diag(inverse)[:, None]  # Rasmussen and Williams 2006, eq. 5.12
+    return _Expert(scaling, known, kernel, weights, mean), _turned_back(others, frames) if turned else others
+
+
+class ContactRegression:
+    """Reduced motions (T, 6 + K) from contacts and forces, by blended experts."""
+
+    def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
+        """From what `fit_contact_regression` returns. `KeyError` where something is missing."""
+        self._known = ContactInputs(*(arrays[f"gp.{name}"].astype(float) for name in INPUTS))
+        self._frames = len(arrays["times"])
+        self._modes = arrays["gp.modes"].astype(float)
+        blend = settings["blend"]
+        self._experts = {
+            part: [(share, self._expert(arrays, part, index)) for index, share in enumerate(blend[part]) if share]
+            for part in PARTS
+        }
+
+    def _expert(self, arrays: Arrays, part: str, index: int) -> _Expert:
+        (frame, linear), name = EXPERTS[index], f"gp.{part}.{index}"
+        scaling = _Scaling.of(self._known, frame)
+        logs = arrays[f"{name}.logs"].astype(float)
+        kernel = Kernel(logs, len(scaling.scale), scaling.places if linear else 0)
+        return _Expert(
+            scaling, self._known, kernel, arrays[f"{name}.weights"].astype(float), arrays[f"{name}.mean"].astype(float)
+        )
+
+    def predict(self, inputs: ContactInputs) -> Float[np.ndarray, "sequences times y"]:
+        """The motions of S contacts."""
+        parts = []
+        for part, experts in self._experts.items():
+            turned = part != "deformation"
+            # all shares may be zero
+            values = np.zeros((len(inputs.contact), 3 * self._frames if turned else len(self._modes)))
+            for share, expert in experts:
+                values += share * expert.predict(inputs, turned)
+            flat = values if turned else values @ self._modes
+            parts.append(flat.reshape(len(values), self._frames, -1))
+        return np.concatenate(parts, axis=2)
+
+
+def fit_contact_regression(
+    known: ContactInputs, asked: ContactInputs, times: Floats, train: Motions, val: Asked, energy: float = ENERGY
+) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and settings of a checkpoint, from training and validation motions (S, T, 6 + K), times (T,) and inputs.
+
+    Kernels maximise the marginal likelihood; validation sets the blend. Modes of the trajectories of deformation hold
+    the share `energy` of them.
+    """
+    flat = {"train": _parts(train), "val": _parts(val)}
+    modes = _modes(flat["train"]["deformation"], energy)
+    for split in flat:
+        flat[split]["deformation"] = flat[split]["deformation"] @ modes.T
+    arrays: Arrays = {"times": times, "gp.modes": modes.astype(np.float16)}
+    arrays |= {f"gp.{name}": getattr(known, name) for name in INPUTS}
+    blend, trials = {}, []
+    for part in PARTS:
+        turned = part != "deformation"
+        fitted = [_fitted(known, flat["train"][part], frame, linear, turned) for frame, linear in EXPERTS]
+        truth = np.concatenate([flat["train"][part], flat["val"][part]])
+        predicted = [np.concatenate([others, e.predict(asked, turned)]) for e, others in fitted]
+        errors = [float(np.sqrt(((p - truth)[len(flat["train"][part]) :] ** 2).mean())) for p in predicted]
+        blend[part] = _blend(predicted, truth, errors)
+        for index, (expert, _) in enumerate(fitted):
+            trials.append({"part": part, "expert": EXPERTS[index], "val": errors[index]})
+            if blend[part][index]:
+                arrays |= _expert_arrays(f"gp.{part}.{index}", expert)
+    return arrays, {"blend": blend, "trials": trials}
+
+
+def _blend(predicted: list[Floats], truth: Floats, errors: list[float]) -> list[float]:
+    """The share of each expert. The best one alone where nothing moves."""
+    shares = nnls(np.stack([p.ravel() for p in predicted], axis=1), truth.ravel())[0]
+    return shares.tolist() if shares.any() else [float(index == int(np.argmin(errors))) for index in range(len(errors))]
+
+
+def _expert_arrays(name: str, expert: _Expert) -> Arrays:
+    arrays = {"logs": expert.kernel.logs, "mean": expert.mean, "weights": expert.weights.astype(np.float32)}
+    return {f"{name}.{key}": array for key, array in arrays.items()}
+
+
+def _parts(reduced: Floats) -> dict[str, Floats]:
+    """Shift, rotation and deformation of motions (S, T, 6 + K), each flat (S, M)."""
+    return {part: reduced[..., columns].reshape(len(reduced), -1) for part, columns in PARTS.items()}
+
+
+def _modes(flat: Floats, share: float) -> Floats:
+    """(M, T K) the leading modes of trajectories of deformation."""
+    _, s, vt = np.linalg.svd(flat, full_matrices=False)
+    energy = np.cumsum(s**2)
+    return vt[: int(np.searchsorted(energy, share * energy[-1])) + 1]

@@ -1,0 +1,72 @@
+"""Kernel ridge regression (Matern 5/2), and the search for its length scales and ridge."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize
+
+from odeform.models.contact.kernel import matern
+from odeform.types import Floats
+
+__all__ = ["Ridge", "search_ridge"]
+
+STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
+RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0
+EVALUATIONS = 150  # of the validation error, from each start
+BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
+
+Parameters = Float[np.ndarray, "sequences parameters"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ridge:
+    """The settings of a kernel ridge regression, and the `error` that they were chosen by."""
+
+    scales: Float[np.ndarray, " parameters"]
+    """Length scales, in units of the normalised parameters."""
+    ridge: float
+    """Relative to the kernel's value at distance 0."""
+    error: float = float("inf")
+
+    def weights(self, theta: Parameters, outputs: Float[np.ndarray, "sequences outputs"]) -> Floats:
+        """(S, outputs): what training outputs at `theta` (S, P) weigh in a prediction."""
+        return cho_solve(self._factor(theta), outputs)
+
+    def predict(self, asked: Floats, theta: Parameters, outputs: Floats) -> Float[np.ndarray, "asked outputs"]:
+        """Predictions at `asked` (A, P) from outputs at `theta` (S, P)."""
+        return matern(asked / self.scales, theta / self.scales) @ self.weights(theta, outputs)
+
+    def left_out(self, theta: Parameters, outputs: Floats) -> Float[np.ndarray, "sequences outputs"]:
+        """Errors at each of `theta` (S, P) if predicted from all the others (Rasmussen and Williams 2006, 5.12)."""
+        inverse = cho_solve(self._factor(theta), np.eye(len(theta)))
+        return (inverse @ outputs) / np.diag(inverse)[:, None]
+
+    def _factor(self, theta: Parameters) -> tuple[Floats, bool]:
+        scaled = theta / self.scales
+        return cho_factor(matern(scaled, scaled) + self.ridge * np.eye(len(theta)))
+
+
+def search_ridge(parameters: int, error: Callable[[Ridge], float]) -> tuple[Ridge, ...]:
+    """The settings that Nelder-Mead finds from each of several starts, the best first."""
+
+    def ridge(settings: Floats) -> Ridge:
+        return Ridge(np.exp(settings[:-1]), float(np.exp(settings[-1])))
+
+    def objective(settings: Floats) -> float:
+        try:
+            return error(ridge(settings))
+        except np.linalg.LinAlgError:
+            return float("inf")  # the kernel matrix is singular to rounding
+
+    length, noise = BOUNDS
+    limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
+    found = []
+    for scale in STARTS:
+        start = np.log([*[scale] * parameters, RIDGE])
+        bounds = [*[length] * parameters, noise]
+        trial = minimize(objective, start, method="Nelder-Mead", bounds=bounds, options=limits)
+        found.append(replace(ridge(trial.x), error=float(trial.fun)))
+    return tuple(sorted(found, key=lambda trial: trial.error))

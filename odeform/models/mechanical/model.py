@@ -1,0 +1,93 @@
+"""ODeform for bodies of known shape and material: the ODE is reduced mechanics, with few learned numbers."""
+
+from functools import cached_property
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.geometry.contact import checked_contact
+from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.push import make_push
+from odeform.mechanics.pushed import PushedBody
+from odeform.mechanics.step import Mechanics, Projectile
+from odeform.models.contact.inputs import ContactInputs
+from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
+from odeform.models.mechanical.correction import Correction
+from odeform.models.mechanical.elastic_body import ElasticBody
+from odeform.models.odeform.latent_trajectory import LatentTrajectory
+from odeform.models.reduced_model import ReducedModel
+from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.reduced_motion import Trajectory
+from odeform.motion.reduced_space import ReducedSpace
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Basis, Floats
+
+__all__ = ["MechanicalODeform"]
+
+FALLBACK = SolverSettings("limex", step=2.5e-3, dtype="float64")
+FINER = {SolverSettings("limex", step=1.25e-4, dtype="float64"): 0.0}  # what solver errors are measured against
+
+
+class MechanicalODeform(ReducedModel):
+    """The motion of one elastic body on the floor that a projectile pushes."""
+
+    model = "odeform-mechanical"
+    rescales_input = False
+
+    def _read(self, checkpoint: Checkpoint) -> None:
+        config = checkpoint.config
+        self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
+        self.law, self.pulse = MechanicalLaw(**config["law"]), float(config["pulse_s"])
+        self.projectile = Projectile(**config["projectile"])
+        shift, deformation = config["largest"]
+        self._largest = float(shift), float(deformation)
+        self.qualities = {name: SolverSettings(**values) for name, values in config["qualities"].items()}
+        self.correction = Correction(checkpoint.arrays, config["correction"]) if "correction" in config else None
+
+    # these take a moment, and not every object of a checkpoint is looked at
+
+    @cached_property
+    def mechanics(self) -> Mechanics:
+        """The right-hand side of its ODE."""
+        return Mechanics(self.body.reduced(), self.law, self.projectile)
+
+    @cached_property
+    def _coordinates(self) -> tuple[Coordinates, Basis]:
+        return coordinates_of(self.body)
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """From states of the mechanics to reduced coordinates."""
+        return self._coordinates[0]
+
+    @cached_property
+    def space(self) -> ReducedSpace:
+        """That of its coordinates."""
+        return space_of(self.body, self._coordinates[1], self._largest)
+
+    def trajectory(
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
+    ) -> Trajectory:
+        assert settings is not None
+        values = [p.denormalise(float(x)) for p, x in zip(self.schema.learned, theta, strict=True)]
+        contact, force = np.array(values[:3]), np.array(values[3:])
+        point, centre = checked_contact(self.rest, contact, force)
+        anchor = self.body.anchor
+        push = make_push(
+            self.mechanics.body, self.body.dynamic, point.point[None] - anchor, centre[None] - anchor, force[None]
+        )
+        pushed = PushedBody(self.mechanics, push, self.pulse)
+
+        correction = None
+        if self.correction is not None:
+            known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])
+            correction = self.correction.over_time(known)
+
+        def decode(times: Floats, states: Floats) -> Floats:
+            reduced = self.coordinates.reduced(*pushed.body_motion(states)[:3])
+            return reduced if correction is None else reduced + correction(times)
+
+        radius = self.space.gyration_radius
+        return LatentTrajectory(
+            pushed, decode, pushed.start, settings, FALLBACK, until, radius, lambda: (pushed, pushed.start), FINER
+        )

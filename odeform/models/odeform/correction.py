@@ -1,0 +1,133 @@
+"""What the latent ODE leaves unexplained of the training motions, regressed on the parameters.
+
+y(t; theta) = share * ODE(t; theta) + rest(t; theta): the autoregressive scheme of Kennedy and O'Hagan (2000), with the
+latent ODE in place of the cheap simulation. The rest is a kernel ridge regression (Matern 5/2) of the training motions
+less that share. Shift, rotation and deformation have a share and a kernel each.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+
+from odeform.models.contact.kernel import matern
+from odeform.motion.reduced_space import POSE
+from odeform.types import Arrays, Floats
+
+__all__ = ["PARTS", "CorrectedPart", "Correction"]
+
+PREFIX = "correction."
+PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(POSE, None)}
+"""Columns of y that are regressed together."""
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedPart:
+    """The regression of one part of y, over all frames of the trained window."""
+
+    theta: Float[np.ndarray, "sequences parameters"]
+    """Training parameters, divided by the length scales."""
+    scales: Float[np.ndarray, " parameters"]
+    weights: Float[np.ndarray, "sequences modes"]
+    modes: Float[np.ndarray, "modes entries"]
+    """Trajectories of residuals, flat."""
+    mean: Float[np.ndarray, " entries"]
+    """Of the training residuals."""
+    share: float
+    """Of the ODE's own motion that is kept."""
+
+    def at(self, theta: Floats) -> Float[np.ndarray, "jet entries"]:
+        """(1 + P, T columns): the residual at theta (P,) in [-1, 1], and its derivatives by each parameter."""
+        apart = theta / self.scales - self.theta
+        r = np.sqrt(5.0 * (apart**2).sum(axis=1))
+        # the derivative of matern by each scaled parameter
+        slopes = -(5.0 / 3.0) * (1.0 + r) * np.exp(-r) * (apart / self.scales).T
+        covariances = np.concatenate([matern((theta / self.scales)[None], self.theta), slopes])
+        out = covariances @ self.weights @ self.modes
+        out[0] += self.mean
+        return out
+
+
+class Correction:
+    """Adds to the motions of the ODE, within the trained window; beyond it, the last value is kept."""
+
+    def __init__(self, times: Floats, coordinates: int, parts: dict[str, CorrectedPart]) -> None:
+        """`times` (T,) s of the frames, the number 6 + K of coordinates, and the corrected `parts` by name."""
+        self._times, self._coordinates, self.parts = times, coordinates, parts
+        self.shares: Float[np.ndarray, " y"] = np.ones(coordinates)
+        """Of each coordinate of the ODE's motion."""
+        for name, part in parts.items():
+            self.shares[PARTS[name]] = part.share
+
+    def first(self, modes: int) -> "Correction":
+        """The correction of a model that keeps the first `modes` of its deformation."""
+        parts, kept = dict(self.parts), POSE + modes
+        if part := parts.get("deformation"):
+            trajectories = np.stack([part.mean, *part.modes]).reshape(-1, len(self._times), self._coordinates - POSE)
+            mean, *rest = trajectories[..., :modes].reshape(len(trajectories), -1)
+            parts["deformation"] = replace(part, mean=mean, modes=np.array(rest))
+        return Correction(self._times, kept, parts)
+
+    def jet(self, theta: Floats) -> Callable[[Floats], Float[np.ndarray, "jet times y"]]:
+        """(T,) s -> (1 + P, T, 6 + K) at theta (P,) in [-1, 1]: values, and derivatives by each parameter."""
+        frames = np.zeros((1 + len(theta), len(self._times), self._coordinates))
+        for name, part in self.parts.items():
+            frames[..., PARTS[name]] = part.at(theta).reshape(*frames.shape[:2], -1)
+        spline = CubicSpline(self._times, frames, axis=1)
+        return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
+
+    def over_time(self, theta: Floats) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
+        """(T,) s -> (T, 6 + K) at theta (P,) in [-1, 1]: a cubic spline through the trained frames."""
+        frames = np.zeros((len(self._times), self._coordinates))
+        for name, part in self.parts.items():
+            frames[:, PARTS[name]] = part.at(theta)[0].reshape(len(frames), -1)
+        spline = CubicSpline(self._times, frames)
+        return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
+
+    def arrays(self) -> Arrays:
+        """The arrays of a checkpoint, by name; `from_arrays` reads them."""
+        out = {f"{PREFIX}times": self._times}
+        for name, part in self.parts.items():
+            # weights of opposite sign cancel, so that they need all their digits
+            values = {
+                "scales": part.scales,
+                "theta": part.theta,
+                "weights": part.weights,
+                "share": np.array([part.share]),
+            }
+            values |= {"modes": part.modes.astype(np.float32), "mean": part.mean}
+            out |= {f"{PREFIX}{name}.{key}": value for key, value in values.items()}
+        return out
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, coordinates: int, parameters: int) -> "Correction | None":
+        """None for a checkpoint without one. ValueError unless arrays are finite and of the expected shapes."""
+        if f"{PREFIX}times" not in arrays:
+            return None
+        times = arrays[f"{PREFIX}times"].astype(float)
+        parts = {}
+        for name, columns in PARTS.items():
+            start = f"{PREFIX}{name}."
+            of = {key.removeprefix(start): a.astype(float) for key, a in arrays.items() if key.startswith(start)}
+            if of:
+                entries = len(times) * len(range(*columns.indices(coordinates)))
+                # files of before both were fitted have neither
+                of = {"mean": np.zeros(entries), "share": np.ones(1), **of}
+                parts[name] = _checked_part(of, parameters, entries)
+        return cls(times, coordinates, parts)
+
+
+def _checked_part(arrays: Arrays, parameters: int, entries: int) -> CorrectedPart:
+    known, modes = len(arrays["theta"]), len(arrays["modes"])
+    shapes = {"theta": (known, parameters), "scales": (parameters,), "weights": (known, modes), "share": (1,)}
+    for key, shape in {**shapes, "modes": (modes, entries), "mean": (entries,)}.items():
+        if arrays[key].shape != shape or not np.isfinite(arrays[key]).all():
+            raise ValueError(f"{PREFIX}: expected finite arrays, one of shape {shape}, got {arrays[key].shape}")
+    if not (arrays["scales"] > 0.0).all():
+        raise ValueError(f"{PREFIX}: expected positive length scales")
+    share = float(arrays.pop("share")[0])
+    if not 0.0 <= share <= 1.0:
+        raise ValueError(f"{PREFIX}: expected a share from 0 to 1, got {share}")
+    return CorrectedPart(**arrays, share=share)

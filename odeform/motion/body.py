@@ -1,0 +1,63 @@
+"""The trained body in reduced coordinates: how low it reaches and how far it deforms, cheaply, at many times."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.reduced_space import POSE, ReducedSpace, rotation_of
+from odeform.motion.watch import Sample
+from odeform.types import Floats, Mesh, PointCloud, Points
+
+__all__ = ["WatchedBody", "watched_body"]
+
+OUTERMOST = 256  # points that represent the body; every point of the bundled ball is within 1.5 mm of them in height
+NEAR = 2e-3  # m above the floor's limit from which on all points are looked at
+
+
+@dataclass(frozen=True, eq=False)
+class WatchedBody:
+    """A few of its outermost points, all of them, and the height in metres below which no point may be."""
+
+    few: EvaluatedBasis
+    all: EvaluatedBasis
+    limit: float
+
+    def sample(self, predicted: Float[np.ndarray, "times y"]) -> Sample:
+        """At predictions (T, 6 + K), not yet bounded, in metres and radians."""
+        space = self.all.space
+        with np.errstate(all="ignore"):
+            deformation = np.linalg.norm(predicted[:, POSE:], axis=1) / space.largest[1]
+            y = space.bounded(predicted)
+            lowest = _lowest(self.few, y)
+            near = np.flatnonzero((lowest >= self.limit) & (lowest < self.limit + NEAR))
+            if len(near):
+                lowest[near] = _lowest(self.all, y[near])
+            rotation, shift = rotation_of(y[:, :POSE], 0.0)
+            centre = self.few.rest.mean(axis=0, dtype=float)
+            return Sample(lowest, deformation, rotation @ centre + shift + space.anchor)
+
+
+def _lowest(evaluated: EvaluatedBasis, y: Floats) -> Floats:
+    """(T,) height in metres of the lowest point. The azimuth does not change it."""
+    rotation, shift = rotation_of(y[:, :POSE], 0.0)
+    local = (y[:, POSE:].astype(np.float32) @ evaluated.values).reshape(len(y), -1, 3) + evaluated.rest
+    heights = (local @ rotation[:, 2, :, None].astype(np.float32))[..., 0]
+    return heights.min(axis=1).astype(float) + shift[:, 2] + evaluated.space.anchor[2]
+
+
+def watched_body(rest: Mesh, space: ReducedSpace, limit: float) -> WatchedBody:
+    """Evaluate the basis on the trained body at rest."""
+    points = np.asarray(rest.points, dtype=float)
+    outermost = points[np.unique((_directions(OUTERMOST) @ (points - points.mean(axis=0)).T).argmax(axis=1))]
+    few, every = (evaluate_basis(PointCloud(some), space, 0.0) for some in (outermost, points))
+    return WatchedBody(few, every, limit)
+
+
+def _directions(count: int) -> Points:
+    """(count, 3) unit vectors, spread evenly (a Fibonacci lattice)."""
+    index = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * index / count, np.pi * (1.0 + 5.0**0.5) * index
+    radius = np.sqrt(1.0 - height**2)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)

@@ -1,0 +1,66 @@
+"""What one has to know of a motion before using it, in words."""
+
+import numpy as np
+
+from odeform.motion.base import Motion
+from odeform.types import Times
+
+__all__ = ["caveats"]
+
+
+def caveats(motion: Motion, times: Times) -> tuple[str, ...]:
+    """One sentence each: a shape that was not trained, parameters and (T,) `times` in seconds outside the trained
+    range, and where the motion is held because it is not physically possible. Empty if there is none of them."""
+    return (
+        *_shape(motion),
+        *_parameters(motion),
+        *_moment(motion, times),
+        *_times(motion, times),
+        *_stop(motion, times),
+    )
+
+
+def _shape(motion: Motion) -> list[str]:
+    likeness = motion.likeness
+    if likeness is None or likeness.same:
+        return []
+    return [f"{likeness.describe()}; {motion.trust.foreign}"]
+
+
+def _parameters(motion: Motion) -> list[str]:
+    trained = {p.name: p for p in motion.schema.parameters}
+    return [
+        f"{name} = {motion.parameters[name]:g} {p.unit} is outside the trained range, {p.low:g} to {p.high:g} {p.unit}"
+        for name, p in trained.items()
+        if name in motion.outside
+    ]
+
+
+def _moment(motion: Motion, times: Times) -> list[str]:
+    others = 0 if motion.only_at is None else int((np.abs(times - motion.only_at) > 1e-6).sum())
+    if not others:
+        return []
+    return [
+        f"only the state at {motion.only_at:.3g} s is predicted: {others} of {len(times)} frames are not predictions"
+    ]
+
+
+def _times(motion: Motion, times: Times) -> list[str]:
+    later = sum(motion.extrapolates(float(time)) for time in times)
+    if not later:
+        return []
+    window = motion.schema.window
+    end = window.stop + window.reach * (window.stop - window.start)
+    still = f"; soon after {end:.3g} s it stands still" if float(np.max(times)) > end else ""
+    which = f"{later} of {len(times)} frames are" if len(times) > 1 else f"t = {float(times[0]):.4g} s is"
+    return [
+        f"{which} outside the trained window, {window.start:g} to {window.stop:g} s: "
+        f"there the motion is extrapolated{still}"
+    ]
+
+
+def _stop(motion: Motion, times: Times) -> list[str]:
+    stop = motion.stop_at(float(times[0])) if len(times) == 1 else motion.first_stop(float(np.max(times, initial=0.0)))
+    if stop is None:
+        return []
+    return [f"the motion stops at t = {stop.time:.3f} s, because {stop.reason} afterwards: that moment is shown on"]

@@ -1,0 +1,29 @@
+"""What no motion of a body in a scene can do: the bounds that predicted motions are held to."""
+
+from dataclasses import dataclass
+
+__all__ = ["DEPTH", "Limits"]
+
+DEPTH = 5e-3
+"""Metres that a body may sink into the floor. The simulator's contacts let it sink by up to 3 mm."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of physically possible motions.
+
+    Attributes:
+        floor: Height of the floor in metres; None where nothing is known of a floor.
+        depth: Metres that a body may sink into it.
+        gravity: m/s^2, along -z.
+        deformation: Largest RMS deformation, in multiples of the largest trained one. Inside the trained box models
+            reach 1.0, and up to ten times beyond it 1.2; a continuation that gets lost passes 1.4.
+        energy: Largest energy of the rigid motion after the trained window, in multiples of the largest within it.
+            Nothing drives a body then: sound motions stay below 0.6, one that falls through the floor reaches 18.
+    """
+
+    floor: float | None = None
+    depth: float = DEPTH
+    gravity: float = 9.81
+    deformation: float = 1.3
+    energy: float = 1.1

@@ -1,0 +1,185 @@
+"""Watches over a motion: where it leaves what is physically possible, the last sound moment is shown instead.
+
+Within the trained window a model predicts each moment by itself, so each is checked by itself: a moment that is not
+sound shows the last sound one before it. After the window each frame follows from the ones before, so the motion ends
+where it is first not sound. Both follow from the motion on fixed grids of times, whose intervals are refined where
+needed: never from the times that are asked for, nor from their order.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.motion.limits import Limits
+from odeform.motion.recent import Recent
+from odeform.schema import Window
+from odeform.types import Floats, Ints, Times
+
+__all__ = ["Sample", "Stop", "Watch"]
+
+FINER = 2  # grid times per trained frame: a body that falls at 3 m/s moves by 12 mm between them
+REFINED = 32  # parts of a grid interval, which are divided once more: 4 microseconds at 120 Hz
+SLACK = 2.5e-4  # m by which a motion may sink deeper between two grid times; 0.08 mm is the most of 5,000 kicks
+CHUNK = 44  # grid times after the window that are checked at once
+COARSE = 16  # times in the window at which the energy is looked up
+RECENT = 4  # results that are kept: pose, points and gradient of a time are evaluated one after the other
+
+SOUND, NON_FINITE, SUNK, DEFORMED, DRIVEN = range(5)
+REASONS = {
+    NON_FINITE: "it is not finite",
+    SUNK: "it sinks into the floor",
+    DEFORMED: "it deforms more than the body can",
+    DRIVEN: "it gains energy",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A motion at T times, as the model predicts it.
+
+    `lowest` (T,) is the height of the lowest point of the trained body in metres, `deformation` (T,) its RMS
+    deformation relative to the largest trained one, `centre` (T, 3) the position of its centre in metres.
+    """
+
+    lowest: Floats
+    deformation: Floats
+    centre: Float[np.ndarray, "times 3"]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The last sound moment in seconds, which is shown in place of later ones, and what is wrong with them."""
+
+    time: float
+    reason: str
+
+
+class Watch:
+    """Times at which a motion is sound, and the times that are shown in place of others."""
+
+    def __init__(self, limits: Limits, window: Window, sample: Callable[[Times], Sample]) -> None:
+        """`sample` evaluates the motion at (T,) seconds of the model's clock, in any order and without this watch."""
+        self._limits, self._window, self.sample = limits, window, sample
+        self._step = 1.0 / (FINER * window.rate)
+        self._steps = 0  # after the window, up to which the motion is known to be sound
+        self._end: Stop | None = None
+        self._recent: Recent[Times] = Recent(RECENT)
+
+    def held(self, times: Times) -> Times:
+        """(T,) seconds of the clock -> the seconds that are shown; the same where the motion is sound."""
+        return self._recent.get(times.tobytes(), lambda: self._held(times))
+
+    def stop_at(self, time: float) -> Stop | None:
+        """What is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
+        if time > self._window.stop:
+            return self._after_window(time)
+        return self._last_sound(time) if time > self._window.start and self._faults(np.array([time]))[0] else None
+
+    def first_stop(self, until: float) -> Stop | None:
+        """The first moment before `until` seconds of the clock from which on the motion is held; checks all of it."""
+        grid = self._grid[self._grid <= until]
+        wrong = np.flatnonzero(self._faults(grid))
+        if len(wrong):
+            return self._last_sound(float(grid[wrong[0]]))
+        return self._after_window(until) if until > self._window.stop else None
+
+    def _held(self, times: Times) -> Times:
+        latest = float(times.max(initial=self._window.start))
+        end = self._after_window(latest) if latest > self._window.stop else None
+        out = times if end is None else np.where(times > self._window.stop, np.minimum(times, end.time), times)
+        inside = np.flatnonzero((out <= self._window.stop) & (out > self._window.start))
+        wrong = inside[self._faults(out[inside]) != SOUND] if len(inside) else inside
+        if len(wrong):
+            out = out.copy()
+            out[wrong] = [self._last_sound(float(time)).time for time in out[wrong]]
+        return out
+
+    @cached_property
+    def _grid(self) -> Times:
+        """Times of the window without its start, where the body is at rest."""
+        count = round((self._window.stop - self._window.start) / self._step)
+        return self._window.start + self._step * np.arange(1, count + 1)
+
+    def _faults(self, times: Times) -> Ints:
+        """(T,) what is wrong, energy aside; `SOUND` where nothing is."""
+        if not len(times):
+            return np.zeros(0, dtype=int)
+        return _faults(self.sample(times), self._limits)
+
+    def _last_sound(self, time: float) -> Stop:
+        """The last sound moment in the window before `time`, which is not sound."""
+        grid = self._grid[self._grid < time]
+        sound = np.flatnonzero(self._faults(grid) == SOUND)
+        index = int(sound[-1]) + 1 if len(sound) else 0
+        begin = float(grid[index - 1]) if index else self._window.start
+        return self._refined(begin, float(grid[index]) if index < len(grid) else time)
+
+    def _refined(self, begin: float, end: float) -> Stop:
+        """The last sound moment between a sound one and one that is not."""
+        fault = SOUND
+        for _ in range(2):
+            times = np.linspace(begin, end, REFINED + 1)
+            faults = self._faults(times[1:])
+            first = int((faults != SOUND).argmax())
+            begin, end, fault = float(times[first]), float(times[first + 1]), int(faults[first])
+        return Stop(begin, REASONS.get(fault, ""))
+
+    def _after_window(self, until: float) -> Stop | None:
+        """The end of the motion, if it is before `until`."""
+        while self._end is None and self._window.stop + self._steps * self._step < until:
+            self._check_on()
+        return self._end if self._end is not None and self._end.time < until else None
+
+    def _check_on(self) -> None:
+        """Check the next times after the window; for any request they are the same, in the same order."""
+        steps, stop = self._steps, self._window.stop
+        if not steps and self._faults(np.array([stop]))[0] != SOUND:
+            self._end = self._last_sound(stop)
+            return
+        times = stop + self._step * np.arange(steps - 1, steps + CHUNK + 2)
+        sample = self.sample(times)
+        faults = _faults(sample, self._limits)[1:-1]
+        driven = self._energy(times, sample) > self._limits.energy * self._most_energy
+        faults[(faults == SOUND) & driven] = DRIVEN
+        wrong = np.flatnonzero(faults[1:] != SOUND)
+        if not len(wrong):
+            self._steps = steps + CHUNK
+            return
+        first = int(wrong[0]) + 1
+        before, after = float(times[first]), float(times[first + 1])
+        self._end = Stop(before, REASONS[DRIVEN]) if faults[first] == DRIVEN else self._refined(before, after)
+
+    def _energy(self, times: Times, sample: Sample) -> Floats:
+        """(T - 2,) energy of the centre, per mass, at all but the first and the last of evenly spaced times."""
+        with np.errstate(all="ignore"):
+            speed = (sample.centre[2:] - sample.centre[:-2]) / (times[2:] - times[:-2])[:, None]
+            height = sample.centre[1:-1, 2] - self._ground
+            return self._limits.gravity * height + 0.5 * (speed**2).sum(axis=1)
+
+    @cached_property
+    def _coarse(self) -> tuple[Times, Sample]:
+        times = np.linspace(self._window.start, self._window.stop, COARSE + 1)[1:]
+        return times, self.sample(times)
+
+    @cached_property
+    def _ground(self) -> float:
+        """The lowest height of the centre in the window."""
+        return float(self._coarse[1].centre[:, 2].min())
+
+    @cached_property
+    def _most_energy(self) -> float:
+        """The largest energy in the window."""
+        return float(self._energy(*self._coarse).max())
+
+
+def _faults(sample: Sample, limits: Limits) -> Ints:
+    finite = np.isfinite(sample.lowest) & np.isfinite(sample.deformation) & np.isfinite(sample.centre).all(axis=1)
+    out = np.where(finite, SOUND, NON_FINITE)
+    with np.errstate(invalid="ignore"):
+        out[finite & (sample.deformation > limits.deformation)] = DEFORMED
+        if limits.floor is not None:
+            out[finite & (sample.lowest < limits.floor - limits.depth + SLACK)] = SUNK
+    return out

@@ -1,0 +1,81 @@
+"""Scenes in which a sphere pushes a body: their parameters are `object`, `contact_x` to `_z`, `force_x` to `_z`."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from odeform.geometry.contact import RADIUS, nearest_on
+from odeform.geometry.push import TOWARDS, Push, default_contact, push_of
+from odeform.schema import OBJECT, Parameters
+from odeform.types import Mesh, Vector
+
+__all__ = ["CONTACT", "FORCE", "Contacts", "contact_parameters", "push_from", "vector_of"]
+
+MIDDLING = 0.7  # from the weakest to the strongest force of an object: that of a push that is not given
+CONTACT, FORCE = "contact", "force"
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """What pushes, and how."""
+
+    forces: Callable[[str], tuple[float, float]]
+    """Weakest and strongest force on an object in newton."""
+    pulse: float
+    """Seconds from 0 on during which the sphere pushes."""
+    radius: float = RADIUS
+    """Of the sphere in metres."""
+
+    def complete(
+        self, given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float] | None = None
+    ) -> dict[str, Any]:
+        """A contact and a force for those that are not given, on a body at rest.
+
+        `forces` are the weakest and the strongest on it in newton, by default those of the object.
+
+        The contact is a visible point of its surface, on the side that a given force pushes from; the force is of
+        middling strength, straight into the surface. What is given only in part, or is not a number, is left alone.
+        """
+        try:
+            contact, force = (_given(given, name) for name in (CONTACT, FORCE))
+        except (TypeError, ValueError):
+            return dict(given)
+        if contact is not None and force is not None:
+            return dict(given)
+        if contact is None:
+            pushed = force is not None and force.any()
+            at = default_contact(rest, -force if pushed else TOWARDS)  # pyright: ignore[reportOptionalOperand]
+        else:
+            at = nearest_on(rest, contact)
+        weakest, strongest = forces or self.forces(str(given.get(OBJECT, "")))
+        push = Push(at, weakest + MIDDLING * (strongest - weakest))
+        return {**contact_parameters(push), **given}
+
+
+def _given(given: Mapping[str, Any], name: str) -> Vector | None:
+    """The vector of that name; None if no part of it is given. ValueError or TypeError if it is not three numbers."""
+    parts = [given.get(f"{name}_{axis}") for axis in "xyz"]
+    if all(part is None for part in parts):
+        return None
+    vector = np.array([float(part) for part in parts])  # pyright: ignore[reportArgumentType]
+    if not np.isfinite(vector).all():
+        raise ValueError(name)
+    return vector
+
+
+def vector_of(parameters: Parameters, name: str) -> Vector:
+    """(3,) the parameters NAME_x, NAME_y and NAME_z."""
+    return np.array([float(parameters[f"{name}_{axis}"]) for axis in "xyz"])
+
+
+def contact_parameters(push: Push) -> dict[str, float]:
+    """The parameters of a scene that a push stands for."""
+    both = ((CONTACT, push.contact.point), (FORCE, push.force))
+    return {f"{name}_{axis}": float(x) for name, vector in both for axis, x in zip("xyz", vector, strict=True)}
+
+
+def push_from(parameters: Parameters, rest: Mesh) -> Push:
+    """The push that parameters describe, at the point of the body at rest that is nearest to their contact."""
+    return push_of(nearest_on(rest, vector_of(parameters, CONTACT)), vector_of(parameters, FORCE))

@@ -1,0 +1,174 @@
+"""Scene `contact-force`: a sphere is driven into a soft body that rests on the floor, and is then gone."""
+
+import zlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from odeform.geometry.contact import RADIUS, checked_contact
+from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
+from odeform.simulation.contact_draws import contact_draws
+from odeform.simulation.contacts import Contacts, vector_of
+from odeform.simulation.errors import SimulationError
+from odeform.simulation.glyphs import Arrow
+from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.simulation.objects.soft_object import SoftObject
+from odeform.simulation.objects.tetrahedra import inside_out
+from odeform.simulation.physics import GRAVITY
+from odeform.simulation.scene import Scene
+from odeform.simulation.stepping import run
+from odeform.types import Mesh, MotionSequence, Points, Vector
+
+__all__ = ["PULSE", "SCENE", "contact_and_force", "glyphs", "simulate", "simulate_object"]
+
+PULSE = 0.040  # s
+STEP = 5e-4  # s, until the projectile has been gone for a while; twice that afterwards
+COARSE_FROM = 0.050  # s
+
+
+def _contact(axis: str, low: float, high: float, default: float) -> Parameter:
+    return Parameter(
+        f"contact_{axis}", "m", low, high, default, description=f"{axis} of the point where the sphere touches the body"
+    )
+
+
+def _force(axis: str, default: float) -> Parameter:
+    return Parameter(f"force_{axis}", "N", -25.0, 25.0, default, description=f"{axis} of the force on the sphere")
+
+
+SCHEMA = Schema(
+    scene="contact-force",
+    parameters=(
+        _contact("x", -0.32, 0.32, 0.038),
+        _contact("y", -0.22, 0.22, 0.0),
+        _contact("z", 0.0, 0.45, 0.1),
+        _force("x", -8.0),
+        _force("y", 0.0),
+        _force("z", 0.0),
+    ),
+    window=Window(0.0, 0.19, 100.0),
+    objects=OBJECTS,
+    notes=(
+        "The body rests on the floor. A rigid sphere (radius 20 mm, 20 g, weightless) touches it at the contact, is "
+        "driven by the constant force along its direction for 40 ms, and is then gone.",
+        "Contacts lie on the surface of the settled body, forces within 45 degrees of the inward normal.",
+    ),
+)
+
+
+def contact_and_force(parameters: Parameters) -> tuple[Vector, Vector]:
+    """(3,) m and (3,) N of a parameter set."""
+    return vector_of(parameters, "contact"), vector_of(parameters, "force")
+
+
+def simulate(
+    parameters: Parameters,
+    rate: float | None = None,
+    step: float = STEP,
+    report: Callable[[float], None] = lambda _: None,
+) -> MotionSequence:
+    """One motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
+
+    See `simulate_object`.
+    """
+    return simulate_object(get_object(parameters[OBJECT]), parameters, rate, step, report)
+
+
+def simulate_object(
+    item: SoftObject,
+    parameters: Parameters,
+    rate: float | None = None,
+    step: float = STEP,
+    report: Callable[[float], None] = lambda _: None,
+) -> MotionSequence:
+    """One motion of the surface of any soft object over the scene's window, with frames at `rate` Hz.
+
+    `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the share done. Frame 0
+    is the settled body. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError` for a
+    contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and
+    `SimulationError`.
+    """
+    # here, so that looking at the scene and training on its data need no simulator
+    from odeform.simulation.objects.body import SoftBody, contact_of
+    from odeform.simulation.projectile import StruckBody, projectile_xml
+
+    window, rest = SCHEMA.window, item.rest_mesh()
+    rate = rate or window.rate
+    contact, force = contact_and_force(parameters)
+    at, centre = checked_contact(rest, contact, force)
+    others = projectile_xml(centre, force if force.any() else -at.normal, contact_of(item.material))
+    body = SoftBody(item.points, item.elements, item.material, step, others=others)
+    body.positions = item.settled
+    struck = StruckBody(body, force, PULSE)
+
+    def share(now: float) -> None:
+        report(now / window.stop)
+
+    times, nodes = run(struck, COARSE_FROM, rate, report=share)
+    body.set_timestep(2.0 * step)
+    later, more = run(struck, window.stop, rate, begin=COARSE_FROM, report=share)
+    new = later > times[-1] + 0.5 / rate
+    _check_orientation(item, more[-1])
+    vertices = np.concatenate([nodes, more[new]])[:, : item.surface_count]
+    return MotionSequence(
+        np.concatenate([times, later[new]]), vertices.astype(np.float32), item.faces, item.weights, dict(parameters)
+    )
+
+
+def _check_orientation(item: SoftObject, nodes: Points) -> None:
+    """Raise `SimulationError` if tetrahedra stay inside out at the end: too strong a pulse for this material law."""
+    if inverted := int(inside_out(nodes, item.elements).sum()):
+        raise SimulationError(f"{inverted} of {len(item.elements)} tetrahedra are inside out at the end")
+
+
+def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` parameter sets of the object `name`; see `contact_draws`."""
+    item = get_object(name)
+    drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed, zlib.crc32(name.encode())])
+    return [
+        {
+            f"{key}_{axis}": float(x)
+            for key, row in (("contact", c), ("force", f))
+            for axis, x in zip("xyz", row, strict=True)
+        }
+        for c, f in drawn
+    ]
+
+
+def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
+    """The force on the sphere, as an arrow that ends at its far side; its length is in proportion to the force."""
+    if not {p.name for p in SCHEMA.parameters} <= set(parameters):
+        return ()
+    contact, force = contact_and_force(parameters)
+    strength, size = float(np.linalg.norm(force)), float(np.ptp(rest_points, axis=0).max())
+    if strength == 0.0:
+        return ()
+    strongest = get_object(parameters.get(OBJECT, OBJECTS[0])).forces[1]
+    direction = force / strength
+    vector = 0.4 * size * min(strength / strongest, 2.0) * direction
+    return (Arrow(contact - 2.0 * RADIUS * direction - vector, vector, f"{strength:.1f} N", 0.0, PULSE),)
+
+
+def forces(name: str) -> tuple[float, float]:
+    """Weakest and strongest force on an object in newton; those of the first for an unknown one."""
+    return get_object(name if name in OBJECTS else OBJECTS[0]).forces
+
+
+def rest_mesh(name: str = OBJECTS[0]) -> Mesh:
+    """The settled surface of an object."""
+    return get_object(name).rest_mesh()
+
+
+SCENE = Scene(
+    schema=SCHEMA,
+    simulate=simulate,
+    rest_mesh=rest_mesh,
+    step=STEP,
+    count=300,
+    fixed={"pulse_s": PULSE, "projectile_radius_m": RADIUS, "projectile_mass_kg": 0.020, "gravity_m_s2": GRAVITY},
+    gravity=GRAVITY,
+    glyphs=glyphs,
+    contacts=Contacts(forces, PULSE),
+    sampler=sample,
+)

@@ -1,0 +1,85 @@
+"""Two sections of the page of tables: what each part of ODeform gives, and what fewer training sequences cost."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from odeform.tables.cells import Runs, models, paragraph, scored_rows, scores_of, table
+from odeform.tables.plan import ABLATED, BALLS, FEWER, FRAMES
+
+__all__ = ["ablations", "learning_curve"]
+
+PAIR = ("RMSE", "deformation, %")
+LABELS = {
+    "ode": "the ODE: states stay as they start",
+    "clock": "the clock of the decoders",
+    "parameters": "the parameters of the decoders",
+    "random-features": "random features",
+    "correction": "the regression of what is left",
+}
+
+
+def ablations(runs: Runs) -> list[str]:
+    """Rows by what was left out, columns by scene."""
+    head = ["without", *(f"{scene}, {unit}" for scene in BALLS for unit in PAIR)]
+    scores = {
+        _label(parts): [cell for scene in BALLS for cell in _pair(runs, scene, without=parts)] for parts in ABLATED
+    }
+    if not any(any(row) for row in scores.values()):
+        return []
+    return [
+        "## Ablations",
+        "",
+        *paragraph(
+            "`odeform` without some of its parts, trained again with the same steps (`--without`).",
+            "Without the regression of what is left unexplained, the ODE is on its own; the rows below it leave out",
+            "more. Deformation is relative, as elsewhere.",
+        ),
+        "",
+        *table(head, scored_rows(scores)),
+    ]
+
+
+def _label(parts: Sequence[str]) -> str:
+    """What a row leaves out, in words."""
+    others = [LABELS[part] for part in parts if part != "correction"]
+    if not parts:
+        return "nothing"
+    return ", ".join(f"– {label}" for label in others) if others else LABELS["correction"]
+
+
+def _pair(runs: Runs, scene: str, **attributes: Any) -> list[list[float]]:
+    """Pooled RMSE in mm and deformation error in per cent, one of each per seed."""
+    rmse, deformation = (
+        scores_of(runs, FRAMES[scene], metric, scene=scene, **attributes)
+        for metric in ("rmse_pooled_mm", "deformation_relative")
+    )
+    return [rmse, [100.0 * value for value in deformation]]
+
+
+def learning_curve(runs: Runs) -> list[str]:
+    """A table for each scene: models by number of training sequences."""
+    sections = []
+    for scene, counts in FEWER.items():
+        names = models(runs, scene=scene)
+        sizes = [*counts, None]
+        rows = scored_rows(
+            {
+                model: [cell for count in sizes for cell in _pair(runs, scene, model=model, sequences=count)]
+                for model in names
+            }
+        )
+        labels = [*map(str, counts), "all"]
+        head = [scene, *(f"{label}, {unit}" for label in labels for unit in PAIR)]
+        sections += table(head, rows) if names else []
+    if not sections:
+        return []
+    return [
+        "## Learning curve",
+        "",
+        *paragraph(
+            "Trained on the first so many training sequences (`--sequences`), with the same steps;",
+            "validation and test are the same.",
+        ),
+        "",
+        *sections,
+    ]

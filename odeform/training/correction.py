@@ -1,0 +1,90 @@
+"""The regression of what a trained latent ODE leaves unexplained, kept where it explains validation motions."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.dataset.training_data import TrainingData
+from odeform.models.kernel_search import search_ridge
+from odeform.models.odeform.correction import PARTS, CorrectedPart, Correction
+from odeform.models.odeform.model import ODeform
+from odeform.training.pruning import FINE
+from odeform.types import Floats
+
+__all__ = ["with_correction"]
+
+LEFT_OUT = 1e-3  # of the mean square error on validation: what the modes of the residuals may leave out
+EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
+
+
+def with_correction(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
+    """The checkpoint of a trained ODeform with a correction of those parts of y that it improves on validation.
+
+    Unchanged where that holds for all parts, and where a spline filled in frames.
+    """
+    model = ODeform(checkpoint)
+    if not all(data.observed[split].all() for split in data.observed):
+        return checkpoint
+    evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
+    parts = {}
+    own = {
+        split: np.stack(
+            [model.integrate(one, evaluated, FINE, float(times[-1])).reduced(times) for one in data.theta[split]]
+        )
+        for split in data.theta
+    }
+    for name, columns in PARTS.items():
+        truth, motion = ({split: _flat(of[split], columns) for split in of} for of in (data.reduced, own))
+        if not truth["train"].any() and not motion["train"].any():
+            continue
+        part, explained = _fitted(data.theta, truth, motion)
+        if explained >= EXPLAINED:
+            parts[name] = part
+    if not parts:
+        return checkpoint
+    correction = Correction(times, data.reduced["train"].shape[2], parts)
+    shares = {name: round(part.share, 3) for name, part in parts.items()}
+    config = {**checkpoint.config, "correction": {"share_of_ode": shares}}
+    return replace(checkpoint, config=config, arrays={**checkpoint.arrays, **correction.arrays()})
+
+
+def _flat(reduced: Floats, columns: slice) -> Floats:
+    return reduced[..., columns].reshape(len(reduced), -1)
+
+
+def _fitted(
+    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats]
+) -> tuple[CorrectedPart, float]:
+    """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
+
+    Length scales and ridge minimise the leave-one-out error of the training motions themselves: residuals on training
+    do not tell how smooth those of other parameters are, and a search on few validation motions fits their noise. The
+    share has the smallest error on validation, relative in each sequence: in small sets one hard sequence would decide.
+    """
+    known, asked = theta["train"], theta["val"]
+    mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
+    # inner products are all that the search needs: coordinates in place of entries
+    u, sizes, _ = np.linalg.svd(truth["train"] - mean, full_matrices=False)
+    ridge = search_ridge(known.shape[1], lambda ridge: float(np.linalg.norm(ridge.left_out(known, u * sizes))))[0]
+
+    alone = mean + ridge.predict(asked, known, truth["train"] - mean) - truth["val"]
+    added = motion["val"] - own - ridge.predict(asked, known, motion["train"] - own)
+    left = motion["val"] - truth["val"]
+    weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
+    share = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
+    share = float(np.clip(share, 0.0, 1.0))
+    missed = alone + share * added
+    explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
+
+    rest = truth["train"] - share * motion["train"]
+    u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
+    dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
+    count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
+    coefficients = ridge.weights(known, (u * sizes)[:, :count])
+    part = CorrectedPart(known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share)
+    return part, float(explained)
+
+
+def _norms(rows: Floats) -> Floats:
+    return np.linalg.norm(rows, axis=1)

@@ -1,0 +1,27 @@
+"""What people do with the page, as scripts: `SCRIPTS` by the control that each needs. `Missed` if one fails."""
+
+from collections.abc import Callable
+
+from odeform_viz.benchmark.use.columns import compare
+from odeform_viz.benchmark.use.downloads import export, take_pictures
+from odeform_viz.benchmark.use.fits import fit
+from odeform_viz.benchmark.use.recordings import record
+from odeform_viz.benchmark.use.shapes import load_shapes
+from odeform_viz.benchmark.use.simulations import simulate
+from odeform_viz.benchmark.use.states import save_and_restore
+from odeform_viz.benchmark.use.visits import come_and_go
+from odeform_viz.benchmark.visitors import Visitors
+
+__all__ = ["SCRIPTS"]
+
+SCRIPTS: tuple[tuple[Callable[[Visitors], None], str], ...] = (
+    (compare, "Pin these parameters"),
+    (export, "Download"),
+    (take_pictures, "Film (.webp)"),
+    (fit, "Fit to the truth"),
+    (record, "Start recording"),
+    (load_shapes, "Load a shape..."),
+    (simulate, "Simulate this"),
+    (save_and_restore, "Save state"),
+    (come_and_go, "time (s)"),
+)

@@ -1,0 +1,61 @@
+"""What the colors of a frame show: displacement, strain, or the distance from the truth."""
+
+import numpy as np
+
+from odeform.motion.recorded import RecordedMotion
+from odeform.types import Geometry, Mesh, Perpoint
+from odeform_viz.coloring.interpolation import NearestInterpolation
+from odeform_viz.coloring.scale import ScaleFitter
+from odeform_viz.coloring.strain import SurfaceStrain
+from odeform_viz.view import Coloring, ColumnFrame, Frame
+
+__all__ = ["Colorist"]
+
+USED = 0.99  # quantile of the values that the scale reaches: single vertices do not set it
+
+
+class Colorist:
+    """Computes the values, and fits one scale to all visible columns. It keeps what depends on shapes alone."""
+
+    def __init__(self) -> None:
+        self._fitter = ScaleFitter()
+        self._strains: dict[int, tuple[Geometry, SurfaceStrain]] = {}
+        self._carried: dict[int, tuple[RecordedMotion, Geometry, NearestInterpolation]] = {}
+
+    def color(self, frame: Frame, quantity: str) -> Coloring | None:
+        """The values of each column; None where no visible column has any, as for errors without a truth."""
+        values = {c.column.key: found for c in frame.columns if (found := self._values(c, frame, quantity)) is not None}
+        if not values:
+            return None
+        largest = max(float(np.quantile(found, USED)) for found in values.values())
+        return Coloring(self._fitter.fit(quantity, largest), values)
+
+    def _values(self, shown: ColumnFrame, frame: Frame, quantity: str) -> Perpoint | None:
+        rest = shown.column.geometry
+        if quantity == "displacement":
+            if shown.points is None:
+                return np.zeros(len(rest.points))
+            return 1e3 * np.linalg.norm(np.subtract(shown.points, rest.points, dtype=float), axis=1)
+        if quantity == "strain" and isinstance(rest, Mesh):
+            return 100.0 * self._strain(shown, rest)
+        if quantity == "error" and shown.error is not None and frame.truth is not None:
+            return self._on_column(shown, frame.truth, 1e3 * shown.error.distances)
+        return None
+
+    def _strain(self, shown: ColumnFrame, rest: Mesh) -> Perpoint:
+        if shown.points is None:
+            return np.zeros(len(rest.points))
+        known = self._strains.get(shown.column.key)
+        if known is None or known[0] is not rest:
+            known = self._strains[shown.column.key] = (rest, SurfaceStrain(rest))
+        return known[1](shown.points)
+
+    def _on_column(self, shown: ColumnFrame, truth: ColumnFrame, values: Perpoint) -> Perpoint:
+        """Values at the truth's vertices, carried to the points of the column."""
+        record, rest = truth.motion, shown.column.geometry
+        assert isinstance(record, RecordedMotion)
+        known = self._carried.get(shown.column.key)
+        if known is None or known[0] is not record or known[1] is not rest:
+            carried = NearestInterpolation(record.geometry.points, rest.points)
+            known = self._carried[shown.column.key] = (record, rest, carried)
+        return known[2](values)

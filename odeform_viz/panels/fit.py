@@ -1,0 +1,168 @@
+"""Fits the parameters of the model to the visible truth, step by step before the user's eyes."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from odeform.errors import InputError
+from odeform.identification.identify import Identification
+from odeform.identification.known import why_not_identifiable
+from odeform.identification.observation import View, observe
+from odeform.motion.recorded import RecordedMotion
+from odeform.schema import Parameters, Schema
+from odeform_viz.columns import Column
+from odeform_viz.page import Page, Panel
+from odeform_viz.runtime.jobs import Job, fit_parameters
+
+__all__ = ["FitPanel", "describe_identification"]
+
+LABEL = "fit"
+NO_TRUTH = "Choose a test sequence or simulate one: its motion is fitted, not its parameters."
+FAILED = "⚠ **The fit failed**: {}"
+EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
+
+
+def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
+    """Markdown of estimates with their 90 % intervals, beside the true parameters where they are known."""
+    rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
+    for p in schema.learned:
+        one, true = found.parameters[p.name], truth.get(p.name)
+        estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
+        known = "" if true is None else f"{true:.3g}"
+        rows.append(f"| {p.name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
+    explained = (
+        "model and noise explain the motion"
+        if found.misfit <= EXPLAINED
+        else "⚠ **the model does not explain this motion**, and the intervals are wider for it"
+    )
+    return "\n".join([*rows, "", f"Misfit {found.misfit:.2g}: {explained}. {found.seconds:.1f} s."])
+
+
+class FitPanel(Panel):
+    """A button, the steps of the search as a column of their own, and the estimates.
+
+    The search runs in a process of its own: sliders stay as quick as without it.
+    """
+
+    def __init__(self, page: Page) -> None:
+        self._page, self._columns = page, page.columns
+        self._lock = threading.Lock()
+        self._job: Job | None = None
+        self._truth: RecordedMotion | None = None
+        self._found: Parameters = {}
+        gui = page.server.gui
+        with gui.add_folder("Fit"):
+            self._text = gui.add_markdown(NO_TRUTH)
+            self._start = gui.add_button("Fit to the truth", hint="find the parameters that explain the visible truth")
+            self._start.on_click(lambda _: self._begin())
+            self._cancel = gui.add_button("Cancel the fit", color="gray", visible=False)
+            self._cancel.on_click(lambda _: self.close())
+            self._use = gui.add_button("Set sliders to the estimate", color="gray", visible=False)
+            self._use.on_click(lambda _: self._use_estimate())
+        page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
+        self._refresh()
+
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        predictor = page.model.predictor
+        return predictor is not None and not why_not_identifiable(predictor)
+
+    def close(self) -> None:
+        """Cancel the search in progress, if any."""
+        with self._lock:
+            if self._job is not None and self._job.running:
+                self._job.cancel()
+                self._show("")
+
+    def _refresh(self) -> None:
+        """Follow the visible truth: another one has no estimate yet."""
+        column = self._columns.truth
+        truth = column.truth if column is not None and column.visible else None
+        self._start.disabled = truth is None
+        if truth is not self._truth:
+            self._truth = truth
+            self.close()
+            self._show("" if truth else NO_TRUTH)
+
+    def _show(self, text: str, found: Parameters | None = None, working: bool = False) -> None:
+        self._text.content, self._text.visible = text, bool(text)
+        self._found = found or {}
+        self._use.visible = bool(found)
+        self._start.visible, self._cancel.visible = not working, working
+
+    def _begin(self) -> None:
+        with self._lock:
+            truth, model = self._truth, self._page.model
+            if truth is None or model.predictor is None or (self._job is not None and self._job.running):
+                return
+            schema, predictor = self._page.schema, model.predictor
+            try:
+                observation = observe(truth.sequence, schema, View())
+            except InputError as error:
+                self._show(FAILED.format(error))
+                return
+            fixed = {p.name: truth.setting[p.name] for p in schema.parameters if p.role == "azimuth"}
+            search = _Search(self._page, model, truth.setting, fixed, self._show)
+            arguments = type(predictor), predictor.checkpoint, observation
+            self._show("starting", working=True)
+            self._page.controls.set_overlay(True)
+            self._job = Job(fit_parameters, arguments, search.done, search.failed, search.progress)
+            self._job.start()
+
+    def _use_estimate(self) -> None:
+        self._page.controls.set_parameters(self._found)
+        self._page.wake()
+
+
+@dataclass
+class _Search:
+    """One search: shows each step in a column of its own."""
+
+    page: Page
+    model: Column
+    truth: Parameters
+    fixed: Parameters
+    """Known parameters, which are not searched."""
+    show: Callable[..., None]
+    misfits: list[str] = field(default_factory=list)
+    key: int | None = None
+
+    def progress(self, report: float | tuple[dict[str, float], float]) -> None:
+        """Show a step, or how far a calibration is."""
+        if not isinstance(report, tuple):
+            self.show(f"Measuring the model's own error first: {100.0 * report:.0f} %", working=True)
+            return
+        parameters, misfit = report
+        self.misfits.append(f"{misfit:.3g}")
+        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items())
+        steps = " → ".join(self.misfits[-6:])
+        self.show(f"step {len(self.misfits)}: {values}  \nmisfit {steps}", working=True)
+        self._place(parameters)
+
+    def done(self, found: Identification) -> None:
+        """Show the estimates."""
+        estimate = {name: one.value for name, one in found.parameters.items()}
+        self._place(estimate)
+        text = describe_identification(found, self.page.schema, self.truth)
+        self.show(text, {**self.fixed, **estimate})
+
+    def failed(self, message: str) -> None:
+        """Say why there are none."""
+        self.show(FAILED.format(message))
+
+    def _place(self, parameters: Parameters) -> None:
+        """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
+        columns = self.page.columns
+        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True)
+        mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
+        if mine:
+            self.key = mine[0].key
+            columns.change(lambda all_: [_moved(c, column) if c.key == self.key else c for c in all_])
+        else:
+            columns.add(column)
+            self.key = next(c.key for c in reversed(columns.all) if c.pinned == column.pinned)
+        self.page.columns_changed()
+
+
+def _moved(known: Column, column: Column) -> Column:
+    return replace(column, label=known.label, key=known.key, color_index=known.color_index)

@@ -1,0 +1,114 @@
+"""A shape of the user's own as a soft body: made in a process of its own, which can be cancelled."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import viser
+
+from odeform.errors import InputError
+from odeform_viz.fitting import MOST_POINTS, readable_shape
+from odeform_viz.own_shapes import (
+    OwnBody,
+    describe_own_body,
+    own_of,
+    takes_own_bodies,
+    with_own_body,
+    without_own_body,
+)
+from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import LOCK, serialized, take_upload
+from odeform_viz.runtime.jobs import Job, own_body_of
+from odeform_viz.state import PageState
+
+__all__ = ["OwnShapePanel"]
+
+LARGEST = 256 << 20  # bytes of an upload
+TRAINED = "The trained bodies. A closed mesh, or points or splats of a solid, can be pushed as well."
+WORKING = "**{}** is being repaired, filled with tetrahedra and laid on the floor. This takes up to a minute."
+
+
+class OwnShapePanel(Panel):
+    """Loads a shape, and goes back to the trained bodies."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self._job: Job | None = None
+        gui = page.server.gui
+        with gui.add_folder("Shape", expand_by_default=False):
+            self._text = gui.add_markdown(TRAINED)
+            hint = f"a mesh, points or Gaussian splats of one solid body, up to {MOST_POINTS:,} points"
+            self._load = gui.add_upload_button("Load a shape...", color="gray", hint=hint)
+            self._load.on_upload(lambda event: self._upload(take_upload(event)))
+            self._cancel = gui.add_button("Cancel", color="gray", visible=False)
+            self._cancel.on_click(serialized(self._give_up))
+            self._back = gui.add_button("Back to the trained bodies", color="gray", visible=False)
+            self._back.on_click(serialized(self._go_back))
+        self._show()
+
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        predictor = page.model.predictor
+        return predictor is not None and takes_own_bodies(predictor)
+
+    def restore(self, state: PageState) -> None:
+        self._show()
+
+    def close(self) -> None:
+        """Cancel the work in progress, if any."""
+        if self._job is not None and self._job.running:
+            self._job.cancel()
+
+    def load(self, path: str | Path, name: str, origin: str) -> None:
+        """Make a body of a file in another process, and show it. `InputError` for a file that cannot be read."""
+        geometry, _ = readable_shape(path)
+        with LOCK:
+            self.close()
+            self._job = Job(own_body_of, (geometry, name), lambda own: self._made(own, origin), self._failed)
+            self._working(WORKING.format(name))
+            self._job.start()
+
+    def _upload(self, file: viser.UploadedFile) -> None:
+        try:
+            if len(file.content) > LARGEST:
+                raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
+            # readers take paths, so the file exists while it is read
+            with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
+                path = Path(folder) / f"shape{Path(file.name).suffix}"
+                path.write_bytes(file.content)
+                try:
+                    self.load(path, file.name, origin="")
+                except InputError as error:
+                    raise InputError(str(error).replace(str(path), file.name).replace(path.name, file.name)) from None
+        except (InputError, OSError) as error:
+            self._failed(str(error))
+
+    def _made(self, own: OwnBody, origin: str) -> None:
+        with LOCK:
+            made = replace(own, fit=replace(own.fit, origin=origin))
+            self._page.columns.change(lambda columns: with_own_body(columns, made))
+            self._show()
+        self._page.clock.seek(self._page.schema.window.start)
+        self._page.columns_changed()
+
+    def _failed(self, message: str) -> None:
+        self._page.notices.show("Shape not loaded", message)
+        self._show()
+        self._text.content = f"⚠ **{message}**"  # stays after the notification
+
+    def _give_up(self) -> None:
+        self.close()
+        self._show()
+
+    def _go_back(self) -> None:
+        self._page.columns.change(without_own_body)
+        self._show()
+        self._page.columns_changed()
+
+    def _working(self, text: str) -> None:
+        self._text.content, self._cancel.visible, self._load.visible = text, True, False
+
+    def _show(self) -> None:
+        own = own_of(self._page.model.predictor)
+        self._text.content = TRAINED if own is None else describe_own_body(own)
+        self._back.visible, self._cancel.visible, self._load.visible = own is not None, False, True

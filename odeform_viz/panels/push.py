@@ -1,0 +1,231 @@
+"""What a sphere pushes, where and how hard: an object, a contact to click, and a force in the contact's frame."""
+
+import math
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+import viser
+
+from odeform.errors import InputError
+from odeform.geometry.contact import CONE, nearest_on, touching_centre
+from odeform.geometry.push import Push, push_of
+from odeform.schema import OBJECT
+from odeform.simulation.contacts import contact_parameters, push_from
+from odeform.types import Mesh, Vector
+from odeform_viz.columns import Column
+from odeform_viz.own_shapes import own_of
+from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import set_content
+from odeform_viz.pushing import ShownPush, contacts_of, push_excess, surface_of
+from odeform_viz.state import PageState
+from odeform_viz.view import Description
+
+__all__ = ["PushPanel"]
+
+MARGIN = 1.5  # times the strongest trained force: the end of the slider
+WIDEST = 60.0  # degrees of each tilt
+HINT = "Click the body to choose where the sphere pushes. Drag the ball at the arrow's tail to change the force."
+
+
+class PushPanel(Panel):
+    """Holds the scene's own parameters; the sliders show them in the contact's frame, and change them."""
+
+    def __init__(self, page: Page) -> None:
+        self._page, self._schema = page, page.schema
+        self._lock = threading.RLock()
+        self._left: dict[str, dict[str, Any]] = {}  # by object: its parameters when it was left
+        self._resumes: tuple[bool, float] | None = None  # whether it played, and when, before the arrow was dragged
+        own = own_of(page.model.predictor)
+        liked = own is not None and own.like in self._schema.objects
+        self._parameters = self._defaults(own.like if own and liked else self._schema.objects[0])
+        self._surface = surface_of(page.model, self._parameters)
+        gui = page.server.gui
+        with gui.add_folder("Push"):
+            self._object = gui.add_dropdown(
+                "object", self._schema.objects, visible=len(self._schema.objects) > 1, hint="the body that is pushed"
+            )
+            self._text = gui.add_markdown("")
+            self._strength = gui.add_slider("force (N)", 0.0, 1.0, 0.01, 0.0, hint="")
+            self._up = self._add_tilt(gui, "tilt up (°)", "off the inward normal, along the surface and upwards")
+            self._side = self._add_tilt(gui, "tilt sideways (°)", "off the inward normal, along the surface")
+            buttons = gui.add_button_group("set", ("straight in", "default"), hint="the direction, or the whole push")
+            buttons.on_click(self._clicked)
+        for control in (self._object, self._strength, self._up, self._side):
+            control.on_update(lambda _: page.wake())
+        self._write()
+        controls = page.controls
+        controls.parameters, controls.set_parameters = self.parameters, self.set
+        controls.pick, controls.pull = self.pick, self.pull
+        page.on_columns_changed(self._follow_surface)
+        self._show()
+
+    @classmethod
+    def needed(cls, page: Page) -> bool:
+        return contacts_of(page.schema) is not None
+
+    def _add_tilt(self, gui: viser.GuiApi, name: str, hint: str) -> viser.GuiSliderHandle[float]:
+        cone = math.degrees(CONE)
+        marks = ((-cone, f"-{cone:.0f}"), (0.0, "0"), (cone, f"{cone:.0f}"))
+        return gui.add_slider(name, -WIDEST, WIDEST, 0.5, 0.0, marks=marks, hint=hint)
+
+    def parameters(self) -> dict[str, Any]:
+        """Those of the scene. `InputError` for values that no control can have."""
+        with self._lock:
+            self._follow_surface()
+            values = self._values()
+            if values == self._written:
+                return dict(self._parameters)
+            self._check(values)
+            name, strength, up, side = values
+            if values[1:] != self._written[1:]:
+                contact = push_from(self._parameters, self._surface).contact
+                self._adopt(Push(contact, float(strength), math.radians(up), math.radians(side)))
+                self._written = (self._written[0], strength, up, side)
+            if name != self._written[0]:
+                self._change_object(name)
+            return dict(self._parameters)
+
+    def set(self, parameters: Mapping[str, Any]) -> None:
+        """Set the scene's parameters of these names. `InputError` for unknown ones and values no motion can have."""
+        with self._lock:
+            changed = parameters.get(OBJECT, self._parameters[OBJECT]) != self._parameters[OBJECT]
+            base = {} if changed else self._parameters
+            self._parameters = self._schema.complete({**base, **self._completed(parameters, changed)})
+            self._surface = surface_of(self._page.model, self._parameters)
+            self._write()
+        self._page.wake()
+
+    def pick(self, column: Column | None, point: Vector) -> None:
+        """Move the contact to a point (3,) m of the shape at rest, with the same force in its frame."""
+        try:
+            with self._lock:
+                parameters = self.parameters()
+                self._check_pick(column, parameters)
+                contact = nearest_on(self._surface, point)
+                if touching_centre(self._surface, contact) is None:
+                    raise InputError("The sphere does not fit there: the floor or a part of the body is in its way.")
+                self._adopt(push_from(parameters, self._surface).at(contact))
+                self._write()
+        except InputError as error:
+            self._page.notices.show("Contact not moved", str(error))
+            return
+        if self._page.clock.playing:
+            self._page.clock.seek(self._schema.window.start)
+        self._page.wake()
+
+    def pull(self, push: ShownPush, tail: Vector, phase: str) -> None:
+        """Follow the arrow's tail, which is dragged to (3,) m; the body is at rest meanwhile, and moves afterwards."""
+        clock, start = self._page.clock, self._schema.window.start
+        if phase == "start":
+            self._resumes = clock.playing, clock.time()
+            self._page.pause_at(start)
+        with self._lock:
+            self._adopt(self._limited(push_of(push.push.contact, push.pulled_to(tail))))
+            self._write()
+        if phase == "end" and self._resumes is not None:
+            played, time = self._resumes
+            clock.seek(start if played else time)
+            if played:
+                clock.play()
+        self._page.wake()
+
+    def describe(self, description: Description) -> None:
+        self._show()
+
+    def show_error(self, message: str) -> None:
+        self._show()
+
+    def restore(self, state: PageState) -> None:
+        self.set(state.parameters)
+
+    def _completed(self, parameters: Mapping[str, Any], changed: bool) -> dict[str, Any]:
+        """With the defaults of an object that was not shown before."""
+        return {**self._defaults(str(parameters[OBJECT])), **parameters} if changed else dict(parameters)
+
+    def _defaults(self, name: str) -> dict[str, Any]:
+        predictor = self._page.model.predictor
+        assert predictor is not None
+        return predictor.complete({OBJECT: name})
+
+    def _forces(self) -> tuple[float, float]:
+        predictor = self._page.model.predictor
+        assert predictor is not None
+        return predictor.force_range(self._parameters)
+
+    def _values(self) -> tuple[str, float, float, float]:
+        return self._object.value, self._strength.value, self._up.value, self._side.value
+
+    def _check(self, values: tuple[str, float, float, float]) -> None:
+        self._schema.check_object(values[0])
+        for slider, value in zip((self._strength, self._up, self._side), values[1:], strict=True):
+            if not slider.min <= value <= slider.max:
+                raise InputError(f"{slider.label}: expected {slider.min:g} to {slider.max:g}, got {value:g}")
+
+    def _check_pick(self, column: Column | None, parameters: Mapping[str, Any]) -> None:
+        name = parameters[OBJECT]
+        if column is None:
+            raise InputError(f"That click is beside the {name}: click its surface to choose where the sphere pushes.")
+        if column.pinned is not None:
+            raise InputError(f"{column.label} is pinned: click a column that follows the sliders.")
+        if column.truth is not None and column.truth.parameters.get(OBJECT) != name:
+            raise InputError(f"The truth is of another object: click the {name}.")
+
+    def _change_object(self, name: str) -> None:
+        self._left[self._parameters[OBJECT]] = self._parameters
+        self._parameters = self._left.get(name) or self._defaults(name)
+        self._surface = surface_of(self._page.model, self._parameters)
+        self._write()
+
+    def _adopt(self, push: Push) -> None:
+        self._parameters = {**self._parameters, **contact_parameters(push)}
+
+    def _limited(self, push: Push) -> Push:
+        """The nearest that the sliders can show."""
+        far = max(push.angle / math.radians(WIDEST), 1.0)
+        return Push(push.contact, min(push.strength, self._strength.max), push.up / far, push.side / far)
+
+    def _follow_surface(self) -> None:
+        """After another shape was loaded, the contact is on its surface."""
+        with self._lock:
+            surface: Mesh = surface_of(self._page.model, self._parameters)
+            if surface is self._surface:
+                return
+            own = own_of(self._page.model.predictor)
+            like = own.like if own and own.like in self._schema.objects else str(self._parameters[OBJECT])
+            self._surface, self._left = surface, {}
+            self._parameters = self._defaults(like)
+            self._write()
+
+    def _write(self) -> None:
+        """Let the controls show the parameters."""
+        with self._lock, self._page.server.atomic():
+            name = str(self._parameters[OBJECT])
+            push, (weakest, strongest) = push_from(self._parameters, self._surface), self._forces()
+            self._object.visible = len(self._schema.objects) > 1 and not self._page.model.loaded
+            self._strength.max = MARGIN * strongest
+            self._strength.hint = f"of the sphere on the body; trained range {weakest:g} to {strongest:g} N"
+            shown = (round(push.strength, 3), round(math.degrees(push.up), 1), round(math.degrees(push.side), 1))
+            self._object.value = name
+            for slider, value in zip((self._strength, self._up, self._side), shown, strict=True):
+                slider.value = min(max(value, slider.min), slider.max)
+            self._written = self._values()
+
+    def _show(self) -> None:
+        with self._lock:
+            parameters = self._parameters
+            push = push_from(parameters, self._surface)
+        excess = push_excess(push, self._forces())
+        warning = f"⚠ **extrapolated**: {', '.join(excess)}  \n" if excess else ""
+        set_content(self._text, warning + HINT)
+
+    async def _clicked(self, event: viser.GuiEvent) -> None:
+        # a coroutine runs soon where the message arrives, before a drag that follows it
+        with self._lock:
+            if event.target.value == "default":
+                self._parameters = self._defaults(str(self._parameters[OBJECT]))
+            else:
+                push = push_from(self.parameters(), self._surface)
+                self._adopt(Push(push.contact, push.strength))
+            self._write()
+        self._page.wake()

@@ -1,0 +1,65 @@
+"""What surrounds the columns of a recording: the floor, the part of a scene that does not move, and arrows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from odeform.simulation.glyphs import Arrow
+from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint
+from odeform_viz.colors import ARROW
+from odeform_viz.recording.entities import FLOOR, STILL
+
+__all__ = ["log_arrows", "log_surroundings", "spheres"]
+
+HALF, CELL = 3.0, 0.25  # m; of the floor and its grid
+PLANE, LINES = (236, 238, 242), (190, 194, 202)
+
+
+def log_surroundings(stream: rr.RecordingStream, still: Geometry | None) -> None:
+    """Log the part of a scene that does not move, in place of what was there; None for the floor."""
+    stream.log(STILL, rr.Clear(recursive=True))
+    if still is None:
+        _log_floor(stream)
+        return
+    stream.log(FLOOR, rr.Clear(recursive=True))
+    if isinstance(still, Mesh):
+        stream.log(f"{STILL}/mesh", rr.Mesh3D(vertex_positions=still.points, triangle_indices=still.faces))
+    else:
+        colors, radii = spheres(still) if isinstance(still, GaussianSplats) else (None, None)
+        stream.log(f"{STILL}/points", rr.Points3D(still.points, colors=colors, radii=radii))
+
+
+def _log_floor(stream: rr.RecordingStream) -> None:
+    corners = HALF * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float32)
+    up = np.tile(np.array([0, 0, 1], dtype=np.float32), (4, 1))
+    plane = rr.Mesh3D(
+        vertex_positions=corners - np.array([0, 0, 2e-3], dtype=np.float32),  # below the lines, which would flicker
+        triangle_indices=[[0, 1, 2], [0, 2, 3]],
+        vertex_normals=up,
+        vertex_colors=[PLANE] * 4,
+    )
+    stream.log(f"{FLOOR}/plane", plane)
+    at = np.arange(-HALF, HALF + 0.5 * CELL, CELL)
+    lines = [[(x, -HALF, 0.0), (x, HALF, 0.0)] for x in at] + [[(-HALF, y, 0.0), (HALF, y, 0.0)] for y in at]
+    stream.log(f"{FLOOR}/lines", rr.LineStrips3D(lines, colors=LINES, radii=rr.Radius.ui_points(0.35)))
+
+
+def log_arrows(stream: rr.RecordingStream, entity: str, arrows: Sequence[Arrow], size: float) -> None:
+    """Log what acts on a body of `size` m, in place of what acted before."""
+    if not arrows:
+        stream.log(entity, rr.Clear(recursive=False))
+        return
+    drawn = rr.Arrows3D(
+        origins=[arrow.start for arrow in arrows],
+        vectors=[arrow.vector for arrow in arrows],
+        labels=[arrow.label for arrow in arrows],
+        colors=[ARROW] * len(arrows),
+        radii=0.02 * size,
+    )
+    stream.log(entity, drawn)
+
+
+def spheres(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
+    """Colors (N, 3), and radii (N,) in m of spheres of the same size: Rerun draws no Gaussians."""
+    return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)

@@ -1,0 +1,19 @@
+"""How a shape is drawn, whatever it is made of."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import UInt8
+
+__all__ = ["Colors", "Look"]
+
+Colors = UInt8[np.ndarray, "points 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """`colors` (N, 3) in sRGB, None for the shape's own; `opacity` from 0 to 1, None for opaque."""
+
+    colors: Colors | None = None
+    opacity: float | None = None
+    wireframe: bool = False

@@ -1,0 +1,114 @@
+"""Nodes of a mesh in viser's scene: a checkerboard, or a color for each vertex."""
+
+import numpy as np
+import viser
+from jaxtyping import UInt8
+
+from odeform.types import Faces, Floats, Mesh, Points
+from odeform_viz.colors import Color, paler
+from odeform_viz.rendering.checkerboard import Part, checkerboard_parts
+from odeform_viz.rendering.glb import GlbWriter
+from odeform_viz.rendering.look import Colors, Look
+
+__all__ = ["MeshView"]
+
+
+class MeshView:
+    """A mesh whose vertices move. Only one of its kinds of nodes is visible, and only that is updated."""
+
+    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
+        self._rest = np.asarray(mesh.points, dtype=np.float32)
+        own = None if mesh.colors is None else _Own(mesh, mesh.colors)
+        self._own = own and (own, _Colored(server, f"{root}/own", len(own.vertices), own.faces, _reach(mesh)))
+        self._checkerboard = _Checkerboard(server, root, mesh, color) if own is None else None
+        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, _reach(mesh))
+
+    def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
+        """See `ShapeView`: (N, 3) m. A mesh has no covariances."""
+        present = self._rest if points is None else points
+        if look.colors is not None:
+            if self._own is not None:
+                self._own[1].hide()
+            if self._checkerboard is not None:
+                self._checkerboard.hide()
+            self._colored.show(present, look.colors, look)
+            return
+        self._colored.hide()
+        if self._own is not None:
+            own, view = self._own
+            view.show(present[own.vertices], own.colors, look)
+        elif self._checkerboard is not None:
+            self._checkerboard.show(points, self._rest, look)
+
+
+class _Own:
+    """The colors of a file, for each vertex: one whose faces differ in color is split.
+
+    `vertices` (M,) index those of the mesh; `faces` (F, 3) and `colors` (M, 3) refer to the M.
+    """
+
+    def __init__(self, mesh: Mesh, colors: UInt8[np.ndarray, "faces 3 3"]) -> None:
+        red, green, blue = colors.reshape(-1, 3).astype(np.int64).T
+        keys = (mesh.faces.reshape(-1).astype(np.int64) << 24) | (red << 16) | (green << 8) | blue
+        kept, first, faces = np.unique(keys, return_index=True, return_inverse=True)
+        self.vertices, self.faces = kept >> 24, faces.reshape(-1, 3)
+        self.colors = colors.reshape(-1, 3)[first]
+
+
+def _reach(mesh: Mesh) -> float:
+    """Metres from the origin that the deformed mesh stays within, with room to spare."""
+    return 4.0 * float(np.abs(mesh.points).max())
+
+
+class _Checkerboard:
+    """Vertices are sent alone: faces and colors stay as they are."""
+
+    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
+        points = np.asarray(mesh.points, dtype=np.float32)
+        self._parts: list[tuple[viser.MeshHandle, Part]] = []
+        for index, (part, shade) in enumerate(zip(checkerboard_parts(mesh), (color, paler(color)), strict=False)):
+            name, vertices = f"{root}/part_{index}", part.vertices(points)
+            self._parts.append((server.scene.add_mesh_simple(name, vertices, part.faces, color=shade), part))
+        self._at_rest = True
+
+    def show(self, points: Points | None, rest: Points, look: Look) -> None:
+        moved = points is not None or not self._at_rest
+        for handle, part in self._parts:
+            if moved:
+                handle.vertices = part.vertices(rest if points is None else points)
+            handle.visible, handle.opacity, handle.wireframe = True, look.opacity, look.wireframe
+        self._at_rest = points is None
+
+    def hide(self) -> None:
+        for handle, _ in self._parts:
+            handle.visible = False
+
+
+class _Colored:
+    """Everything is sent with each change: viser colors vertices in glTF files only."""
+
+    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, reach: float) -> None:
+        self._server, self._node, self._mesh = server, node, (count, faces, reach)
+        self._writer: tuple[object, GlbWriter] | None = None
+        self._handle: viser.GlbHandle | None = None
+        self._sent: tuple[Points, Colors, object] | None = None
+
+    def show(self, points: Points, colors: Colors, look: Look) -> None:
+        layout = (look.opacity, look.wireframe)
+        if self._handle is not None:
+            self._handle.visible = True
+        sent = self._sent
+        if sent is not None and sent[1] is colors and sent[2] == layout and np.array_equal(sent[0], points):
+            return
+        self._sent = (points, colors, layout)
+        if self._writer is None or self._writer[0] != layout:
+            self._writer = (layout, GlbWriter(*self._mesh, look.opacity, look.wireframe))
+        data = self._writer[1].write(points, colors)
+        if self._handle is None:
+            self._handle = self._server.scene.add_glb(self._node, data)
+        else:
+            self._handle.glb_data = data
+
+    def hide(self) -> None:
+        if self._handle is not None:
+            self._handle.visible = False

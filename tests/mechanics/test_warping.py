@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from odeform.mechanics.warping import rotations, surface_turns, warped
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.3, 2.0])
+def test_a_point_that_turns_evenly_moves_along_an_arc(angle: float) -> None:
+    rng = np.random.default_rng(0)
+    displacement, axis = rng.normal(size=(2, 50, 3))
+    turns = angle * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    way = [Rotation.from_rotvec(0.5 * (s + 1.0) * turns).apply(displacement) for s in nodes]
+    np.testing.assert_allclose(warped(displacement, turns), 0.5 * np.tensordot(weights, way, 1), atol=1e-12)
+
+
+def test_rotations() -> None:
+    turns = np.random.default_rng(0).normal(size=(4, 5, 3))
+    expected = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(4, 5, 3, 3)
+    np.testing.assert_allclose(rotations(turns), expected, atol=1e-8)
+    np.testing.assert_array_equal(rotations(np.zeros((2, 3))), np.broadcast_to(np.eye(3), (2, 3, 3)))
+
+
+def test_the_turns_of_a_surface_that_turns_as_a_whole_are_that_turn() -> None:
+    ball = trimesh.creation.icosphere(2)
+    turn, shift = np.array([0.1, -0.4, 0.2]), np.array([1.0, 2.0, 3.0])
+    points, faces = np.asarray(ball.vertices), np.asarray(ball.faces, dtype=np.int32)
+    shapes = np.stack([np.cross(turn, points) + shift, 0.0 * points], axis=2)
+    found = surface_turns(points, faces, shapes)
+    np.testing.assert_allclose(found[..., 0], np.broadcast_to(turn, points.shape), rtol=1e-4)
+    assert not found[..., 1].any()

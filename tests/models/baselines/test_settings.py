@@ -1,0 +1,43 @@
+"""What stands in a checkpoint of a baseline is checked when it is read, or at the latest when it is used."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from odeform.errors import InputError
+from odeform.models.registry import model_class, open_checkpoint
+
+FRAME = {"anchor": [0.0, 0.0, 0.1], "arm": 0.1, "reach": 0.2, "largest": 1.0, "scale": 0.1, "part_scale": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("model", "settings"),
+    [
+        ("gp", {"length_scales": [0.0, 1.0]}),
+        ("gp", {"length_scales": [float("nan"), 1.0]}),
+        ("pod-rbf", {"smoothing": float("nan")}),
+        ("pod-rbf", {"smoothing": -1.0}),
+        ("direct", {"frame": {}}),
+        ("direct", {"frame": {**FRAME, "anchor": []}}),
+        ("direct", {"frame": {**FRAME, "arm": 0.0}}),
+        ("direct", {"frame": {**FRAME, "scale": ""}}),
+        ("direct", {"frame": {**FRAME, "reach": float("inf")}}),
+    ],
+)
+def test_wrong_settings_are_refused_when_read(model: str, settings: dict[str, Any]) -> None:
+    checkpoint = open_checkpoint(f"mass-elastic/{model}")
+    model_class(model)(checkpoint)
+    with pytest.raises(InputError, match=f"checkpoint of {model}: missing or wrong"):
+        model_class(model)(replace(checkpoint, config={**checkpoint.config, **settings}))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize(("model", "name"), [("gp", "gp.weights"), ("pod-rbf", "pod.modes")])
+def test_predictions_that_are_not_finite_are_refused(model: str, name: str, value: float) -> None:
+    checkpoint = open_checkpoint(f"mass-elastic/{model}")
+    arrays = {**checkpoint.arrays, name: np.full_like(checkpoint.arrays[name], value)}
+    predictor = model_class(model)(replace(checkpoint, arrays=arrays))
+    with pytest.raises(InputError, match="the checkpoint predicts numbers that are not finite"):
+        predictor.solve()

@@ -1,0 +1,41 @@
+"""What has to be known of a motion is said in one sentence each, and nothing where there is nothing to say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.models.base import Predictor
+from odeform.motion.caveats import caveats
+
+SINKING = {"mass": 0.92, "bending": 0.39, "force": 141.4, "azimuth": 0.0, "elevation": 0.76}
+
+
+def test_a_trained_motion_has_none(kick: Predictor) -> None:
+    assert caveats(kick.solve(), kick.schema.window.times) == ()
+
+
+def test_parameters_and_times_outside(kick: Predictor) -> None:
+    mass, times = caveats(kick.solve(parameters={"mass": 3.0}), np.array([0.0, 0.5, 1.1]))
+    assert mass == "mass = 3 kg is outside the trained range, 0.5 to 1 kg"
+    assert times == "1 of 3 frames are outside the trained window, 0 to 1 s: there the motion is extrapolated"
+    (far,) = caveats(kick.solve(), np.array([0.0, 9.0]))
+    assert far.endswith("soon after 1.5 s it stands still")
+
+
+def test_a_motion_that_stops(kick: Predictor) -> None:
+    motion = kick.solve(parameters=SINKING)
+    assert motion.status == "stopped at t = 1.202 s: it sinks into the floor"
+    assert "the motion stops at t = 1.202 s" in caveats(motion, np.array([1.3]))[-1]
+    assert all("stops" not in said for said in caveats(motion, np.array([1.1])))
+    assert motion.vertices(1.3)[:, 2].min() == pytest.approx(-0.00475, abs=1e-5)
+    assert np.array_equal(motion.vertices(1.5), motion.vertices(1.3))
+    assert np.array_equal(motion.pose(1.5), motion.pose(1.3))
+
+
+def test_another_shape_stops_with_the_trained_body(kick: Predictor) -> None:
+    egg = replace(kick.rest, points=kick.rest.points * np.float32([1.0, 1.0, 0.7]))
+    motion, trained = kick.solve(egg, SINKING), kick.solve(None, SINKING)
+    assert motion.foreign
+    assert motion.first_stop() == trained.first_stop()
+    assert caveats(motion, np.array([0.5]))[0].startswith("this shape was not trained")

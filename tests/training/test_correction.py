@@ -1,0 +1,142 @@
+"""What the latent ODE leaves unexplained: corrected where that is a smooth function of the parameters."""
+
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from odeform.dataset.index import Dataset
+from odeform.dataset.training_data import TrainingData, prepare
+from odeform.models.base import Predictor
+from odeform.models.odeform.correction import Correction
+from odeform.models.odeform.model import ODeform
+from odeform.motion.reduced_space import POSE
+from odeform.solver.integrate import SolverSettings
+from odeform.training.correction import with_correction
+from odeform.training.pruning import FINE
+from odeform.types import Floats
+
+EXACT = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
+
+
+@pytest.fixture(scope="module")
+def bare(predictors: dict[str, Predictor]) -> ODeform:
+    model = cast(ODeform, predictors["odeform"])
+    arrays = {name: a for name, a in model.checkpoint.arrays.items() if not name.startswith("correction.")}
+    return ODeform(replace(model.checkpoint, arrays=arrays))
+
+
+@pytest.fixture(scope="module")
+def data(dataset: Dataset, bare: ODeform) -> TrainingData:
+    """The model's own motions plus 2 mm of heave and of the first mode that vary smoothly with the parameters."""
+    data = prepare(dataset, bare.space.basis.modes)
+    return replace(data, reduced={split: _own(bare, data, split) + _smooth(data, split) for split in data.reduced})
+
+
+def _own(model: ODeform, data: TrainingData, split: str) -> Floats:
+    evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(data.times[-1])
+    return np.stack([model.integrate(t, evaluated, FINE, stop).reduced(data.times) for t in data.theta[split]])
+
+
+def _smooth(data: TrainingData, split: str) -> Floats:
+    out = np.zeros_like(data.reduced[split])
+    wave = 2e-3 * np.sin(data.theta[split].sum(axis=1))[:, None] * np.sin(7.0 * data.times)
+    out[..., 2] = out[..., POSE] = wave
+    return out
+
+
+@pytest.fixture(scope="module")
+def corrected(bare: ODeform, data: TrainingData) -> ODeform:
+    return ODeform(with_correction(bare.checkpoint, data))
+
+
+def test_a_smooth_residual_is_corrected(bare: ODeform, corrected: ODeform, data: TrainingData) -> None:
+    assert corrected.correction is not None
+    assert set(corrected.correction.parts) == {"shift", "deformation"}  # rotations had no residual
+
+    def missed(model: ODeform) -> float:
+        return float(np.square(_own(model, data, "val") - data.reduced["val"]).mean())
+
+    assert missed(corrected) < 0.25 * missed(bare)
+
+
+def test_an_ode_that_misleads_gives_way_to_the_regression(bare: ODeform, data: TrainingData) -> None:
+    truth = {split: 10.0 * _smooth(data, split) for split in data.reduced}
+    model = ODeform(with_correction(bare.checkpoint, replace(data, reduced=truth)))
+    assert model.correction is not None
+    assert model.correction.parts["shift"].share < 0.1
+    assert model.checkpoint.config["correction"]["share_of_ode"]["shift"] < 0.1
+    missed = _own(model, data, "val") - truth["val"]
+    assert np.square(missed).sum() < 0.01 * np.square(truth["val"]).sum()
+
+
+def test_noise_is_not_corrected(bare: ODeform, data: TrainingData) -> None:
+    rng = np.random.default_rng(0)
+    noisy = {split: _own(bare, data, split) for split in data.reduced}
+    noisy = {split: y + 1e-3 * rng.standard_normal(y.shape) for split, y in noisy.items()}
+    assert with_correction(bare.checkpoint, replace(data, reduced=noisy)) is bare.checkpoint
+
+
+def test_filled_frames_are_no_truth(bare: ODeform, data: TrainingData) -> None:
+    observed = {split: frames.copy() for split, frames in data.observed.items()}
+    observed["train"][:, 1::2] = False
+    assert with_correction(bare.checkpoint, replace(data, observed=observed)) is bare.checkpoint
+
+
+def test_it_rests_at_the_start_and_keeps_its_last_value(corrected: ODeform) -> None:
+    correction, stop = corrected.correction, corrected.schema.window.stop
+    assert correction is not None
+    values = correction.over_time(np.full(corrected.config.parameters, 0.4))(np.array([0.0, stop, 2.0 * stop]))
+    np.testing.assert_allclose(values[0], 0.0, atol=1e-15)
+    assert values[1].any()
+    assert np.array_equal(values[1], values[2])
+
+
+def test_fewer_modes_are_corrected_as_before(corrected: ODeform) -> None:
+    assert corrected.correction is not None
+    theta, times = np.full(corrected.config.parameters, 0.4), np.linspace(0.0, 1.0, 5)
+    fewer = corrected.correction.first(3).over_time(theta)(times)
+    np.testing.assert_allclose(fewer, corrected.correction.over_time(theta)(times)[:, : POSE + 3], atol=1e-15)
+
+
+def test_files_without_share_and_mean_are_read(corrected: ODeform) -> None:
+    known = corrected.correction
+    assert known is not None
+    arrays = {name: a for name, a in known.arrays().items() if not name.endswith((".share", ".mean"))}
+    read = Correction.from_arrays(arrays, len(known.shares), corrected.config.parameters)
+    assert read is not None
+    assert (read.shares == 1.0).all()
+    assert not read.parts["shift"].mean.any()
+
+
+def test_derivatives_are_those_of_the_motion(corrected: ODeform) -> None:
+    theta, times = np.linspace(-0.5, 0.6, corrected.config.parameters), np.linspace(0.05, 0.9, 7)
+    jet = corrected.sensitivities(theta, times, EXACT)
+    evaluated, step = corrected.evaluate_basis(corrected.rest, 0.0), 1e-4
+
+    def motion(at: Floats) -> Floats:
+        return corrected.integrate(at, evaluated, EXACT, 1.0).reduced(times)
+
+    np.testing.assert_allclose(jet[0], motion(theta), atol=1e-9)
+    for index, ahead in enumerate(step * np.eye(len(theta))):
+        central = (motion(theta + ahead) - motion(theta - ahead)) / (2.0 * step)
+        np.testing.assert_allclose(jet[1 + index], central, atol=2e-5 * np.abs(jet[1 + index]).max())
+
+
+def test_it_is_read_as_it_was_written(corrected: ODeform) -> None:
+    known = corrected.correction
+    assert known is not None
+    size = len(known.over_time(np.zeros(corrected.config.parameters))(np.zeros(1))[0])
+    read = Correction.from_arrays(known.arrays(), size, corrected.config.parameters)
+    assert read is not None
+    theta, times = np.full(corrected.config.parameters, -0.3), np.linspace(0.0, 1.0, 9)
+    np.testing.assert_allclose(read.over_time(theta)(times), known.over_time(theta)(times), atol=1e-8)
+    with pytest.raises(ValueError, match="shape"):
+        Correction.from_arrays(known.arrays(), size + 1, corrected.config.parameters)
+    unfit = {**known.arrays(), "correction.shift.share": np.array([1.5])}
+    with pytest.raises(ValueError, match="share from 0 to 1"):
+        Correction.from_arrays(unfit, size, corrected.config.parameters)
+    broken = {name: np.full_like(array, np.nan) for name, array in known.arrays().items()}
+    with pytest.raises(ValueError, match="finite"):
+        Correction.from_arrays(broken, size, corrected.config.parameters)

@@ -1,0 +1,55 @@
+"""What colors show, on motions that are formulas."""
+
+import numpy as np
+import pytest
+from stubs import PEAK, StubPredictor, recorded
+
+from odeform.motion.recorded import RecordedMotion
+from odeform.types import PointCloud
+from odeform_viz.coloring.colorist import Colorist
+from odeform_viz.columns import Column, Columns
+from odeform_viz.session import Session
+from odeform_viz.view import Frame, ViewRequest
+
+
+def _frame(*columns: Column, time: float = PEAK) -> Frame:
+    schema = columns[0].source.schema
+    request = ViewRequest(schema.complete({"mass": 0.5}), time, "balanced", Columns.of(columns).all)
+    return Session(schema).frame(request)
+
+
+def test_displacement_is_without_the_rigid_motion() -> None:
+    stub = StubPredictor()
+    frame = _frame(Column("stub", stub, stub.rest))
+    coloring = Colorist().color(frame, "displacement")
+    assert coloring is not None
+    (values,) = coloring.values.values()
+    local = stub.solve(None, frame.request.parameters).local(PEAK)
+    assert values == pytest.approx(1e3 * np.linalg.norm(local, axis=1), abs=1e-4)
+    assert np.quantile(values, 0.99) <= coloring.scale.top
+    resting = Colorist().color(_frame(Column("stub", stub, stub.rest), time=0.0), "displacement")
+    assert resting is not None
+    assert max(value.max() for value in resting.values.values()) == 0.0
+
+
+def test_strain_is_that_of_meshes_only() -> None:
+    stub = StubPredictor()
+    mesh, cloud = Column("mesh", stub, stub.rest), Column("cloud", stub, PointCloud(stub.rest.points))
+    coloring = Colorist().color(_frame(mesh, cloud), "strain")
+    assert coloring is not None
+    assert len(coloring.values) == 1
+    assert coloring.scale.unit == "%"
+    assert Colorist().color(_frame(cloud), "strain") is None
+
+
+def test_errors_need_a_truth_and_are_carried_to_the_model() -> None:
+    stub = StubPredictor()
+    record = RecordedMotion(stub.schema, recorded(stub, {"mass": 0.5}))
+    model, truth = Column("stub", stub, stub.rest), Column("truth", record, record.geometry)
+    assert Colorist().color(_frame(model), "error") is None
+    coloring = Colorist().color(_frame(model, truth), "error")
+    assert coloring is not None
+    (values,) = coloring.values.values()
+    assert values == pytest.approx(1.0, abs=1e-2)  # mm, everywhere
+    assert coloring.scale.top == pytest.approx(1.0, abs=0.5)
+    assert Colorist().color(_frame(model, truth), "own colours") is None

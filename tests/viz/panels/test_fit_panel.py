@@ -1,0 +1,120 @@
+"""Fitting the visible truth on the page."""
+
+import time
+
+import pytest
+
+from odeform.dataset.store import open_dataset
+from odeform.errors import InputError
+from odeform.identification.identify import Identification, Identified
+from odeform.models.registry import load
+from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.columns import Column
+from odeform_viz.panels import fit
+from odeform_viz.panels.fit import FitPanel, describe_identification
+from odeform_viz.panels.parameters import ParameterPanel
+from odeform_viz.panels.truth import NONE, entry_label
+from odeform_viz.runtime.jobs import Report
+
+View = tuple[App, LoopbackClient]
+ENTRY = open_dataset("mass-elastic").select("test")[2]
+
+
+def endless(report: Report, model: type, *_: object) -> None:
+    """Steps that never converge; in this module, for the job's process to find it."""
+    while True:
+        report(({"mass": 0.6, "bending": 0.5}, 3.0))
+        time.sleep(0.01)
+
+
+def failing(*_: object) -> None:
+    raise InputError("nothing fits")
+
+
+START, CANCEL, USE = "Fit to the truth", "Cancel the fit", "Set sliders to the estimate"
+
+
+def _open(app: App, client: LoopbackClient) -> None:
+    client.set("test sequence", entry_label(ENTRY, app.session.schema))
+    assert client.until(lambda: not client.controls[START].props["disabled"])
+
+
+def test_estimates_stand_beside_the_truth_and_go_to_the_sliders(dropped: View) -> None:
+    app, client = dropped
+    assert client.controls[START].props["disabled"]
+    _open(app, client)
+    client.set("mass (kg)", 0.9)
+    client.click(START)
+    assert client.until(lambda: "model and noise explain the motion" in client.text())
+    assert [c.label for c in app.columns.all] == ["odeform", "truth", "fit"]
+    found = app.columns.all[2].pinned
+    assert found is not None
+    for name, true in ENTRY.parameters.items():
+        assert found[name] == pytest.approx(true, rel=0.02)
+        assert f"| {name} |" in client.text()
+    client.click(USE)
+    assert client.until(lambda: app.panel(ParameterPanel).parameters() == pytest.approx(dict(found)))
+
+
+def test_a_second_fit_takes_the_column_of_the_first(dropped: View) -> None:
+    app, client = dropped
+    _open(app, client)
+    keys, panel = [], app.panel(FitPanel)
+    for _ in range(2):
+        before = panel._job
+        client.click(START)
+        assert client.until(lambda before=before: panel._job is not before)
+        assert client.until(lambda: panel._job is not None and not panel._job.running)
+        assert client.until(lambda: client.controls[START].visible)
+        keys.append([c.key for c in app.columns.all])
+    assert keys[0] == keys[1]
+
+
+@pytest.mark.parametrize("how", ["cancel", "truth", "close"])
+def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.MonkeyPatch, how: str) -> None:
+    """Cancelled, without the truth that it fits, or with the page."""
+    app, client = dropped
+    _open(app, client)
+    monkeypatch.setattr(fit, "fit_parameters", endless)
+    client.click(START)
+    assert client.until(lambda: "misfit 3" in client.text())
+    panel = app.panel(FitPanel)
+    assert panel._job is not None
+    if how == "cancel":
+        client.click(CANCEL)
+    elif how == "truth":
+        client.set("test sequence", NONE)
+    else:
+        panel.close()
+    assert client.until(lambda: client.controls[START].visible and not client.controls[CANCEL].visible)
+    assert not panel._job.running
+    panel._job._process.join(60.0)
+    assert not panel._job._process.is_alive()
+    assert client.until(lambda: "misfit" not in client.text())
+    assert not client.controls[USE].visible
+
+
+def test_a_search_that_fails_says_why(dropped: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    app, client = dropped
+    _open(app, client)
+    monkeypatch.setattr(fit, "fit_parameters", failing)
+    client.click(START)
+    assert client.until(lambda: "**The fit failed**: nothing fits" in client.text())
+    assert client.until(lambda: client.controls[START].visible)
+
+
+def test_what_is_not_determined_is_not_given_as_a_number() -> None:
+    schema = load("mass-elastic").schema
+    sure, vague = Identified(0.7, 0.69, 0.71, True, 0.1, 0.01), Identified(0.3, 0.1, 0.9, False, 0.0, 1.3)
+    text = describe_identification(Identification({"mass": sure, "bending": vague}, 3.0, 1.0), schema, {"mass": 0.72})
+    assert "| mass | **0.7** | 0.69–0.71 | 0.72 |" in text
+    assert "| bending | not identifiable | 0.1–0.9 |  |" in text
+    assert "the model does not explain this motion" in text
+
+
+def test_models_that_cannot_be_fitted_have_no_panel(serve) -> None:
+    predictor = load("contact-force")
+    app, client = serve(Column("odeform", predictor, predictor.rest))
+    assert START not in client.controls
+    assert not any(isinstance(panel, FitPanel) for panel in app.page.panels)

@@ -1,0 +1,134 @@
+"""Choosing an object, clicking a contact and setting a force, as a user does."""
+
+import math
+
+import numpy as np
+import pytest
+from pushed import NAMES, PushedPredictor
+
+from odeform.errors import InputError
+from odeform.geometry.contact import nearest_on
+from odeform.geometry.push import push_of
+from odeform.simulation.contacts import push_from, vector_of
+from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.columns import Column
+from odeform_viz.panels.push import PushPanel
+from odeform_viz.pushing import push_shown
+from odeform_viz.runtime import notices
+
+View = tuple[App, LoopbackClient]
+DONUT, PILLOW = NAMES
+
+
+@pytest.fixture
+def pushed(serve) -> View:
+    model = PushedPredictor()
+    return serve(Column("stub", model, model.rest, origin=""), moment=0.02)
+
+
+def surface(app: App, name: str):
+    predictor = app.page.model.predictor
+    assert predictor is not None
+    return predictor.rest_of({"object": name})
+
+
+def test_the_sliders_are_the_pushs_and_not_the_scenes(pushed: View) -> None:
+    app, client = pushed
+    assert {"object", "force (N)", "tilt up (°)", "tilt sideways (°)"} <= set(client.controls)
+    assert not any(label.startswith(("contact_x", "force_x")) for label in client.controls)
+    assert set(app.request().parameters) == {"object", *(p.name for p in app.page.schema.parameters)}
+
+
+def test_each_object_has_a_push_on_its_own_surface_and_keeps_it(pushed: View) -> None:
+    app, client = pushed
+    client.set("force (N)", 2.5)
+    client.set("object", PILLOW)
+    assert client.until(lambda: app.request().parameters["object"] == PILLOW)
+    parameters = app.request().parameters
+    body = surface(app, PILLOW)
+    assert nearest_on(body, vector_of(parameters, "contact")).distance < 1e-6
+    assert app.request().columns[0].geometry is body
+    assert client.until(lambda: "on the pillow's" in client.text())
+    client.set("object", DONUT)
+    assert client.until(lambda: app.request().parameters["object"] == DONUT)
+    assert np.linalg.norm(vector_of(app.request().parameters, "force")) == pytest.approx(2.5)
+
+
+def test_a_tilt_turns_the_force_off_the_normal(pushed: View) -> None:
+    app, client = pushed
+    client.set("force (N)", 3.0)
+    client.set("tilt up (°)", 20.0)
+    body = surface(app, DONUT)
+    assert client.until(lambda: math.degrees(push_from(app.request().parameters, body).angle) == pytest.approx(20.0))
+    assert push_from(app.request().parameters, body).strength == pytest.approx(3.0)
+    assert client.until(lambda: "20° off the inward normal" in client.text())
+    client.set("tilt sideways (°)", 50.0)
+    assert client.until(lambda: "direction (trained up to 45°" in client.text())
+
+
+def test_a_click_moves_the_contact_and_keeps_the_force_in_its_frame(pushed: View) -> None:
+    app, client = pushed
+    client.set("tilt up (°)", 20.0)
+    body, panel = surface(app, DONUT), app.panel(PushPanel)
+    assert client.until(lambda: math.degrees(push_from(app.request().parameters, body).up) == pytest.approx(20.0))
+    before = push_from(app.request().parameters, body)
+    point = np.asarray(body.points[body.points[:, 0].argmax()], dtype=float)
+    panel.pick(app.page.model, point)
+    after = push_from(app.request().parameters, body)
+    assert np.allclose(after.contact.point, point, atol=1e-4)
+    assert (after.strength, after.up) == (pytest.approx(before.strength), pytest.approx(before.up))
+    assert not np.allclose(after.force, before.force)
+
+
+def test_clicks_that_move_nothing_say_why(pushed: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    app, _ = pushed
+    said: list[str] = []
+    monkeypatch.setattr(notices.Notices, "show", lambda _, title, message: said.append(message))
+    before = app.request().parameters
+    body, panel = surface(app, DONUT), app.panel(PushPanel)
+    panel.pick(None, np.zeros(3))
+    panel.pick(app.page.model, body.points[body.points[:, 2].argmin()].astype(float))
+    assert "beside the donut" in said[0]
+    assert "does not fit" in said[1]
+    assert app.request().parameters == before
+
+
+def test_no_force_is_said(pushed: View) -> None:
+    _, client = pushed
+    client.set("force (N)", 0.0)
+    assert client.until(lambda: "no force" in client.text())
+
+
+def test_the_arrow_is_dragged_while_the_body_rests(pushed: View) -> None:
+    app, _ = pushed
+    panel, start = app.panel(PushPanel), app.page.schema.window.start
+    frame = app.presenter.frame
+    assert frame is not None
+    shown = push_shown(frame.columns[0].column, frame.columns[0].motion)
+    assert shown is not None
+    wanted = push_of(shown.push.contact, 3.7 * shown.push.direction)
+    tail = shown.centre - (shown.contacts.radius + 3.7 * shown.unit) * wanted.direction
+    panel.pull(shown, tail, "start")
+    assert app.clock.time() == start
+    assert np.allclose(vector_of(app.request().parameters, "force"), wanted.force, atol=1e-6)
+    panel.pull(shown, shown.centre, "update")
+    assert not vector_of(app.request().parameters, "force").any()
+    panel.pull(shown, tail, "end")
+    assert app.clock.time() == 0.02
+
+
+def test_parameters_are_kept_exactly_until_a_slider_moves(pushed: View) -> None:
+    app, client = pushed
+    panel = app.panel(PushPanel)
+    body = surface(app, PILLOW)
+    contact = body.points[body.points[:, 2].argmax()].astype(float)
+    given = {"object": PILLOW, **{f"contact_{a}": float(x) for a, x in zip("xyz", contact, strict=True)}}
+    given |= {"force_x": 0.123456, "force_y": -0.2, "force_z": -2.3456789}
+    panel.set(given)
+    assert app.request().parameters == given
+    assert client.until(lambda: client.controls["object"].value == PILLOW)
+    with pytest.raises(InputError, match="unknown object"):
+        panel.set({"object": "brick"})
+    client.set("force (N)", 4.0)
+    assert client.until(lambda: np.linalg.norm(vector_of(app.request().parameters, "force")) == pytest.approx(4.0))
