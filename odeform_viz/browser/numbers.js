@@ -5,6 +5,7 @@
 const BOX = ".mantine-NumberInput-input";
 const { get: read, set: write } = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value");
 const confirmed = new WeakMap(); // the value of a box before it was edited, and its property `value`
+const selecting = new WeakMap(); // the property `value` of the box that has the focus
 const relayed = new WeakSet(); // events that viser is to see
 
 function limitsOf(box) {
@@ -56,6 +57,29 @@ function refuse(box, message) {
   setTimeout(() => note.remove(), 8000);
 }
 
+// A text that is selected as a whole stays so when the page writes to the box, as it does all the time while it plays:
+// what is typed then replaces it. React writes the value, and the number field of viser then sets the caret.
+function keepSelection(box) {
+  const own = Object.getOwnPropertyDescriptor(box, "value");
+  if (!own?.set || selecting.has(box)) return;
+  selecting.set(box, own);
+  const isWhole = () => box.selectionEnd > 0 && box.selectionEnd - box.selectionStart === box.value.length;
+  const write = (text) => {
+    const whole = isWhole();
+    own.set.call(box, text);
+    if (whole) box.select();
+  };
+  Object.defineProperty(box, "value", { get: own.get, set: write, configurable: true });
+  box.setSelectionRange = (...range) => isWhole() || HTMLInputElement.prototype.setSelectionRange.apply(box, range);
+}
+
+function dropSelection(box) {
+  if (!selecting.has(box)) return;
+  Object.defineProperty(box, "value", selecting.get(box));
+  delete box.setSelectionRange;
+  selecting.delete(box);
+}
+
 // While a box is edited, the page must not write to it: it does at each update, of the time while it plays for instance.
 function begin(box) {
   if (confirmed.has(box)) return;
@@ -104,7 +128,13 @@ addEventListener("keydown", (event) => {
   }
 }, true);
 
-addEventListener("focusout", (event) => event.target.matches?.(BOX) && finish(event.target), true);
+addEventListener("focusin", (event) => event.target.matches?.(BOX) && keepSelection(event.target), true);
+
+addEventListener("focusout", (event) => {
+  if (!event.target.matches?.(BOX)) return;
+  finish(event.target);
+  dropSelection(event.target);
+}, true);
 
 // What a box is set to from elsewhere replaces what is being typed there.
 window.odeform.setNumber = (box, text) => {

@@ -29,6 +29,18 @@ def test_a_click_on_a_curve_goes_to_that_time(tab: Tab) -> None:
     assert until(lambda: tab.app.clock.time() == pytest.approx(0.75, abs=0.02))
 
 
+def test_a_selected_number_stays_selected_while_the_time_plays(tab: Tab) -> None:
+    tab.app.clock.play()
+    tab.app.page.wake()
+    box = tab.row("time (s)", "input[@inputmode='decimal']")
+    box.select_text()
+    before = box.input_value()
+    assert until(lambda: box.input_value() != before)
+    assert box.evaluate("box => box.selectionEnd - box.selectionStart === box.value.length")
+    box.press_sequentially("0.25")
+    assert box.input_value() == "0.25"
+
+
 @pytest.mark.parametrize("confirm", [True, False])
 def test_a_click_on_a_curve_replaces_a_time_that_was_typed(tab: Tab, confirm: bool) -> None:
     clock = tab.app.clock
