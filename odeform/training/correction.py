@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import t as student
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
@@ -15,6 +16,7 @@ from odeform.types import Floats
 __all__ = ["with_correction"]
 
 LEFT_OUT = 1e-3  # of the mean square error on validation: what the modes of the residuals may leave out
+CHANCE = 0.05  # most that the probability may be that a share of the ODE gains on validation by chance
 EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
 
 
@@ -61,6 +63,7 @@ def _fitted(
     Length scales and ridge minimise the leave-one-out error of the training motions themselves: residuals on training
     do not tell how smooth those of other parameters are, and a search on few validation motions fits their noise. The
     share has the smallest error on validation, relative in each sequence: in small sets one hard sequence would decide.
+    It is zero where that gain may be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
     mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
@@ -74,6 +77,9 @@ def _fitted(
     weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
     share = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
     share = float(np.clip(share, 0.0, 1.0))
+    gained = np.log(np.maximum(_norms(alone), 1e-30) / np.maximum(_norms(alone + share * added), 1e-30))
+    if _chance(gained) > CHANCE:
+        share = 0.0
     missed = alone + share * added
     explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
 
@@ -84,6 +90,14 @@ def _fitted(
     coefficients = ridge.weights(known, (u * sizes)[:, :count])
     part = CorrectedPart(known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share)
     return part, float(explained)
+
+
+def _chance(gained: Floats) -> float:
+    """The probability of such a mean, or a larger one, where the true mean is zero (one-sided t-test)."""
+    if len(gained) < 2:
+        return 1.0
+    spread = gained.std(ddof=1) / np.sqrt(len(gained))
+    return float(student.sf(gained.mean() / max(spread, 1e-30), len(gained) - 1))
 
 
 def _norms(rows: Floats) -> Floats:

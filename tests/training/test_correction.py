@@ -71,6 +71,17 @@ def test_an_ode_that_misleads_gives_way_to_the_regression(bare: ODeform, data: T
     assert np.square(missed).sum() < 0.01 * np.square(truth["val"]).sum()
 
 
+def test_a_share_that_may_be_chance_is_zero(bare: ODeform, data: TrainingData) -> None:
+    shares = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        truth = {split: 10.0 * _smooth(data, split) for split in data.reduced}
+        truth = {split: y + 1e-3 * rng.standard_normal((len(y), 1, 1)) for split, y in truth.items()}
+        config = with_correction(bare.checkpoint, replace(data, reduced=truth)).config
+        shares += config["correction"]["share_of_ode"].values()
+    assert sum(share > 0.0 for share in shares) <= 0.1 * len(shares)
+
+
 def test_noise_is_not_corrected(bare: ODeform, data: TrainingData) -> None:
     rng = np.random.default_rng(0)
     noisy = {split: _own(bare, data, split) for split in data.reduced}
