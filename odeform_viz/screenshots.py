@@ -26,6 +26,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.formats.writing import write_shape
 from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.types import Floats
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import make_columns
@@ -56,11 +57,7 @@ MOMENT = 0.012  # s; the kicked ball is deformed then
 # inside the trained range, but it would sink into the floor after the trained window
 SINKING = {"mass (kg)": 0.92, "bending (N m)": 0.39, "force (N)": 141.4, "elevation (rad)": 0.76}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
-FILM = (
-    # parameters, and the times to show with them
-    ({"force (N)": 110.0}, np.linspace(0.0, 0.9, 24)),
-    ({"force (N)": 150.0, "elevation (rad)": 0.75}, np.linspace(0.0, 0.9, 24)),
-)
+SOFTEST = {"mass (kg)": 0.5, "bending (N m)": 0.3, "force (N)": 150.0}  # of the trained kicks
 
 
 @dataclass(frozen=True)
@@ -294,16 +291,22 @@ def _packed(picture: Image.Image) -> bytes:
     raise ValueError(f"the picture takes more than {MOST_BYTES} bytes at any quality")
 
 
+def _film() -> Iterator[tuple[list[Column], dict[str, float], Floats]]:
+    """The scenes of the film: columns, parameters, and the times to show."""
+    for name in ("donut", "flip-flop"):
+        yield _push(name), {}, np.linspace(0.0, 0.19, 20)
+    yield _kick(), SOFTEST, np.concatenate([np.linspace(0.0, 0.03, 14), np.linspace(0.05, 0.5, 16)])
+
+
 def _take_film(browser: Browser, out: Path) -> None:
     frames = []
-    with _open(browser, _volleyball(), FILM_SIZE) as view:
-        view.show(0.0)
-        view.picture()
-        for parameters, times in FILM:
+    for columns, parameters, times in _film():
+        with _open(browser, columns, FILM_SIZE) as view:
+            view.show(0.0)
             for label, value in parameters.items():
                 view.set(label, value)
             for moment in times:
-                view.show(round(float(moment), 3))
+                view.show(round(float(moment), 4))
                 height = FILM_WIDTH * FILM_SIZE[1] // FILM_SIZE[0]
                 frames.append(view.picture().resize((FILM_WIDTH, height), Image.Resampling.LANCZOS))
     options = {"duration": round(1000 / FILM_RATE), "loop": 0, "quality": FILM_QUALITY, "method": 6}

@@ -48,7 +48,7 @@ def capture(scene: str, request: ViewRequest, display: DisplayOptions) -> PageSt
     fit = next((c.fit for c in request.columns if c.fit), None)
     notes = []
     if truth and not truth.origin:
-        notes.append("The truth was simulated in the viewer and was not saved.")
+        notes.append("The truth is not from a data set and was not saved.")
     if fit and not fit.origin:
         notes.append("The shape was uploaded and was not saved.")
     columns = tuple(

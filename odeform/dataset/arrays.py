@@ -3,6 +3,7 @@
 import io
 import zipfile
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,17 +18,21 @@ FARTHEST = 1e9  # m
 COPIES = 4  # of its arrays that the use of a sequence takes
 
 
-def read_arrays(data: bytes, where: str) -> dict[str, np.ndarray]:
-    """Times, vertices, faces and weights of an `.npz` archive. `InputError`, which `where` leads, for other archives.
+def read_arrays(
+    data: bytes, where: str, names: Sequence[str] = ARRAYS, optional: Sequence[str] = ()
+) -> dict[str, np.ndarray]:
+    """Arrays of an `.npz` archive by name; those that are `optional` may be missing.
 
-    Sizes are checked before an array is read. Nothing is unpickled.
+    Sizes are checked before an array is read. Nothing is unpickled. `InputError`, which `where` leads, for other files.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(archive.getinfo(f"{name}.npy").file_size for name in ARRAYS)
+            found = {name.removesuffix(".npy") for name in archive.namelist()}
+            names = [*names, *(name for name in optional if name in found)]
+            size = sum(archive.getinfo(f"{name}.npy").file_size for name in names)
         require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in ARRAYS}
+            return {name: arrays[name] for name in names}
     except InputError:
         raise
     except (KeyError, ValueError, TypeError, EOFError, OSError, MemoryError, OverflowError) as error:

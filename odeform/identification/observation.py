@@ -13,6 +13,7 @@ from odeform.types import Floats, Ints, MotionSequence, Points, Times
 __all__ = ["ROUNDING_MM", "Observation", "View", "observe"]
 
 ROUNDING_MM = 0.02  # of the bundled data; more than the truncation error of the modes
+REST_SPEED = 0.01  # m/s of the fastest vertex; what is slower at its last frame rests
 MOST_POINTS, MOST_FRAMES = 64, 160
 
 
@@ -88,10 +89,15 @@ class View:
 
 
 def observe(recorded: MotionSequence, schema: Schema, view: View) -> Observation:
-    """Observe a sequence on frames of the window. The view's seed and the sequence's name fix the random part."""
+    """Observe a sequence on frames of the window. The view's seed and the sequence's name fix the random part.
+
+    What ends at rest stays there until the window ends; what ends while it moves is observed until then.
+    """
     rng = np.random.default_rng([view.seed, zlib.crc32(recorded.name.encode())])
     sequence = recorded.until(schema.window.stop)
     frames = schema.window.times[1:]
+    if _moves_at_end(recorded):
+        frames = frames[frames <= recorded.times[-1] + 1e-9]
     if view.frames is not None:
         frames = np.sort(rng.choice(frames, min(view.frames, len(frames)), replace=False))
     at = np.abs(sequence.times[:, None] - frames).argmin(axis=0)
@@ -102,6 +108,11 @@ def observe(recorded: MotionSequence, schema: Schema, view: View) -> Observation
     positions = positions + 1e-3 * view.noise_mm * rng.normal(size=positions.shape)
     noise = float(np.hypot(view.noise_mm, ROUNDING_MM))
     return Observation(rest, sequence.times[at], positions, schema.azimuth(sequence.parameters), noise)
+
+
+def _moves_at_end(recorded: MotionSequence) -> bool:
+    step = float(recorded.times[-1] - recorded.times[-2])
+    return float(np.abs(np.diff(recorded.vertices[-2:], axis=0)).max()) > REST_SPEED * step
 
 
 def _on_surface(sequence: MotionSequence, frames: Floats, count: int, rng: np.random.Generator) -> Floats:

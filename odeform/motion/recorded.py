@@ -41,6 +41,11 @@ class RecordedMotion:
         return {**self.fixed, **self.parameters}
 
     @property
+    def unknown(self) -> tuple[str, ...]:
+        """Names of the parameters that are not known, as in a motion that was captured."""
+        return tuple(p.name for p in self.schema.learned if p.name not in self.setting)
+
+    @property
     def rate(self) -> float:
         """Frames per second."""
         return 1.0 / float(self.sequence.times[1] - self.sequence.times[0])
@@ -53,7 +58,7 @@ class RecordedMotion:
     @property
     def stats(self) -> SolveStats:
         """The frame rate in place of a solver; its error counts as zero."""
-        return SolveStats(f"simulated, {self.rate:g} frames per second", 0, 0, 0, "ok", 0.0, lambda: 0.0)
+        return SolveStats(f"recorded, {self.rate:.4g} frames per second", 0, 0, 0, "ok", 0.0, lambda: 0.0)
 
     @property
     def outside(self) -> tuple[str, ...]:
@@ -93,7 +98,7 @@ class RecordedMotion:
         return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_weights(self.geometry))
 
     def of(self, parameters: Parameters) -> bool:
-        """Whether this is the motion under these parameters, to the resolution of a slider."""
+        """Whether this may be the motion under these parameters, to the resolution of a slider."""
         if parameters.get(OBJECT) != self.parameters.get(OBJECT):
             return False
         return all(

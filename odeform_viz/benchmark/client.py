@@ -118,8 +118,9 @@ class LoopbackClient:
         return list(self._commands)
 
     def set(self, label: str, value: Any) -> None:
-        """Set the value of a control; that of a button group is the label of a button."""
-        self.until(lambda: label in self.controls)  # a page may come in several batches
+        """Set the value of a control; that of a button group is the label of a button. `TimeoutError` without it."""
+        if not self.until(lambda: label in self.controls):  # a page may come in several batches
+            raise TimeoutError(f"the page has no control {label!r}: {', '.join(self.controls)}")
         control = self.controls[label]
         self._send("GuiUpdateMessage", uuid=control.uuid, updates={"value": value})
         control.value = value

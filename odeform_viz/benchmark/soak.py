@@ -111,7 +111,7 @@ def _run_scripts(visitors: Visitors) -> list[str]:
         visitors.begin()
         try:
             script(visitors)
-        except (Missed, AssertionError) as error:
+        except (Missed, AssertionError, TimeoutError) as error:
             missed.append(f"{script.__name__}: {error}")
         missed += [f"{script.__name__}: unexpected notification {said!r}" for said in visitors.unexpected()]
         reset(visitors, BETWEEN)

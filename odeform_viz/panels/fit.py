@@ -17,7 +17,8 @@ from odeform_viz.runtime.jobs import Job, fit_parameters
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
-NO_TRUTH = "Choose a test sequence or simulate one: its motion is fitted, not its parameters."
+NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
+SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
 EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
 
@@ -96,13 +97,18 @@ class FitPanel(Panel):
             if truth is None or model.predictor is None or (self._job is not None and self._job.running):
                 return
             schema, predictor = self._page.schema, model.predictor
+            # an azimuth that is not known is the sliders'
+            known = {**self._page.controls.parameters(), **truth.setting}
+            fixed = {p.name: known[p.name] for p in schema.parameters if p.role == "azimuth"}
             try:
-                observation = observe(truth.sequence, schema, View())
+                observation = observe(replace(truth.sequence, parameters=known), schema, View())
             except InputError as error:
                 self._show(FAILED.format(error))
                 return
-            fixed = {p.name: truth.setting[p.name] for p in schema.parameters if p.role == "azimuth"}
-            search = _Search(self._page, model, truth.setting, fixed, self._show)
+            window = schema.window
+            ends = float(observation.times[-1])
+            note = SHORT.format(window.stop, ends) if ends < window.stop - 1.0 / window.rate else ""
+            search = _Search(self._page, model, truth.setting, fixed, self._show, note)
             arguments = type(predictor), predictor.checkpoint, observation
             self._show("starting", working=True)
             self._page.controls.set_overlay(True)
@@ -124,6 +130,8 @@ class _Search:
     fixed: Parameters
     """Known parameters, which are not searched."""
     show: Callable[..., None]
+    note: str = ""
+    """What has to be known of the estimates."""
     misfits: list[str] = field(default_factory=list)
     key: int | None = None
 
@@ -144,7 +152,7 @@ class _Search:
         estimate = {name: one.value for name, one in found.parameters.items()}
         self._place(estimate)
         text = describe_identification(found, self.page.schema, self.truth)
-        self.show(text, {**self.fixed, **estimate})
+        self.show("\n\n".join(filter(None, (text, self.note))), {**self.fixed, **estimate})
 
     def failed(self, message: str) -> None:
         """Say why there are none."""

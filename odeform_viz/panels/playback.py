@@ -61,7 +61,7 @@ class PlaybackPanel(Panel):
     def toggle(self) -> None:
         """Play or pause."""
         self._clock.pause() if self._clock.playing else self._clock.play()
-        self._refresh_button()
+        self._page.on_event_loop(self._refresh_button)
         self._page.wake()
 
     def step(self, target: str) -> None:
@@ -72,7 +72,7 @@ class PlaybackPanel(Panel):
     def jump(self, time: float) -> None:
         """Pause at a time in seconds."""
         self._page.pause_at(min(max(time, self._time.min), self._time.max))
-        self._refresh_button()
+        self._page.on_event_loop(self._refresh_button)
 
     async def _dragged(self, event: viser.GuiEvent) -> None:
         # a coroutine runs at once where the message arrives, before the slider follows the clock again
@@ -119,6 +119,7 @@ class PlaybackPanel(Panel):
             self.jump(peak)
 
     def _refresh_button(self) -> None:
+        # on the event loop alone: labels set by two threads at once may arrive in the other order
         playing = self._clock.playing
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY

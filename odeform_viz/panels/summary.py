@@ -8,6 +8,7 @@ from odeform_viz.view import Description, Frame
 __all__ = ["SummaryPanel", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
+UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
 ON_FRAME = 0.02  # frames; closer times count as on the frame
 
 
@@ -57,7 +58,13 @@ class SummaryPanel(Panel):
 
     def describe(self, description: Description) -> None:
         frame = description.frame
-        set_content(self._text, summarize(frame) + (f"  \n{OFF_TRUTH}" if frame.off_truth else ""))
+        truth = frame.truth.column.truth if frame.truth else None
+        lines = [summarize(frame)]
+        if frame.off_truth:
+            lines.append(OFF_TRUTH)
+        elif truth is not None and truth.unknown:
+            lines.append(UNKNOWN.format(", ".join(truth.unknown)))
+        set_content(self._text, "  \n".join(lines))
 
     def show_error(self, message: str) -> None:
         set_content(self._text, f"⚠ **{message}**")

@@ -1,4 +1,4 @@
-"""The truth to compare with: a test sequence of the scene's data set, or one simulated now."""
+"""The truth to compare with: a test sequence of the scene's data set, one of the user's own, or one simulated now."""
 
 import asyncio
 import threading
@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import viser
 
+from odeform.dataset.captured import read_captured
 from odeform.dataset.index import Entry
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
@@ -18,6 +19,7 @@ from odeform.types import MotionSequence
 from odeform_viz.columns import Column
 from odeform_viz.own_shapes import own_of
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import take_upload
 from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_own_body
 from odeform_viz.view import Description
@@ -25,6 +27,8 @@ from odeform_viz.view import Description
 __all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
 NONE, SIMULATED = "none", "simulated here"
+OWN = "an .npz file: times (T,) in s, vertices (T, N, 3) in m; if known, faces and parameters"
+LARGEST = 256 << 20  # bytes of an upload
 NO_SIMULATOR = "This scene was imported, so it cannot be simulated here."
 OVERSAMPLING = 4  # simulated frames per frame of training, to compare between those too
 
@@ -71,6 +75,8 @@ class TruthPanel(Panel):
             if self._dataset is not None:
                 self._browser = gui.add_dropdown("test sequence", (NONE, *self._entries))
                 self._browser.on_update(self._chosen)
+            upload = gui.add_upload_button("Open a motion...", color="gray", mime_type=".npz", hint=OWN)
+            upload.on_upload(lambda event: self._upload(take_upload(event)))
             self._build_simulation(gui)
             self._back = gui.add_button("Set sliders to the truth", color="gray", visible=False)
             self._back.on_click(lambda _: self._set_sliders())
@@ -114,6 +120,14 @@ class TruthPanel(Panel):
         self._page.controls.set_parameters(sequence.parameters)
         self._page.columns_changed()
 
+    def _upload(self, file: viser.UploadedFile) -> None:
+        try:
+            if len(file.content) > LARGEST:
+                raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
+            self.open(read_captured(file.content, file.name, self._schema, self._page.body))
+        except InputError as error:
+            self._page.notices.show("Motion not opened", str(error))
+
     async def _chosen(self, event: viser.GuiEvent) -> None:
         # a coroutine runs at once where the message arrives, before `_refresh` shows the old choice again
         if event.client_id is not None:
@@ -154,7 +168,9 @@ class TruthPanel(Panel):
             return
         truth = self._columns.truth
         labels = {self._origin(entry): label for label, entry in self._entries.items()}
-        label = NONE if truth is None else labels.get(truth.origin, truth.origin or SIMULATED)
+        label = NONE
+        if truth is not None and truth.truth is not None:
+            label = labels.get(truth.origin, truth.origin or truth.truth.sequence.name or SIMULATED)
         options = tuple(dict.fromkeys((NONE, label, *self._entries)))
         if label in self._entries:
             options = (NONE, *self._entries)

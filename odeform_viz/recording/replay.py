@@ -112,7 +112,7 @@ def _load_columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Ch
         checked[name] = result = CheckedColumn(str(facts["label"]))
         if not str(facts["origin"]):
             simulated = bool(facts["truth"])
-            result.skipped = "it was simulated in the viewer" if simulated else "its model was not loaded from a file"
+            result.skipped = "it is not from a data set" if simulated else "its model was not loaded from a file"
             continue
         if facts.get("own_body"):
             result.skipped = "the body that was made of its shape is in no file"

@@ -1,7 +1,9 @@
 """Fitting the visible truth on the page."""
 
+import io
 import time
 
+import numpy as np
 import pytest
 
 from odeform.dataset.store import open_dataset
@@ -118,3 +120,29 @@ def test_models_that_cannot_be_fitted_have_no_panel(serve) -> None:
     app, client = serve(Column("odeform", predictor, predictor.rest))
     assert START not in client.controls
     assert not any(isinstance(panel, FitPanel) for panel in app.page.panels)
+
+
+def test_a_motion_of_ones_own_is_opened_and_fitted(dropped: View) -> None:
+    app, client = dropped
+    sequence = open_dataset("mass-elastic").read(ENTRY)
+    file = io.BytesIO()
+    seen = slice(300)  # it ends while the ball moves
+    np.savez(file, times=sequence.times[seen], vertices=sequence.vertices[seen], faces=sequence.faces)
+    client.upload("Open a motion...", "captured.npz", file.getvalue())
+    assert client.until(lambda: not client.controls[START].props["disabled"])
+    assert client.controls["test sequence"].value == "captured.npz"
+    assert client.until(lambda: "Not known of the truth: mass, bending" in client.text())
+    client.click(START)
+    assert client.until(lambda: "model and noise explain the motion" in client.text())
+    assert "this one ends at 0.6" in client.text()
+    found = app.columns.all[2].pinned
+    assert found is not None
+    for name, true in ENTRY.parameters.items():
+        assert found[name] == pytest.approx(true, rel=0.05)
+
+
+def test_a_motion_that_cannot_be_read_is_refused(dropped: View) -> None:
+    app, client = dropped
+    client.upload("Open a motion...", "captured.npz", b"nothing")
+    assert client.until(lambda: any("captured.npz: damaged" in note for note in client.notifications))
+    assert [c.label for c in app.columns.all] == ["odeform"]

@@ -132,7 +132,7 @@ def test_a_truth_is_loaded_again_and_a_simulated_one_is_skipped(
     assert max(c.off for c in checked) <= 2e-6
     record(path, [own, replace(truth, origin="")], [0.31])
     assert main(["--replay", str(path)]) == 0
-    assert "truth: skipped, it was simulated in the viewer" in capsys.readouterr().out
+    assert "truth: skipped, it is not from a data set" in capsys.readouterr().out
     record(path, [replace(truth, origin="")], [0.31])
     assert main(["--replay", str(path)]) == 1
     assert "none of its columns" in capsys.readouterr().err
