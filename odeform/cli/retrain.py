@@ -1,0 +1,80 @@
+"""`odeform retrain`."""
+
+import argparse
+import shlex
+from pathlib import Path
+from typing import Any
+
+from odeform.cli import train as training
+from odeform.cli.options import add_json, positive, write_json
+from odeform.errors import InputError
+
+__all__ = ["HELP", "add_options", "run"]
+
+HELP = "Train bundled checkpoints again by their recorded commands, and compare the scores"
+SCORES = ("rmse_pooled_mm", "deformation_relative")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "checkpoints", nargs="*", metavar="NAME", help="bundled checkpoints, SCENE or SCENE/MODEL (default: all)"
+    )
+    parser.add_argument("--keep", required=True, metavar="DIR", help="folder of the new ones; what it holds is kept")
+    parser.add_argument(
+        "--steps", type=int, metavar="N", help="steps of those that take steps, in place of the recorded budget"
+    )
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> None:
+    from odeform.checkpoint import bundled_checkpoints
+    from odeform.models.registry import load
+
+    if args.steps is not None:
+        positive("--steps", args.steps)
+    bundled = list(bundled_checkpoints())
+    names = [name if "/" in name else f"{name}/odeform" for name in args.checkpoints] or bundled
+    if unknown := [name for name in names if name not in bundled]:
+        raise InputError(f"{', '.join(unknown)}: expected bundled checkpoints, {', '.join(bundled)}")
+    folder = Path(args.keep)
+    folder.mkdir(parents=True, exist_ok=True)
+    found: dict[str, Any] = {}
+    for name in names:
+        out = folder / f"{name.replace('/', '_')}.safetensors"
+        recorded = load(name).checkpoint
+        command = _command(name, recorded.provenance, out, args.steps)
+        if not out.exists():
+            parser = argparse.ArgumentParser()
+            training.add_options(parser)
+            training.run(parser.parse_args(command))
+        again = load(out).checkpoint
+        shown = " ".join(["odeform train", *command])
+        found[name] = {"command": shown, "recorded": _scores(recorded.scores), "again": _scores(again.scores)}
+        print(_line(name, found[name]))
+    write_json(found, args.json)
+
+
+def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None) -> list[str]:
+    """Arguments of `odeform train`: as recorded, on the bundled data of the scene."""
+    recorded = provenance.get("command")
+    if not recorded:
+        raise InputError(f"{name}: its checkpoint does not record how it was trained")
+    tokens = shlex.split(recorded[-1])[2:]
+    tokens = [{"DIR": name.split("/")[0], "FILE": str(out)}.get(token, token) for token in tokens]
+    budget = next((option for option in ("--steps", "--minutes") if option in tokens), None)
+    if steps is not None and budget is not None:
+        at = tokens.index(budget)
+        tokens[at : at + 2] = ["--steps", str(steps)]
+    return tokens
+
+
+def _scores(scores: dict[str, Any] | None) -> dict[str, float]:
+    means = (scores or {}).get("mean_of_objects") or scores or {}
+    return {key: float(means[key]) for key in SCORES if key in means}
+
+
+def _line(name: str, found: dict[str, Any]) -> str:
+    before, after = (found[which].get(SCORES[0]) for which in ("recorded", "again"))
+    if before is None or after is None:
+        return f"{name}: not scored"
+    return f"{name}: {after:.4g} mm pooled RMSE, recorded {before:.4g} mm ({100.0 * (after / before - 1.0):+.2f} %)"
