@@ -4,6 +4,7 @@ import io
 import zipfile
 import zlib
 from collections.abc import Sequence
+from tokenize import TokenError
 
 import numpy as np
 
@@ -32,12 +33,15 @@ def read_arrays(
             size = sum(archive.getinfo(f"{name}.npy").file_size for name in names)
         require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
+            read = {name: arrays[name] for name in names}
+        if strange := [name for name, array in read.items() if not isinstance(array, np.ndarray)]:
+            raise InputError(f"{where}: damaged: {', '.join(strange)}: expected an array")
+        return read
     except InputError:
         raise
     except (KeyError, ValueError, TypeError, EOFError, OSError, MemoryError, OverflowError) as error:
         raise InputError(f"{where}: damaged: {error}") from None
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, SyntaxError) as error:
+    except (zipfile.BadZipFile, zlib.error, TokenError, NotImplementedError, RuntimeError, SyntaxError) as error:
         raise InputError(f"{where}: damaged: {error}") from None
 
 

@@ -37,14 +37,13 @@ def read_captured(data: bytes, where: str, schema: Schema, body: Mesh) -> Motion
             )
         faces = body.faces
     weights = arrays.get("weights", np.full(vertices.shape[1:2], 1.0))
-    sequence = MotionSequence(
-        arrays["times"].astype(float), vertices, faces, weights, _parameters(arrays, where, schema), where
-    )
-    sequence = checked_sequence(sequence, where)
+    known = _parameters(arrays, where, schema)
+    sequence = checked_sequence(MotionSequence(arrays["times"], vertices, faces, weights, known, where), where)
     if "weights" not in arrays:
         weights = surface_weights(sequence.rest)
-    times, vertices = _even(sequence.times - sequence.times[0], vertices)
-    return MotionSequence(times, vertices.astype(np.float32), faces, weights, sequence.parameters, where)
+    times = sequence.times.astype(float)
+    times, vertices = _even(times - times[0], vertices)
+    return MotionSequence(times, vertices.astype(np.float32), faces, weights, known, where)
 
 
 def _parameters(arrays: dict[str, np.ndarray], where: str, schema: Schema) -> dict[str, Any]:

@@ -15,11 +15,13 @@ import numpy as np
 
 import odeform
 from odeform.checkpoint import bundled_checkpoints
+from odeform.dataset.captured import read_captured
 from odeform.dataset.importers.registry import import_dataset
 from odeform.dataset.store import open_dataset
 from odeform.formats.bundled import read_shape
 from odeform.formats.writing import write_motion
 from odeform.geometry.shape import fit_to
+from odeform.motion.recorded import RecordedMotion
 from odeform_viz.columns import Column, Columns
 from odeform_viz.state import capture, state_from_json, state_to_json
 from odeform_viz.view import DisplayOptions, ViewRequest
@@ -209,6 +211,32 @@ def _restore(path: Path) -> None:
     state_from_json(path.read_bytes(), _model().schema.scene)
 
 
+def _captured(folder: Path, random: Random) -> Path:
+    """Damaged arrays in a sound archive, or a damaged archive."""
+    path = folder / "captured.npz"
+    model = _model()
+    write_motion(model.solve(), np.linspace(0.0, 0.5, 4), path)
+    if random.random() < 0.3:
+        path.write_bytes(mutated(path.read_bytes(), random))
+        return path
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    name = list(members)[random.integers(len(members))]
+    members[name] = mutated(members[name], random)
+    with zipfile.ZipFile(path, "w") as archive:
+        for member, data in members.items():
+            archive.writestr(member, data)
+    return path
+
+
+def _open(path: Path) -> None:
+    model = _model()
+    sequence = read_captured(path.read_bytes(), path.name, model.schema, model.rest)
+    motion = RecordedMotion(model.schema, sequence)
+    _finite(motion.vertices(np.linspace(0.0, 0.5, 3)))
+    _finite(motion.pose(0.1))
+
+
 TARGETS = (
     *(_shape(name) for name in shapes()),
     *(_checkpoint(name) for name in MODELS),
@@ -216,5 +244,6 @@ TARGETS = (
     Target("folder", _folder, _read_all),
     Target("packed", _packed, _read_all),
     Target("table", _table, _import),
+    Target("captured motion", _captured, _open),
     Target("state", _state, _restore),
 )
