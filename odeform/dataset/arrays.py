@@ -3,7 +3,7 @@
 import io
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from tokenize import TokenError
 
 import numpy as np
@@ -12,7 +12,7 @@ from odeform.budget import require_memory
 from odeform.errors import InputError
 from odeform.types import MotionSequence
 
-__all__ = ["checked_sequence", "read_arrays"]
+__all__ = ["check_arrays", "checked_sequence", "read_arrays"]
 
 ARRAYS = ("times", "vertices", "faces", "weights")
 FARTHEST = 1e9  # m
@@ -47,7 +47,13 @@ def read_arrays(
 
 def checked_sequence(sequence: MotionSequence, where: str) -> MotionSequence:
     """The same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not finite."""
-    times, vertices, faces, weights = (np.asarray(getattr(sequence, name)) for name in ARRAYS)
+    check_arrays({name: np.asarray(getattr(sequence, name)) for name in ARRAYS}, where)
+    return sequence
+
+
+def check_arrays(arrays: Mapping[str, np.ndarray], where: str) -> None:
+    """Raise `InputError`, which `where` leads, if the arrays of a sequence do not fit together or are not finite."""
+    times, vertices, faces, weights = (arrays[name] for name in ARRAYS)
     if vertices.ndim != 3 or vertices.shape[2] != 3 or vertices.shape[1] < 2 or vertices.dtype.kind != "f":
         raise InputError(f"{where}: expected vertices (T, N, 3), got {vertices.dtype} {vertices.shape}")
     frames, count = vertices.shape[:2]
@@ -65,4 +71,3 @@ def checked_sequence(sequence: MotionSequence, where: str) -> MotionSequence:
         raise InputError(f"{where}: expected finite times, weights and vertices")
     if not (np.diff(times) > 0.0).all() or np.abs(vertices).max() > FARTHEST:
         raise InputError(f"{where}: expected times that increase, and vertices within {FARTHEST:g} m")
-    return sequence

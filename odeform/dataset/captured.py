@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from odeform.dataset.arrays import checked_sequence, read_arrays
+from odeform.dataset.arrays import check_arrays, read_arrays
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
 from odeform.io import parse_json
@@ -36,12 +36,12 @@ def read_captured(data: bytes, where: str, schema: Schema, body: Mesh) -> Motion
                 f"{where}: expected faces (F, 3), or as many vertices as the trained body has, {len(body.points)}"
             )
         faces = body.faces
-    weights = arrays.get("weights", np.full(vertices.shape[1:2], 1.0))
+    weighed = "weights" in arrays
+    arrays = {"weights": np.full(vertices.shape[1:2], 1.0), **arrays, "faces": faces}
+    check_arrays(arrays, where)
+    weights = arrays["weights"] if weighed else surface_weights(Mesh(vertices[0], faces))
     known = _parameters(arrays, where, schema)
-    sequence = checked_sequence(MotionSequence(arrays["times"], vertices, faces, weights, known, where), where)
-    if "weights" not in arrays:
-        weights = surface_weights(sequence.rest)
-    times = sequence.times.astype(float)
+    times = arrays["times"].astype(float)
     times, vertices = _even(times - times[0], vertices)
     return MotionSequence(times, vertices.astype(np.float32), faces, weights, known, where)
 

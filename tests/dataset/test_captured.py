@@ -76,7 +76,7 @@ def test_a_predicted_motion_can_be_opened(tmp_path: Any, schema: Schema) -> None
     ("change", "message"),
     [
         ({"vertices": np.zeros((3, 5, 3), np.float32), "times": np.arange(3.0)}, "expected faces"),
-        ({"times": np.zeros(151)}, "times that increase"),
+        ({"times": np.zeros(151)}, "expected at least 2 frames"),
         ({"vertices": None}, "damaged"),
         ({"parameters": np.array("[1]")}, "by name"),
         ({"parameters": np.array('{"mass": "heavy"}')}, "mass"),
@@ -94,3 +94,9 @@ def test_others_are_refused(sequence: MotionSequence, schema: Schema, change: di
 def test_what_is_no_archive_is_refused(schema: Schema, sequence: MotionSequence) -> None:
     with pytest.raises(InputError, match=f"{FILE}: damaged"):
         read_captured(b"PK\x03\x04 nothing", FILE, schema, sequence.rest)
+
+
+def test_time_runs_forward(schema: Schema, sequence: MotionSequence) -> None:
+    data = pack(times=-sequence.times, vertices=sequence.vertices)
+    with pytest.raises(InputError, match="times that increase"):
+        read_captured(data, FILE, schema, sequence.rest)
