@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -292,14 +292,25 @@ class Schema:
         try:
             return cls(
                 scene=str(data["scene"]),
-                parameters=tuple(Parameter(**{**p, "shape": tuple(p.get("shape", ()))}) for p in data["parameters"]),
+                parameters=tuple(_parameter(p) for p in data["parameters"]),
                 window=Window(**{name: float(value) for name, value in data["window"].items()}),
                 needs_observations=bool(data.get("needs_observations", False)),
                 notes=tuple(data.get("notes", ())),
                 impact=tuple(data["impact"]) if data.get("impact") else None,
-                objects=tuple(data.get("objects", ())),
+                objects=_texts(data.get("objects", ())),
             )
         except InputError:
             raise
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(f"schema: missing or invalid field of an ODeform scene: {error}") from None
+
+
+def _parameter(data: Mapping[str, Any]) -> Parameter:
+    _texts([data.get(name, "") for name in ("name", "unit", "role")])
+    return Parameter(**{**data, "shape": tuple(data.get("shape", ()))})
+
+
+def _texts(values: Iterable[Any]) -> tuple[str, ...]:
+    if isinstance(values, str) or not all(isinstance(value, str) for value in values):
+        raise TypeError(f"expected names, got {values!r}")
+    return tuple(values)

@@ -32,6 +32,12 @@ def test_a_window_without_numbers_is_refused(stop: object) -> None:
         Schema.from_json(data)
 
 
+@pytest.mark.parametrize("wrong", [{"objects": [["cat"]]}, {"objects": "cat"}, {"parameters": [{"name": ["mass"]}]}])
+def test_names_are_texts(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="expected names"):
+        Schema.from_json({**SCHEMA.to_json(), **wrong})
+
+
 def test_ranges_map_to_the_unit_cube() -> None:
     for parameter in SCHEMA.parameters:
         assert parameter.normalise(parameter.low) == pytest.approx(-1.0)

@@ -84,6 +84,8 @@ class ReducedSpace:
         """From `to_json` and `arrays` of a checkpoint; `rest` is the trained body at rest in the scene."""
         basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
         anchor = np.array(data["anchor"], dtype=float)
+        if anchor.shape != (3,):
+            raise ValueError(f"anchor: expected three numbers, got {data['anchor']!r}")
         # older checkpoints do not say: all of them are of surfaces
         surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
         shift, deformation = data.get("largest", ("inf", "inf"))  # pyright: ignore

@@ -86,6 +86,7 @@ DAMAGE: dict[str, Callable[[dict[str, Any]], Any]] = {
     "no schema": lambda index: {k: v for k, v in index.items() if k != "schema"},
     "no sequences": lambda index: {k: v for k, v in index.items() if k != "sequences"},
     "strange entry": lambda index: {**index, "sequences": [{"name": "s0", "color": "red"}]},
+    "strange name": lambda index: {**index, "sequences": [{**index["sequences"][0], "name": "s\0"}]},
     "strange schema": lambda index: {**index, "schema": {**index["schema"], "window": {"start": 0.0}}},
 }
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from odeform.dataset.training_data import TrainingData
 from odeform.models.reduced_model import ReducedModel
-from odeform.types import Arrays
+from odeform.types import Arrays, Floats
 
 __all__ = ["FittedModel"]
 
@@ -17,3 +17,9 @@ class FittedModel(ReducedModel):
     @abstractmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
         """Arrays and settings of the checkpoint, from which `_read` restores the model."""
+
+    def _check_inputs(self, theta: Floats) -> None:
+        """Raise `ValueError` unless theta is (S, P), with the scene's P parameters."""
+        count = len(self.schema.learned)
+        if theta.ndim != 2 or theta.shape[1] != count:
+            raise ValueError(f"theta: expected shape (S, {count}), got {theta.shape}")

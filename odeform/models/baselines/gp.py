@@ -41,6 +41,7 @@ class GaussianProcess(FittedModel):
         self._scales = np.array(checkpoint.config["length_scales"], dtype=float)
         if not (np.isfinite(self._scales) & (self._scales > 0.0)).all():
             raise ValueError(f"length_scales: expected positive numbers, got {self._scales}")
+        self._check_inputs(arrays["theta"])
         self._inputs, self._weights = arrays["theta"] / self._scales, arrays["gp.weights"]
 
     @staticmethod

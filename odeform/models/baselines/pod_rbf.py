@@ -38,6 +38,7 @@ class PodRbf(FittedModel):
         smoothing = float(config["smoothing"])
         if not 0.0 <= smoothing < np.inf:
             raise ValueError(f"smoothing: expected a finite number of 0 or more, got {smoothing:g}")
+        self._check_inputs(arrays["theta"])
         self._interpolate = RBFInterpolator(
             arrays["theta"].astype(float),
             arrays["pod.coefficients"].astype(float),

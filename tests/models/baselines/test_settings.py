@@ -41,3 +41,18 @@ def test_predictions_that_are_not_finite_are_refused(model: str, name: str, valu
     predictor = model_class(model)(replace(checkpoint, arrays=arrays))
     with pytest.raises(InputError, match="the checkpoint predicts numbers that are not finite"):
         predictor.solve()
+
+
+@pytest.mark.parametrize("model", ["gp", "pod-rbf"])
+def test_inputs_are_the_parameters_of_the_scene(model: str) -> None:
+    checkpoint = open_checkpoint(f"mass-elastic/{model}")
+    arrays = {**checkpoint.arrays, "theta": checkpoint.arrays["theta"][:, :1]}
+    with pytest.raises(InputError, match=r"theta: expected shape \(S, 2\)"):
+        model_class(model)(replace(checkpoint, arrays=arrays))
+
+
+def test_the_anchor_is_a_point() -> None:
+    checkpoint = open_checkpoint("mass-elastic/pod-rbf")
+    space = {**checkpoint.config["space"], "anchor": 0.1}
+    with pytest.raises(InputError, match="anchor: expected three numbers"):
+        model_class("pod-rbf")(replace(checkpoint, config={**checkpoint.config, "space": space})).solve()
