@@ -14,6 +14,7 @@ from odeform.types import Floats, Mesh, MotionSequence
 
 __all__ = ["read_captured"]
 
+SHORTEST = 1e-9  # step between frames, relative to the whole
 UNEVEN = 1e-3  # of a step: more, and frames are resampled
 
 
@@ -42,7 +43,10 @@ def read_captured(data: bytes, where: str, schema: Schema, body: Mesh) -> Motion
     weights = arrays["weights"] if weighed else surface_weights(Mesh(vertices[0], faces))
     known = _parameters(arrays, where, schema)
     times = arrays["times"].astype(float)
-    times, vertices = _even(times - times[0], vertices)
+    times = times - times[0]
+    if np.diff(times).min() < SHORTEST * times[-1]:
+        raise InputError(f"{where}: expected times that increase by at least {SHORTEST:g} of the whole in each frame")
+    times, vertices = _even(times, vertices)
     return MotionSequence(times, vertices.astype(np.float32), faces, weights, known, where)
 
 

@@ -161,6 +161,8 @@ def _entry(raw: Mapping[str, Any], schema: Schema) -> Entry:
     for text in (entry.name, entry.split, entry.sha256, entry.status):
         if not isinstance(text, str):
             raise TypeError(f"{text!r}: expected text")
+    if not isinstance(entry.parameters, dict):
+        raise TypeError(f"{entry.parameters!r}: expected parameters by name")
     if "\0" in entry.name:
         raise ValueError(f"{entry.name!r}: expected the name of a file")
     schema.complete(schema.known(entry.parameters))

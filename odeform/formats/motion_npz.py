@@ -7,6 +7,7 @@ from typing import IO
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.motion.base import Motion
@@ -53,7 +54,10 @@ def _write_frames(archive: zipfile.ZipFile, name: str, frame: Callable[[float], 
     """One array (T, ...) float32, of which `frame(time)` computes the rows."""
     with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
         for index, time in enumerate(times):
-            array = np.ascontiguousarray(frame(float(time)), dtype="<f4")
+            with np.errstate(over="ignore"):
+                array = np.ascontiguousarray(frame(float(time)), dtype="<f4")
+            if not np.isfinite(array).all():
+                raise InputError(f"{name} at {time:g} s: too large for 32-bit numbers in the units of the file")
             if index == 0:
                 header = {"descr": "<f4", "fortran_order": False, "shape": (len(times), *array.shape)}
                 np.lib.format.write_array_header_1_0(member, header)

@@ -100,3 +100,10 @@ def test_time_runs_forward(schema: Schema, sequence: MotionSequence) -> None:
     data = pack(times=-sequence.times, vertices=sequence.vertices)
     with pytest.raises(InputError, match="times that increase"):
         read_captured(data, FILE, schema, sequence.rest)
+
+
+def test_frames_are_apart_in_time(schema: Schema, sequence: MotionSequence) -> None:
+    times = sequence.times.copy()
+    times[-1] = 1e12
+    with pytest.raises(InputError, match="times that increase by at least"):
+        read_captured(pack(times=times, vertices=sequence.vertices), FILE, schema, sequence.rest)

@@ -87,6 +87,10 @@ DAMAGE: dict[str, Callable[[dict[str, Any]], Any]] = {
     "no sequences": lambda index: {k: v for k, v in index.items() if k != "sequences"},
     "strange entry": lambda index: {**index, "sequences": [{"name": "s0", "color": "red"}]},
     "strange name": lambda index: {**index, "sequences": [{**index["sequences"][0], "name": "s\0"}]},
+    "a list of parameters": lambda index: {
+        **index,
+        "sequences": [{**index["sequences"][0], "parameters": list(index["sequences"][0]["parameters"])}],
+    },
     "strange schema": lambda index: {**index, "schema": {**index["schema"], "window": {"start": 0.0}}},
 }
 

@@ -1,5 +1,6 @@
 """Sizes of the ODeform network."""
 
+import math
 from dataclasses import dataclass
 
 from odeform.motion.reduced_space import POSE
@@ -28,6 +29,10 @@ class ModelConfig:
     """Principal components of a decoder's inputs, on which its random features are built."""
     random_features: int = 0
     """Number per decoder; they are added when the rest is trained."""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.clock, int | float) and 0.0 < self.clock < math.inf):
+            raise ValueError(f"clock: expected a positive number of seconds, got {self.clock!r}")
 
     @property
     def state(self) -> int:

@@ -56,3 +56,11 @@ def test_the_anchor_is_a_point() -> None:
     space = {**checkpoint.config["space"], "anchor": 0.1}
     with pytest.raises(InputError, match="anchor: expected three numbers"):
         model_class("pod-rbf")(replace(checkpoint, config={**checkpoint.config, "space": space})).solve()
+
+
+@pytest.mark.parametrize("clock", [0.0, -1.0, float("nan")])
+def test_the_clock_of_decoders_is_a_time(clock: object) -> None:
+    checkpoint = open_checkpoint("mass-elastic/odeform")
+    network = {**checkpoint.config["network"], "clock": clock}
+    with pytest.raises(InputError, match="clock: expected a positive number"):
+        model_class("odeform")(replace(checkpoint, config={**checkpoint.config, "network": network}))
