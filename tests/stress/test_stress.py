@@ -228,18 +228,18 @@ def test_spin_is_energy() -> None:
 
 
 def test_the_plot_shows_where_and_when_a_model_is_unstable(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
-    plot = stability_map(model, ("force", "mass"), reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
+    plot = stability_map(model, ("force", "mass"), reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")
     assert plot.values.shape == plot.sound.shape == (3, 3, 3)
     assert plot.sound[0].all()
     force, mass = (next(p for p in model.schema.parameters if p.name == name) for name in plot.names)
-    motion = model.solve(None, {"force": force.denormalise(2.0), "mass": mass.denormalise(-2.0)})
+    motion = model.solve(None, {"force": force.denormalise(1.0), "mass": mass.denormalise(-1.0)})
     shares = motion.deformation_rms(plot.times) / plot.values[:, 0, 2]
     assert np.allclose(shares, shares[0])
     picture = np.asarray(map_image(plot))
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
     monkeypatch.setattr(LatentTrajectory, "last_good", property(lambda _: 1.02))
-    failed = stability_map(model, reach=2.0, count=3, moments=(0.5, 1.0, 10.0))
+    failed = stability_map(model, reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert failed.sound[:2].any()
     assert not failed.sound[2].any()
     assert not np.array_equal(picture, np.asarray(map_image(failed)))

@@ -91,7 +91,7 @@ def test_the_list_names_the_truth_that_was_opened_otherwise(serve: Callable[...,
     app, client = serve(Column("odeform", drop, drop.rest), moment=0.3)
     app.panel(TruthPanel).open(sequence, f"mass-elastic/{ENTRIES[0].name}")
     assert client.until(lambda: client.controls["test sequence"].value == entry_label(ENTRIES[0], schema))
-    app.panel(TruthPanel).open(sequence)
+    app.panel(TruthPanel).open(replace(sequence, name=""))
     assert client.until(lambda: client.controls["test sequence"].value == SIMULATED)
 
 
