@@ -97,10 +97,10 @@ class FitPanel(Panel):
             if truth is None or model.predictor is None or (self._job is not None and self._job.running):
                 return
             schema, predictor = self._page.schema, model.predictor
-            # an azimuth that is not known is the sliders'
-            known = {**self._page.controls.parameters(), **truth.setting}
-            fixed = {p.name: known[p.name] for p in schema.parameters if p.role == "azimuth"}
             try:
+                # an azimuth that is not known is the sliders'
+                known = {**self._page.controls.parameters(), **truth.setting}
+                fixed = {p.name: known[p.name] for p in schema.parameters if p.role == "azimuth"}
                 observation = observe(replace(truth.sequence, parameters=known), schema, View())
             except InputError as error:
                 self._show(FAILED.format(error))

@@ -146,3 +146,11 @@ def test_a_motion_that_cannot_be_read_is_refused(dropped: View) -> None:
     client.upload("Open a motion...", "captured.npz", b"nothing")
     assert client.until(lambda: any("captured.npz: damaged" in note for note in client.notifications))
     assert [c.label for c in app.columns.all] == ["odeform"]
+
+
+def test_a_slider_out_of_range_is_said(dropped: View) -> None:
+    app, client = dropped
+    _open(app, client)
+    client.set("mass (kg)", 1e9)
+    client.click(START)
+    assert client.until(lambda: "The fit failed" in client.text() and "got 1e+09" in client.text())
