@@ -21,6 +21,9 @@ from odeform_viz.runtime.access import is_loopback
 __all__ = ["main", "make_columns"]
 
 
+WAKING = 0.5  # s; a Ctrl-C that the system gives to another thread does not end a sleep, and is noticed after it
+
+
 def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) -> list[Column]:
     """A column for each checkpoint. A shape from a file is fitted to the body of the first model, and printed how.
 
@@ -67,7 +70,7 @@ def _serve(args: argparse.Namespace) -> None:
             print(f"warning: any machine that reaches {app.url} can drive this viewer", file=sys.stderr, flush=True)
         print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C to stop)", flush=True)
         while True:
-            time.sleep(3600.0)
+            time.sleep(WAKING)
     finally:
         app.close()
 

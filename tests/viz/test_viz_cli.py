@@ -63,9 +63,9 @@ def test_version_and_help_are_printed(option: str, printed: str, capsys: pytest.
 @contextmanager
 def _viewer(*arguments: str) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """`odeform-viz` in a process of its own, and its port. The process ends with the block, or at the deadline."""
-    command = [sys.executable, "-m", "odeform_viz.cli", "--port", "0", *arguments]
+    command = [sys.executable, "-X", "faulthandler", "-m", "odeform_viz.cli", "--port", "0", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    watchdog = threading.Timer(DEADLINE, process.kill)
+    watchdog = threading.Timer(DEADLINE, process.send_signal, (signal.SIGABRT,))  # it says where all threads are
     watchdog.start()
     try:
         assert process.stdout is not None
