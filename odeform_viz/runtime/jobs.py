@@ -41,31 +41,38 @@ class Job:
     running: bool = field(default=False, init=False)
     """Until the result has arrived or the job is cancelled."""
     _cancelled: threading.Event = field(default_factory=threading.Event, init=False)
+    _starting: threading.Lock = field(default_factory=threading.Lock, init=False)
 
     def start(self) -> None:
         """Start the process; returns at once. `failed` is called if the system has no room for another process."""
+        with self._starting:  # a cancellation from another thread waits until there is a process to end
+            try:
+                self._start()
+                return
+            except OSError as error:
+                self.running = False
+                reason = f"no process could be started: {error.strerror}"
+        self.failed(reason)
+
+    def _start(self) -> None:
         self.running = True
         # spawn, not fork: this process has threads, and a fork would copy their locks in any state
         context = multiprocessing.get_context("spawn")
         self._inbox, outbox = context.Pipe(duplex=False)
         self._process = context.Process(target=_run, args=(outbox, self.work, self.args), daemon=True)
-        try:
-            self._process.start()
-        except OSError as error:
-            self.running = False
-            self.failed(f"no process could be started: {error.strerror}")
-            return
+        self._process.start()
         outbox.close()
         self._thread = threading.Thread(target=self._listen, name="odeform-job", daemon=True)
         self._thread.start()
 
     def cancel(self) -> None:
         """Terminate the process. No callback follows."""
-        if not self.running:
-            return
-        self._cancelled.set()
-        self._process.terminate()
-        self.running = False
+        with self._starting:
+            if not self.running:
+                return
+            self._cancelled.set()
+            self._process.terminate()
+            self.running = False
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout=5.0)
 

@@ -100,6 +100,42 @@ def test_a_process_that_cannot_be_started_is_a_failure(monkeypatch: pytest.Monke
     listener.job.cancel()
 
 
+class _Slow:
+    """Takes its time to be sent to the process."""
+
+    def __init__(self) -> None:
+        self.sending, self.go_on = threading.Event(), threading.Event()
+
+    def __reduce__(self) -> tuple[type, tuple[()]]:
+        self.sending.set()
+        assert self.go_on.wait(DEADLINE)
+        return _Slow, ()
+
+
+def test_a_job_can_be_cancelled_while_its_process_starts() -> None:
+    slow = _Slow()
+    job = Job(fail, (slow,), pytest.fail, pytest.fail)
+    starting, faults = threading.Thread(target=job.start), []
+
+    def cancel() -> None:
+        try:
+            job.cancel()
+        except AttributeError as error:
+            faults.append(error)
+
+    starting.start()
+    assert slow.sending.wait(DEADLINE)
+    cancelling = threading.Thread(target=cancel)
+    cancelling.start()
+    slow.go_on.set()
+    for thread in (starting, cancelling):
+        thread.join(DEADLINE)
+    assert not faults
+    assert not job.running
+    job._process.join(DEADLINE)
+    assert job._process.exitcode == -signal.SIGTERM
+
+
 VIEWER = """
 import os, signal, sys
 sys.path.insert(0, {folder!r})
