@@ -1,6 +1,5 @@
 """Kernel ridge regression (Matern 5/2), and the search for its length scales and ridge."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ __all__ = ["Ridge", "search_ridge"]
 
 STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
 RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0
-EVALUATIONS = 150  # of the validation error, from each start
+EVALUATIONS = 150  # of the error, from each start
 BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
 
 Parameters = Float[np.ndarray, "sequences parameters"]
@@ -49,24 +48,32 @@ class Ridge:
         return cho_factor(matern(scaled, scaled) + self.ridge * np.eye(len(theta)))
 
 
-def search_ridge(parameters: int, error: Callable[[Ridge], float]) -> tuple[Ridge, ...]:
-    """The settings that Nelder-Mead finds from each of several starts, the best first."""
+def search_ridge(known: Parameters, outputs: Floats, val: tuple[Floats, Floats] | None = None) -> tuple[Ridge, ...]:
+    """The settings that Nelder-Mead finds from each of several starts, the best first.
+
+    They minimise the RMS error of predictions from training motions other than the one predicted: the leave-one-out
+    error of training `outputs` (S, outputs) at `known` (S, P), together with the error of the motions `val`, which are
+    theta (V, P) and outputs (V, outputs). Few validation motions alone tell less.
+    """
+    asked, expected = (known[:0], outputs[:0]) if val is None else val
 
     def ridge(settings: Floats) -> Ridge:
         return Ridge(np.exp(settings[:-1]), float(np.exp(settings[-1])))
 
     def objective(settings: Floats) -> float:
         try:
-            return error(ridge(settings))
+            left_out = ridge(settings).left_out(known, outputs)
+            missed = ridge(settings).predict(asked, known, outputs) - expected
         except np.linalg.LinAlgError:
             return float("inf")  # the kernel matrix is singular to rounding
+        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(known) + len(asked)))
 
     length, noise = BOUNDS
     limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
     found = []
     for scale in STARTS:
-        start = np.log([*[scale] * parameters, RIDGE])
-        bounds = [*[length] * parameters, noise]
+        start = np.log([*[scale] * known.shape[1], RIDGE])
+        bounds = [*[length] * known.shape[1], noise]
         trial = minimize(objective, start, method="Nelder-Mead", bounds=bounds, options=limits)
         found.append(replace(ridge(trial.x), error=float(trial.fun)))
     return tuple(sorted(found, key=lambda trial: trial.error))

@@ -60,16 +60,16 @@ def _fitted(
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
-    Length scales and ridge minimise the leave-one-out error of the training motions themselves: residuals on training
-    do not tell how smooth those of other parameters are, and a search on few validation motions fits their noise. The
-    share has the smallest error on validation, relative in each sequence: in small sets one hard sequence would decide.
-    It is zero where that gain may be chance, as with few validation motions it often is.
+    Length scales and ridge are those of the motions themselves: residuals on training do not tell how smooth those of
+    other parameters are. The share has the smallest error on validation, relative in each sequence: in small sets one
+    hard sequence would decide. It is zero where that gain may be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
     mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
     # inner products are all that the search needs: coordinates in place of entries
-    u, sizes, _ = np.linalg.svd(truth["train"] - mean, full_matrices=False)
-    ridge = search_ridge(known.shape[1], lambda ridge: float(np.linalg.norm(ridge.left_out(known, u * sizes))))[0]
+    u, sizes, _ = np.linalg.svd(np.concatenate([truth["train"], truth["val"]]) - mean, full_matrices=False)
+    outputs, expected = np.split(u * sizes, [len(known)])
+    ridge = search_ridge(known, outputs)[0]  # without validation, where what it predicts is compared with the ODE
 
     alone = mean + ridge.predict(asked, known, truth["train"] - mean) - truth["val"]
     added = motion["val"] - own - ridge.predict(asked, known, motion["train"] - own)
@@ -83,6 +83,7 @@ def _fitted(
     missed = alone + share * added
     explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
 
+    ridge = search_ridge(known, outputs, (asked, expected))[0]
     rest = truth["train"] - share * motion["train"]
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on

@@ -79,7 +79,9 @@ class LoopbackClient:
         self.nodes: set[str] = set()
         """Names of the scene's nodes."""
         self.downloads: dict[str, bytearray] = {}
-        """Downloaded files, by name."""
+        """Downloaded files, by name. They can be deleted at any time, also while they arrive."""
+        self.drawing_s = 0.0
+        """Seconds that a picture takes."""
         self._sizes: dict[str, int] = {}
         self._transfers: dict[str, str] = {}
         self._send("ViewerCameraMessage", **CAMERA)  # the server ignores clients without a camera
@@ -191,9 +193,12 @@ class LoopbackClient:
             self._transfers[message["transfer_uuid"]] = message["filename"]
             self.downloads[message["filename"]] = bytearray()
             self._sizes[message["filename"]] = message["size_bytes"]
-        elif kind == "FileTransferPart" and message["transfer_uuid"] in self._transfers:
-            self.downloads[self._transfers[message["transfer_uuid"]]] += message["content"]
+        elif kind == "FileTransferPart":
+            self.downloads.get(self._transfers.get(message["transfer_uuid"], ""), bytearray()).extend(
+                message["content"]
+            )
         elif kind == "GetRenderRequestMessage":
+            time.sleep(self.drawing_s)
             picture, size = io.BytesIO(), (message["width"], message["height"])
             Image.new("RGB", size).save(picture, "PNG" if message["format"] == "image/png" else "JPEG")
             self._send("GetRenderResponseMessage", payload=picture.getvalue(), render_uuid=message["render_uuid"])

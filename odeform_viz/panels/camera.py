@@ -57,4 +57,4 @@ class CameraPanel(Panel):
         )
 
     def _next_colors(self) -> None:
-        self._colors.value = COLOR_BY[(COLOR_BY.index(self._colors.value) + 1) % len(COLOR_BY)]
+        self._colors.value = COLOR_BY[(COLOR_BY.index(self._options().color_by) + 1) % len(COLOR_BY)]

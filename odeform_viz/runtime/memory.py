@@ -2,12 +2,12 @@
 
 import ctypes
 import sys
-import time
+import threading
 
 __all__ = ["MallocTrimmer", "share_arenas"]
 
 M_ARENA_MAX = -8  # option of mallopt
-INTERVAL = 2.0  # s
+DELAY = 2.0  # s
 
 
 def share_arenas(count: int = 2) -> None:
@@ -17,17 +17,29 @@ def share_arenas(count: int = 2) -> None:
 
 
 class MallocTrimmer:
-    """Returns freed memory at most every two seconds; takes some milliseconds, without holding the GIL."""
+    """Returns freed memory two seconds after it is asked to; requests in between count as one.
+
+    What was asked for often frees more of its memory a moment later. Takes some milliseconds, without holding the GIL.
+    """
 
     def __init__(self) -> None:
         self._libc = _glibc()
-        self._last = 0.0
+        self._lock = threading.Lock()
+        self._timer: threading.Timer | None = None
 
     def __call__(self) -> None:
-        now = time.monotonic()
-        if self._libc is not None and now - self._last > INTERVAL:
-            self._last = now
-            self._libc.malloc_trim(0)
+        with self._lock:
+            if self._libc is None or self._timer is not None:
+                return
+            self._timer = threading.Timer(DELAY, self._trim)
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _trim(self) -> None:
+        with self._lock:
+            self._timer = None
+        assert self._libc is not None
+        self._libc.malloc_trim(0)
 
 
 def _glibc() -> ctypes.CDLL | None:

@@ -1,8 +1,9 @@
 """Kernel ridge regression over the parameters: the posterior mean of a Gaussian process, and a strong rival.
 
 Matern 5/2 kernel with a length scale for each parameter (Rasmussen and Williams 2006, 4.2 and 2.2), on the POD
-coefficients of whole trajectories. Length scales and ridge minimise the error on validation. In scenes with a contact
-and a force it works in the contact's frame (`odeform.models.contact.regression`).
+coefficients of whole trajectories. Length scales and ridge minimise the error on validation and the leave-one-out error
+on training together. In scenes with a contact and a force it works in the contact's frame
+(`odeform.models.contact.regression`).
 """
 
 from typing import Any
@@ -46,20 +47,15 @@ class GaussianProcess(FittedModel):
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
-        """Length scales and ridge by Nelder-Mead on the RMS displacement on validation, from several starts."""
+        """Length scales and ridge by Nelder-Mead, from several starts."""
         if has_contact(data.schema):
             known, asked = (contact_inputs(data.schema, data.theta[split], data.space) for split in ("train", "val"))
             return fit_contact_regression(known, asked, data.times, data.reduced["train"], data.reduced["val"])
-        pod = fit_trajectory_pod(data)
-        train, val = data.theta["train"], data.theta["val"]
-
-        def error(ridge: Ridge) -> float:
-            return pod.error(ridge.predict(val, train, pod.coefficients), data.reduced["val"])
-
-        found = search_ridge(train.shape[1], error)
-        weights = found[0].weights(train, pod.coefficients)
-        arrays = {"times": data.times, "theta": train, "gp.weights": weights, **pod.arrays()}
-        trials = [{**_named(trial), "val": trial.error} for trial in found]
+        pod, theta = fit_trajectory_pod(data), data.theta
+        found = search_ridge(theta["train"], pod.coefficients, (theta["val"], pod.project(data.reduced["val"])))
+        weights = found[0].weights(theta["train"], pod.coefficients)
+        arrays = {"times": data.times, "theta": theta["train"], "gp.weights": weights, **pod.arrays()}
+        trials = [{**_named(trial), "error": trial.error} for trial in found]
         return arrays, {**_named(found[0]), "modes": len(pod.modes), "trials": trials}
 
     def trajectory(

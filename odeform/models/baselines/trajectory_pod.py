@@ -25,6 +25,10 @@ class TrajectoryPod:
     coefficients: Float[np.ndarray, "sequences modes"]
     """Coefficients of the training motions; the modes are orthonormal."""
 
+    def project(self, reduced: Floats) -> Float[np.ndarray, "sequences modes"]:
+        """Coefficients of trajectories (S, T, 6 + K)."""
+        return ((reduced * self.weight).reshape(len(reduced), -1) - self.mean) @ self.modes.T
+
     def error(self, coefficients: Floats, reduced: Floats) -> float:
         """RMS distance in m between (S, modes) `coefficients` and trajectories (S, T, 6 + K), over the sequences."""
         target = (reduced * self.weight).reshape(len(reduced), -1)

@@ -1,0 +1,62 @@
+"""Kernel ridge regression and the search for its settings."""
+
+import numpy as np
+import pytest
+
+from odeform.models.kernel_search import Ridge, search_ridge
+from odeform.types import Floats
+
+
+def _surface(theta: Floats) -> Floats:
+    return np.stack([np.sin(2.0 * theta[:, 0]), np.cos(1.5 * theta[:, 0]) * theta[:, 1]], axis=1)
+
+
+@pytest.fixture(scope="module")
+def theta() -> Floats:
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2))
+
+
+def test_left_out_is_what_a_fit_without_that_sequence_misses(theta: Floats) -> None:
+    ridge, outputs = Ridge(np.array([0.7, 1.5]), 1e-4), _surface(theta)
+    errors = ridge.left_out(theta, outputs)
+    for index in range(0, len(theta), 7):
+        others = np.arange(len(theta)) != index
+        predicted = ridge.predict(theta[index : index + 1], theta[others], outputs[others])[0]
+        np.testing.assert_allclose(errors[index], outputs[index] - predicted, atol=1e-9)
+
+
+def test_the_found_settings_have_the_least_error_of_both_splits(theta: Floats) -> None:
+    known, asked = theta[:22], theta[22:]
+    found = search_ridge(known, _surface(known), (asked, _surface(asked)))
+    assert [trial.error for trial in found] == sorted(trial.error for trial in found)
+
+    def error(ridge: Ridge) -> float:
+        missed = ridge.predict(asked, known, _surface(known)) - _surface(asked)
+        each = np.concatenate([ridge.left_out(known, _surface(known)), missed])
+        return float(np.sqrt(np.square(each).sum(axis=1).mean()))
+
+    assert found[0].error == pytest.approx(error(found[0]))
+    for scales in ((0.3, 0.3), (1.0, 1.0), (3.0, 3.0)):
+        assert found[0].error <= error(Ridge(np.array(scales), 1e-6))
+
+
+def test_training_motions_count_where_validation_is_a_single_one(theta: Floats) -> None:
+    """A validation motion that any length scale predicts, at a training motion: those left out decide."""
+    known = theta[:25]
+    found = search_ridge(known, _surface(known), (known[:1], _surface(known[:1])))[0]
+    missed = found.predict(theta[25:], known, _surface(known)) - _surface(theta[25:])
+    assert np.abs(missed).max() < 0.1
+
+
+def test_without_validation_motions_those_left_out_decide(theta: Floats) -> None:
+    found = search_ridge(theta, _surface(theta))[0]
+    left_out = found.left_out(theta, _surface(theta))
+    assert found.error == pytest.approx(float(np.sqrt(np.square(left_out).sum(axis=1).mean())))
+
+
+def test_settings_without_a_solution_are_passed_over() -> None:
+    """Two equal inputs: without noise, the kernel matrix is singular."""
+    known = np.zeros((2, 1))
+    found = search_ridge(known, np.array([[1.0], [2.0]]), (np.array([[0.0]]), np.array([[1.5]])))[0]
+    assert np.isfinite(found.error)
+    assert 1.0 < found.predict(np.zeros((1, 1)), known, np.array([[1.0], [2.0]]))[0, 0] < 2.0
