@@ -73,6 +73,7 @@ WRITERS: dict[str, Writer] = {
         "mesh, animated", shape="odeform.formats.meshes:mesh_bytes", motion="odeform.formats.gltf_motion:write_glb"
     ),
     ".npz": Writer("NumPy arrays of all frames", motion="odeform.formats.motion_npz:write_npz"),
+    ".webp": Writer("film", motion="odeform.formats.motion_film:write_webp"),
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from odeform.models.contact.kernel import matern
@@ -38,18 +39,25 @@ class Ridge:
         """Predictions at `asked` (A, P) from outputs at `theta` (S, P)."""
         return matern(asked / self.scales, theta / self.scales) @ self.weights(theta, outputs)
 
-    def left_out(self, theta: Parameters, outputs: Floats) -> Float[np.ndarray, "sequences outputs"]:
-        """Errors at each of `theta` (S, P) if predicted from all the others (Rasmussen and Williams 2006, 5.12)."""
-        inverse = cho_solve(self._factor(theta), np.eye(len(theta)))
-        return (inverse @ outputs) / np.diag(inverse)[:, None]
+    def rms(self, theta: Parameters, outputs: Floats, asked: Floats, expected: Floats) -> float:
+        """RMS error, over sequences, of outputs (S, outputs) at `theta` (S, P), each predicted from all the others
+        (Rasmussen and Williams 2006, 5.12), and of those `expected` (A, outputs) at `asked` (A, P)."""
+        inverse = dpotri(self._factor(theta)[0], lower=True)[0]
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        weights = inverse @ outputs
+        left_out = weights / np.diag(inverse)[:, None]
+        missed = matern(asked / self.scales, theta / self.scales) @ weights - expected
+        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(theta) + len(asked)))
 
     def _factor(self, theta: Parameters) -> tuple[Floats, bool]:
         scaled = theta / self.scales
-        return cho_factor(matern(scaled, scaled) + self.ridge * np.eye(len(theta)))
+        return cho_factor(matern(scaled, scaled) + self.ridge * np.eye(len(theta)), lower=True)
 
 
-def search_ridge(known: Parameters, outputs: Floats, val: tuple[Floats, Floats] | None = None) -> tuple[Ridge, ...]:
-    """The settings that Nelder-Mead finds from each of several starts, the best first.
+def search_ridge(
+    known: Parameters, outputs: Floats, val: tuple[Floats, Floats] | None = None, start: Ridge | None = None
+) -> tuple[Ridge, ...]:
+    """The settings that Nelder-Mead finds from `start`, or else from each of several, the best first.
 
     They minimise the RMS error of predictions from training motions other than the one predicted: the leave-one-out
     error of training `outputs` (S, outputs) at `known` (S, P), together with the error of the motions `val`, which are
@@ -62,18 +70,17 @@ def search_ridge(known: Parameters, outputs: Floats, val: tuple[Floats, Floats] 
 
     def objective(settings: Floats) -> float:
         try:
-            left_out = ridge(settings).left_out(known, outputs)
-            missed = ridge(settings).predict(asked, known, outputs) - expected
+            return ridge(settings).rms(known, outputs, asked, expected)
         except np.linalg.LinAlgError:
             return float("inf")  # the kernel matrix is singular to rounding
-        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(known) + len(asked)))
 
     length, noise = BOUNDS
     limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
+    starts = (start,) if start else [Ridge(np.full(known.shape[1], scale), RIDGE) for scale in STARTS]
     found = []
-    for scale in STARTS:
-        start = np.log([*[scale] * known.shape[1], RIDGE])
+    for one in starts:
+        begin = np.log([*one.scales, one.ridge])
         bounds = [*[length] * known.shape[1], noise]
-        trial = minimize(objective, start, method="Nelder-Mead", bounds=bounds, options=limits)
+        trial = minimize(objective, begin, method="Nelder-Mead", bounds=bounds, options=limits)
         found.append(replace(ridge(trial.x), error=float(trial.fun)))
     return tuple(sorted(found, key=lambda trial: trial.error))

@@ -8,7 +8,7 @@ from odeform.models.base import Predictor, check_finite
 from odeform.models.continuation import ContinuedTrajectory, Dynamics
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
-from odeform.motion.recent import Recent
+from odeform.motion.recent import InUse
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
 from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.schema import Parameters
@@ -16,8 +16,6 @@ from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
 
 __all__ = ["ReducedModel"]
-
-CACHED = 4  # geometries (or azimuths) whose basis is kept
 
 
 class ReducedModel(Predictor):
@@ -38,8 +36,8 @@ class ReducedModel(Predictor):
         return Dynamics.from_arrays(self.checkpoint.arrays, coordinates, len(self.schema.learned))
 
     @cached_property
-    def _evaluated(self) -> Recent[EvaluatedBasis]:
-        return Recent(CACHED)
+    def _evaluated(self) -> InUse[EvaluatedBasis]:
+        return InUse()
 
     @abstractmethod
     def trajectory(
@@ -57,7 +55,7 @@ class ReducedModel(Predictor):
         return ContinuedTrajectory(solved, self.dynamics, theta, window)
 
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
-        """The basis on a geometry at an azimuth in radians; the last few are kept."""
+        """The basis on a geometry at an azimuth in radians; kept while a motion uses it, or until the next one."""
 
         def evaluated() -> EvaluatedBasis:
             check_finite(geometry)

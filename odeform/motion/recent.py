@@ -1,9 +1,10 @@
-"""A small cache of the values that were used last."""
+"""Small caches: of the values that were used last, and of those in use."""
 
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
+from weakref import WeakValueDictionary
 
-__all__ = ["Recent"]
+__all__ = ["InUse", "Recent"]
 
 Value = TypeVar("Value")
 
@@ -24,3 +25,19 @@ class Recent(Generic[Value]):
         if not entries or found is not entries[0]:
             self._entries = (found, *(entry for entry in entries if entry is not found))[: self._size]
         return found[1]
+
+
+class InUse(Generic[Value]):
+    """Keeps the value that was asked for last, and others as long as something else refers to them."""
+
+    def __init__(self) -> None:
+        self._referred: WeakValueDictionary[Hashable, Value] = WeakValueDictionary()
+        self._last: Value | None = None
+
+    def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """The value of `key`, which is made if it is not kept."""
+        value = self._referred.get(key)
+        if value is None:
+            value = self._referred[key] = make()
+        self._last = value
+        return value

@@ -83,7 +83,7 @@ def _fitted(
     missed = alone + share * added
     explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
 
-    ridge = search_ridge(known, outputs, (asked, expected))[0]
+    ridge = search_ridge(known, outputs, (asked, expected), ridge)[0]
     rest = truth["train"] - share * motion["train"]
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on

@@ -8,9 +8,9 @@ import numpy as np
 import viser
 
 from odeform.errors import InputError
+from odeform.formats.picture_files import Picture, png_bytes, webp_bytes
 from odeform_viz.export import export_notes
 from odeform_viz.page import Page, Panel
-from odeform_viz.picture_files import Picture, png_bytes, webp_bytes
 
 __all__ = ["PicturePanel"]
 

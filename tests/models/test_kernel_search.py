@@ -16,13 +16,15 @@ def theta() -> Floats:
     return np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2))
 
 
-def test_left_out_is_what_a_fit_without_that_sequence_misses(theta: Floats) -> None:
-    ridge, outputs = Ridge(np.array([0.7, 1.5]), 1e-4), _surface(theta)
-    errors = ridge.left_out(theta, outputs)
-    for index in range(0, len(theta), 7):
-        others = np.arange(len(theta)) != index
-        predicted = ridge.predict(theta[index : index + 1], theta[others], outputs[others])[0]
-        np.testing.assert_allclose(errors[index], outputs[index] - predicted, atol=1e-9)
+def test_each_is_predicted_from_the_others(theta: Floats) -> None:
+    ridge, known, asked = Ridge(np.array([0.7, 1.5]), 1e-4), theta[:22], theta[22:]
+    missed = [ridge.predict(asked, known, _surface(known)) - _surface(asked)]
+    for index in range(len(known)):
+        others = np.arange(len(known)) != index
+        predicted = ridge.predict(known[index : index + 1], known[others], _surface(known[others]))
+        missed.append(predicted - _surface(known[index : index + 1]))
+    rms = float(np.sqrt(np.square(np.concatenate(missed)).sum(axis=1).mean()))
+    assert ridge.rms(known, _surface(known), asked, _surface(asked)) == pytest.approx(rms, rel=1e-9)
 
 
 def test_the_found_settings_have_the_least_error_of_both_splits(theta: Floats) -> None:
@@ -31,11 +33,9 @@ def test_the_found_settings_have_the_least_error_of_both_splits(theta: Floats) -
     assert [trial.error for trial in found] == sorted(trial.error for trial in found)
 
     def error(ridge: Ridge) -> float:
-        missed = ridge.predict(asked, known, _surface(known)) - _surface(asked)
-        each = np.concatenate([ridge.left_out(known, _surface(known)), missed])
-        return float(np.sqrt(np.square(each).sum(axis=1).mean()))
+        return ridge.rms(known, _surface(known), asked, _surface(asked))
 
-    assert found[0].error == pytest.approx(error(found[0]))
+    assert found[0].error == error(found[0])
     for scales in ((0.3, 0.3), (1.0, 1.0), (3.0, 3.0)):
         assert found[0].error <= error(Ridge(np.array(scales), 1e-6))
 
@@ -50,8 +50,7 @@ def test_training_motions_count_where_validation_is_a_single_one(theta: Floats) 
 
 def test_without_validation_motions_those_left_out_decide(theta: Floats) -> None:
     found = search_ridge(theta, _surface(theta))[0]
-    left_out = found.left_out(theta, _surface(theta))
-    assert found.error == pytest.approx(float(np.sqrt(np.square(left_out).sum(axis=1).mean())))
+    assert found.error == found.rms(theta, _surface(theta), theta[:0], _surface(theta[:0]))
 
 
 def test_settings_without_a_solution_are_passed_over() -> None:

@@ -1,4 +1,4 @@
-"""Pictures and films of the viewport as files. What has to be known of the motion is in their metadata."""
+"""Pictures and films as files. What has to be known of the motion is in their metadata."""
 
 import io
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-__all__ = ["png_bytes", "webp_bytes"]
+__all__ = ["Picture", "png_bytes", "webp_bytes"]
 
 DESCRIPTION = 0x010E  # "ImageDescription" of EXIF
 QUALITY, METHOD = 80, 4  # of WebP; slower methods save a tenth
@@ -25,12 +25,13 @@ def png_bytes(picture: Picture, notes: Sequence[str]) -> bytes:
     return file.getvalue()
 
 
-def webp_bytes(pictures: Sequence[Picture], seconds: float, notes: Sequence[str]) -> bytes:
+def webp_bytes(pictures: Sequence[Picture], seconds: float | Sequence[float], notes: Sequence[str]) -> bytes:
     """An animated WebP file of pictures (H, W, 3), each shown for `seconds`, forever; `notes` are in its EXIF."""
     first, *others = (Image.fromarray(picture) for picture in pictures)
     exif, file = Image.Exif(), io.BytesIO()
     if notes:
         exif[DESCRIPTION] = ". ".join(notes).encode("ascii", "replace").decode()
-    options = {"duration": round(1000.0 * seconds), "loop": 0, "quality": QUALITY, "method": METHOD}
+    shown = [round(1000.0 * float(each)) for each in np.broadcast_to(seconds, len(pictures))]
+    options = {"duration": shown, "loop": 0, "quality": QUALITY, "method": METHOD}
     first.save(file, "WEBP", save_all=True, append_images=others, exif=exif, **options)
     return file.getvalue()

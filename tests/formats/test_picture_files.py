@@ -5,7 +5,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from odeform_viz.picture_files import DESCRIPTION, png_bytes, webp_bytes
+from odeform.formats.picture_files import DESCRIPTION, png_bytes, webp_bytes
 
 NOTES = ("mass = 7 kg is outside the trained range", "t = 2 s is extrapolated")
 SAID = "mass = 7 kg is outside the trained range. t = 2 s is extrapolated"
