@@ -20,7 +20,7 @@ from odeform_viz.recording.control import RecordingControl
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.runtime.access import Access, reachable_address
 from odeform_viz.runtime.clock import Clock
-from odeform_viz.runtime.memory import MallocTrimmer, share_arenas
+from odeform_viz.runtime.memory import Tidier, share_arenas
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.runtime.worker import Worker
@@ -60,7 +60,7 @@ class App:
         share_arenas()
         # threads of a matrix product wait for each other: with one core busy, two take ten times as long as one
         self._threads = threadpool_limits(1, "blas")
-        self._trim = MallocTrimmer()
+        self._tidy = Tidier()
         window = self.session.schema.window
         self.clock = Clock(window.start, window.stop)
         self._access = Access.of(host, origins)
@@ -149,5 +149,5 @@ class App:
             panel.show_error(message)
 
     def settle(self) -> None:
-        """Return freed memory to the system; see `Output`."""
-        self._trim()
+        """Return unused memory to the system; see `Output`."""
+        self._tidy()

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from odeform.formats.picture_files import Picture
 from odeform.geometry.normals import vertex_normals
@@ -18,6 +18,9 @@ LIGHT = np.array([-0.35, 0.55, 0.75])  # in the picture's axes: right, up, towar
 PAPER, TILE, SHADOW = 250.0, 241.0, 0.86
 GREY = (150, 164, 186)  # of what has no colour of its own
 FRAGMENTS = 1 << 20  # samples of triangles that are worked on at once
+
+
+Ints = Int[np.ndarray, " samples"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +88,7 @@ def draw(geometry: Geometry, view: View, color: Sequence[float] = GREY) -> Pictu
 class _Samples:
     """Samples (M,) of the image, their nearness to the eye, and their colours (M, 3); None for shadow."""
 
-    places: Floats
+    places: Ints
     depth: Floats
     colors: Floats | None
 
@@ -114,7 +117,7 @@ def _samples(geometry: Geometry, seen: Floats, view: View, colors: Floats | None
         yield _Samples(places, depth[inside], None if tint is None else tint[inside])
 
 
-def _of_triangles(corners: Floats, colors: Floats | None) -> Iterator[tuple[Floats, Floats, Floats, Floats | None]]:
+def _of_triangles(corners: Floats, colors: Floats | None) -> Iterator[tuple[Ints, Ints, Floats, Floats | None]]:
     """Columns, rows, nearness and colours of the samples in triangles (F, 3, 3), of similar size at a time."""
     low = np.floor(corners[..., :2].min(axis=1)).astype(int)
     sides = np.ceil(corners[..., :2].max(axis=1)).astype(int) - low
@@ -141,7 +144,7 @@ def _of_triangles(corners: Floats, colors: Floats | None) -> Iterator[tuple[Floa
 
 def _of_discs(
     centres: Floats, radius: float, colors: Floats | None
-) -> Iterator[tuple[Floats, Floats, Floats, Floats | None]]:
+) -> Iterator[tuple[Ints, Ints, Floats, Floats | None]]:
     """Columns, rows, nearness and colours of the samples in discs around centres (N, 3)."""
     reach = int(np.ceil(radius))
     grid = np.stack(np.meshgrid(*2 * [np.arange(-reach, reach + 1)]), axis=-1).reshape(-1, 2)

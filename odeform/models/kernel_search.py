@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dpotri
+from scipy.linalg import cho_factor, cho_solve, get_lapack_funcs
 from scipy.optimize import minimize
 
 from odeform.models.contact.kernel import matern
@@ -42,7 +41,9 @@ class Ridge:
     def rms(self, theta: Parameters, outputs: Floats, asked: Floats, expected: Floats) -> float:
         """RMS error, over sequences, of outputs (S, outputs) at `theta` (S, P), each predicted from all the others
         (Rasmussen and Williams 2006, 5.12), and of those `expected` (A, outputs) at `asked` (A, P)."""
-        inverse = dpotri(self._factor(theta)[0], lower=True)[0]
+        factor, lower = self._factor(theta)
+        (invert,) = get_lapack_funcs(("potri",), (factor,))
+        inverse = invert(factor, lower=lower)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weights = inverse @ outputs
         left_out = weights / np.diag(inverse)[:, None]

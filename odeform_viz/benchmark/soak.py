@@ -1,7 +1,6 @@
 """Soak test: random inputs and scripted visits, from several browsers. Finds errors, stale frames, growing memory."""
 
 import contextlib
-import gc
 import io
 import math
 import sys
@@ -25,6 +24,7 @@ __all__ = ["GROWTH", "Soak", "soak"]
 GROWTH = 0.05  # of the memory after warm-up, at most
 WARM_UP = 0.2  # of the parts
 BETWEEN = 1.0  # s at rest between scripts
+REST = 4.0  # s at rest before memory is measured
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def soak(
             newest.append(seconds_to_newest(visitors, visitors.clients[len(newest) % 2]))
             for client in visitors.clients:
                 client.downloads.clear()  # memory of the client, not of the viewer
-            gc.collect()
+            visitors.collect(REST)  # in which the viewer returns what it has freed
             resident.append(_resident_mb())
         refused = len(first.notifications)
         sent = visitors.sent + first.sent + second.sent
