@@ -14,11 +14,16 @@ from odeform_viz.view import ViewRequest
 
 __all__ = ["export", "export_formats", "export_notes"]
 
+FILM = ".webp"
+
 
 def export_formats() -> dict[str, tuple[str, bool]]:
-    """Labels of the formats, their suffixes, and whether they hold the whole motion rather than the current frame."""
+    """Labels of the formats, their suffixes, and whether they hold the whole motion rather than the current frame.
+
+    Films are left to the browser, which draws what it shows.
+    """
     frames = {f"current frame ({suffix})": (suffix, False) for suffix in shape_formats()}
-    return frames | {f"whole motion ({suffix})": (suffix, True) for suffix in motion_formats()}
+    return frames | {f"whole motion ({suffix})": (suffix, True) for suffix in motion_formats() if suffix != FILM}
 
 
 def export(session: Session, request: ViewRequest, path: Path, whole: bool) -> Path:

@@ -1,6 +1,6 @@
 """Pictures of shapes on a floor, by software: orthographic, with a depth buffer, soft edges and a shadow from above."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +71,7 @@ class View:
         return image
 
 
-def draw(geometry: Geometry, view: View, color: Sequence[float] = GREY) -> Picture:
+def draw(geometry: Geometry, view: View, color: tuple[int, int, int] = GREY) -> Picture:
     """A picture of a shape in metres, above a floor at z = 0; `color` is red, green and blue, 0 to 255, where the shape
     has no colours. Splats are drawn as opaque discs of their colours."""
     image = view.floor()
@@ -162,7 +162,7 @@ def _radius(geometry: Geometry, view: View) -> float:
     return max(0.7 * spacing * view.size[1] * SAMPLES / view.height, 0.5 * SAMPLES)
 
 
-def _colors(geometry: Geometry, view: View, color: Sequence[float]) -> Floats:
+def _colors(geometry: Geometry, view: View, color: tuple[int, int, int]) -> Floats:
     """Colours of the corners of faces (F, 3, 3), or of points (N, 3)."""
     if isinstance(geometry, GaussianSplats):
         return 255.0 * geometry.colors

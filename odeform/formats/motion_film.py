@@ -39,7 +39,8 @@ def write_webp(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape |
     """
     if len(times) > MOST:
         raise InputError(f"a film has at most {MOST} frames, got {len(times)}: choose fewer times")
-    boxes = np.array([[p.min(axis=0), p.max(axis=0)] for p in (motion.vertices(float(t)) for t in times)])
+    frames = (motion.vertices(float(t)) for t in times)
+    boxes = np.array([[points.min(axis=0), points.max(axis=0)] for points in frames], dtype=float)
     views, notes = _views(boxes), caveats(motion, times)
     steps = np.append(np.abs(np.diff(times)), STAY)
     seconds = np.maximum(steps, SHORTEST)
@@ -62,7 +63,7 @@ def _views(boxes: Floats) -> list[View]:
     middle[:, 2] = 0.5 * (low + high)[2]
     extent = np.array([*(body if follows else high - low)[:2], (high - low)[2]])
     # the diagonal of the floor plan is the widest that can be seen
-    height = AROUND * max(np.hypot(extent[0], extent[1]) * SIZE[1] / SIZE[0], extent[2] + 0.5 * extent[:2].max())
+    height = AROUND * float(max(np.hypot(extent[0], extent[1]) * SIZE[1] / SIZE[0], extent[2] + 0.5 * extent[:2].max()))
     return [View(target, max(height, 1e-6), SIZE, height / TILES) for target in middle]
 
 
