@@ -63,7 +63,7 @@ def test_a_line_is_a_format(kick: Predictor, tmp_path: Path) -> None:
 
 def test_endings_as_text() -> None:
     expected = (
-        ".csv, .glb, .npz, .html or .rrd, or .ply, .obj, .stl or .glb with {frame} in the name (one file per frame)"
+        ".csv, .glb, .npz, .webp, .html or .rrd, or .ply, .obj, .stl or .glb with {frame} in the name (one file per frame)"
     )
     assert registry.motion_endings() == expected
 
@@ -92,7 +92,7 @@ def test_unknown_endings(kick: Predictor, tmp_path: Path) -> None:
         write_shape(BALL, tmp_path / "ball.npz")
     motion = kick.solve()
     for name in ("motion.mp4", "motion.ply", "motion"):
-        with pytest.raises(InputError, match=r"expected a name ending in .csv, .glb, .npz, .html or .rrd, or .ply"):
+        with pytest.raises(InputError, match=r"expected a name ending in .csv, .glb, .npz, .webp, .html or .rrd, or .ply"):
             write_motion(motion, np.array([0.0]), tmp_path / name)
     (tmp_path / "shape").touch()
     with pytest.raises(InputError, match=r"expected one of .glb, .* got no ending"):
