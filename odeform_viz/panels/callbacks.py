@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import viser
 
-__all__ = ["LOCK", "on_user_change", "serialized", "set_content", "take_upload"]
+__all__ = ["LOCK", "on_user_change", "serialized", "set_content"]
 
 Control = viser.GuiDropdownHandle | viser.GuiCheckboxHandle | viser.GuiSliderHandle | viser.GuiNumberHandle
 Controls = Control | viser.GuiVector3Handle
@@ -32,15 +32,6 @@ def on_user_change(control: Controls, action: Callable[[], None]) -> None:
             serialized(action)(event)
 
     control.on_update(changed)
-
-
-def take_upload(event: viser.GuiEvent) -> viser.UploadedFile:
-    """The uploaded file of an event. Its button, which would keep the content in memory, forgets it."""
-    button = event.target
-    assert isinstance(button, viser.GuiUploadButtonHandle)
-    file = button.value
-    button._impl.value = viser.UploadedFile("", b"")  # its setter would send it to all clients
-    return file
 
 
 def set_content(text: viser.GuiMarkdownHandle | viser.GuiHtmlHandle, content: str) -> None:

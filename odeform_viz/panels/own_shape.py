@@ -1,6 +1,5 @@
 """A shape of the user's own as a soft body: made in a process of its own, which can be cancelled."""
 
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,13 +16,13 @@ from odeform_viz.own_shapes import (
     without_own_body,
 )
 from odeform_viz.page import Page, Panel
-from odeform_viz.panels.callbacks import LOCK, serialized, take_upload
+from odeform_viz.panels.callbacks import LOCK, serialized
+from odeform_viz.panels.uploads import path_of, take_upload
 from odeform_viz.runtime.jobs import Job, own_body_of
 from odeform_viz.state import PageState
 
 __all__ = ["OwnShapePanel"]
 
-LARGEST = 256 << 20  # bytes of an upload
 TRAINED = "The trained bodies. A closed mesh, or points or splats of a solid, can be pushed as well."
 WORKING = "**{}** is being repaired, filled with tetrahedra and laid on the floor. This takes up to a minute."
 
@@ -70,16 +69,8 @@ class OwnShapePanel(Panel):
 
     def _upload(self, file: viser.UploadedFile) -> None:
         try:
-            if len(file.content) > LARGEST:
-                raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
-            # readers take paths, so the file exists while it is read
-            with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
-                path = Path(folder) / f"shape{Path(file.name).suffix}"
-                path.write_bytes(file.content)
-                try:
-                    self.load(path, file.name, origin="")
-                except InputError as error:
-                    raise InputError(str(error).replace(str(path), file.name).replace(path.name, file.name)) from None
+            with path_of(file) as path:
+                self.load(path, file.name, origin="")
         except (InputError, OSError) as error:
             self._failed(str(error))
 

@@ -4,7 +4,7 @@ import viser
 
 from odeform.errors import InputError
 from odeform_viz.page import Page, Panel
-from odeform_viz.panels.callbacks import take_upload
+from odeform_viz.panels.uploads import content_of, take_upload
 
 __all__ = ["StatePanel"]
 
@@ -19,7 +19,7 @@ class StatePanel(Panel):
             save = gui.add_button("Save state", color="gray", hint="columns, parameters and time, as a small file")
             save.on_click(lambda event: self._save(event.client))
             restore = gui.add_upload_button("Restore state", color="gray", mime_type="application/json")
-            restore.on_upload(lambda event: self._restore(take_upload(event).content))
+            restore.on_upload(lambda event: self._restore(take_upload(event)))
 
     def _save(self, client: viser.ClientHandle | None) -> None:
         if client is None:
@@ -29,9 +29,9 @@ class StatePanel(Panel):
         except InputError as error:
             self._page.notices.show("State not saved", str(error))
 
-    def _restore(self, content: bytes) -> None:
+    def _restore(self, file: viser.UploadedFile) -> None:
         try:
-            notes = self._page.restore(content)
+            notes = self._page.restore(content_of(file))
         except (InputError, OSError) as error:
             self._page.notices.show("State not restored", str(error))
             return

@@ -1,6 +1,5 @@
 """The shape that moves: the trained body, a bundled shape, or one from a file, as a whole or in part."""
 
-import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,13 +17,13 @@ from odeform_viz.fitting import MOST_POINTS, describe_fit, shape_from
 from odeform_viz.own_shapes import takes_own_bodies
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.alignment import Alignment
-from odeform_viz.panels.callbacks import LOCK, serialized, take_upload
+from odeform_viz.panels.callbacks import LOCK, serialized
 from odeform_viz.panels.region import RegionEditor
+from odeform_viz.panels.uploads import path_of, take_upload
 from odeform_viz.state import PageState
 
 __all__ = ["ShapePanel"]
 
-LARGEST = 256 << 20  # bytes of an upload
 TRAINED = "The trained body."
 
 
@@ -83,16 +82,8 @@ class ShapePanel(Panel):
             self._text.content = f"⚠ **{error}**"  # stays after the notification
 
     def _upload(self, file: viser.UploadedFile) -> None:
-        if len(file.content) > LARGEST:
-            raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
-        # readers take paths, so the file exists while it is read
-        with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
-            path = Path(folder) / f"shape{Path(file.name).suffix}"
-            path.write_bytes(file.content)
-            try:
-                self._load(path, file.name, origin="")
-            except InputError as error:
-                raise InputError(str(error).replace(str(path), file.name).replace(path.name, file.name)) from None
+        with path_of(file) as path:
+            self._load(path, file.name, origin="")
 
     def _load(self, path: str | Path, name: str, origin: str | None = None) -> None:
         """`origin`, if given, replaces the path that a saved state refers to."""

@@ -19,7 +19,7 @@ from odeform.types import MotionSequence
 from odeform_viz.columns import Column
 from odeform_viz.own_shapes import own_of
 from odeform_viz.page import Page, Panel
-from odeform_viz.panels.callbacks import take_upload
+from odeform_viz.panels.uploads import content_of, take_upload
 from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_own_body
 from odeform_viz.view import Description
@@ -28,7 +28,6 @@ __all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
 NONE, SIMULATED = "none", "simulated here"
 OWN = "an .npz file: times (T,) in s, vertices (T, N, 3) in m; if known, faces and parameters"
-LARGEST = 256 << 20  # bytes of an upload
 NO_SIMULATOR = "This scene was imported, so it cannot be simulated here."
 OVERSAMPLING = 4  # simulated frames per frame of training, to compare between those too
 
@@ -122,9 +121,7 @@ class TruthPanel(Panel):
 
     def _upload(self, file: viser.UploadedFile) -> None:
         try:
-            if len(file.content) > LARGEST:
-                raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
-            self.open(read_captured(file.content, file.name, self._schema, self._page.body))
+            self.open(read_captured(content_of(file), file.name, self._schema, self._page.body))
         except InputError as error:
             self._page.notices.show("Motion not opened", str(error))
 
