@@ -108,11 +108,11 @@ class SceneView:
         shapes = [id(shown.column.geometry) for shown in frame.columns]
         reasons = (row, shapes, together, options.viewport, frame.still is None)
         if frame.columns and self._framed != reasons:
-            self._framed = reasons
             height, extent = max(_height(c) for c in frame.columns), max(self._size(c) for c in frame.columns)
             level = frame.still is not None
             self._framing = frame_columns(len(row), extent, height, options.viewport, together, level)
             self._cameras.aim(self._framing)
+            self._framed = reasons  # last: a request cancelled on the way is framed anew
         return self._framing
 
     def _size(self, shown: ColumnFrame) -> float:

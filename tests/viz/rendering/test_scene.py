@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import viser
 
+from odeform.cancellation import Cancelled
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
@@ -36,3 +37,22 @@ def test_splats_are_sent_deformed_and_as_given_at_rest(
     np.testing.assert_allclose(moved[1], 1e4 * motion.deformed_covariances(0.02), rtol=1e-6, atol=lost)
     np.testing.assert_allclose(resting[1], 1e4 * splats.covariances, rtol=1e-6, atol=lost)
     assert np.abs(moved[1] - resting[1]).max() > 1e-2 * resting[1].max()
+
+
+def test_a_row_whose_framing_was_cancelled_is_framed_by_the_next_frame(
+    server: viser.ViserServer, kick: Predictor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, view = Session(kick.schema), SceneView(server, 0.2, lambda: None)
+    columns = Columns.of([Column("left", kick, kick.rest), Column("right", kick, kick.rest)]).all
+    request = ViewRequest(session.schema.complete({}), 0.02, "balanced", columns[:1])
+    view.publish(session.frame(request), DisplayOptions(), None)
+    both = session.frame(replace(request, columns=columns))
+    with monkeypatch.context() as patch:
+        patch.setattr("odeform_viz.rendering.scene._height", lambda _: cancelled())
+        with pytest.raises(Cancelled):
+            view.publish(both, DisplayOptions(), None)
+    view.publish(both, DisplayOptions(), None)
+
+
+def cancelled() -> float:
+    raise Cancelled
