@@ -3,8 +3,9 @@
 import argparse
 import json
 import math
+import statistics
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +40,36 @@ def measure(dataset: Path, keep: Path, minutes: float) -> Scores:
     return found
 
 
-def summary(found: Mapping[str, Scores]) -> list[str]:
-    """Lines of Markdown: pooled RMSE in mm by kind, with the ratio of `odeform` to the best rival."""
+def summary(found: Mapping[str, Sequence[Scores]]) -> list[str]:
+    """Lines of Markdown: pooled RMSE in mm by kind, its mean and standard deviation over data sets of that kind.
+
+    Ends with the ratio of `odeform` to the best rival, the one with the least mean.
+    """
     lines = ["| data | " + " | ".join(MODELS) + " | of the best rival |", "|---" * (len(MODELS) + 2) + "|"]
     ratios = []
-    for name, scores in found.items():
-        errors = [scores[model]["rmse_pooled_mm"] for model in MODELS]
-        ratios.append(errors[0] / min(errors[1:]))
-        lines.append(f"| {name} | " + " | ".join(f"{error:.3g}" for error in errors) + f" | {ratios[-1]:.2f} |")
-    mean = math.exp(sum(map(math.log, ratios)) / len(ratios))
+    for name, sets in found.items():
+        errors = [[scores[model]["rmse_pooled_mm"] for scores in sets] for model in MODELS]
+        means = [statistics.mean(each) for each in errors]
+        ratios.append(means[0] / min(means[1:]))
+        lines.append(f"| {name} | {' | '.join(map(_mean, errors))} | {ratios[-1]:.2f} |")
+    mean = math.exp(statistics.mean(map(math.log, ratios)))
     return [*lines, f"| geometric mean |{' |' * len(MODELS)} {mean:.2f} |"]
+
+
+def _mean(errors: Sequence[float]) -> str:
+    spread = f" ± {statistics.stdev(errors):.2g}" if len(errors) > 1 else ""
+    return f"{statistics.mean(errors):.3g}{spread}"
+
+
+def _made(name: str, seed: int, keep: Path) -> Path:
+    """The data set of a kind, whose parameters are drawn anew for each seed."""
+    dataset = keep / (f"{name}-{seed}" if seed else name)
+    frames = dataset.with_name(f"{dataset.name}-frames")
+    if not (dataset / "dataset.json").exists():
+        if not (frames / "parameters.csv").exists():
+            write_folder(KINDS[name], frames, seed, report=print_line)
+        import_dataset(frames, dataset)
+    return dataset
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -60,18 +81,13 @@ def main(argv: list[str] | None = None) -> None:
         "--data", type=Path, action="append", default=[], metavar="DIR", help="imported data set as well"
     )
     parser.add_argument("--minutes", type=float, default=30.0, metavar="M", help="of odeform train (default: 30)")
+    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="data sets of each kind (default: 1)")
     args = parser.parse_args(argv)
     args.keep.mkdir(parents=True, exist_ok=True)
-    found: dict[str, Scores] = {}
-    for name in filter(None, args.kinds.split(",")):
-        frames, dataset = args.keep / f"{name}-frames", args.keep / name
-        if not (dataset / "dataset.json").exists():
-            if not (frames / "parameters.csv").exists():
-                write_folder(KINDS[name], frames, report=print_line)
-            import_dataset(frames, dataset)
-        found[name] = measure(dataset, args.keep, args.minutes)
-    for dataset in args.data:
-        found[dataset.name] = measure(dataset, args.keep, args.minutes)
+    names = filter(None, args.kinds.split(","))
+    sets = {name: [_made(name, seed, args.keep) for seed in range(args.seeds)] for name in names}
+    sets |= {dataset.name: [dataset] for dataset in args.data}
+    found = {name: [measure(each, args.keep, args.minutes) for each in made] for name, made in sets.items()}
     print("\n".join(summary(found)), file=sys.stdout)
 
 

@@ -15,10 +15,15 @@ def scores(*errors: float) -> own_data.Scores:
 
 
 def test_ratios_are_to_the_best_rival() -> None:
-    lines = summary({"walk": scores(1.0, 4.0, 2.0, 9.0), "throw": scores(4.0, 2.0, 3.0, 9.0)})
+    lines = summary({"walk": [scores(1.0, 4.0, 2.0, 9.0)], "throw": [scores(4.0, 2.0, 3.0, 9.0)]})
     assert lines[2] == "| walk | 1 | 4 | 2 | 9 | 0.50 |"
     assert lines[3].endswith("| 2.00 |")
     assert lines[4] == "| geometric mean | | | | | 1.00 |"
+
+
+def test_data_sets_of_a_kind_are_averaged() -> None:
+    lines = summary({"walk": [scores(1.0, 4.0, 3.0, 9.0), scores(3.0, 2.0, 9.0, 9.0)]})
+    assert lines[2] == "| walk | 2 ± 1.4 | 3 ± 1.4 | 6 ± 4.2 | 9 ± 0 | 0.67 |"
 
 
 @pytest.mark.slow
@@ -34,4 +39,7 @@ def test_a_kind_is_made_trained_and_not_trained_again(
     assert len(kept) == len(MODELS)
     main(arguments)
     assert capsys.readouterr().out == first
-    assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.safetensors")} == kept
+    main([*arguments, "--seeds", "2"])
+    assert "±" in capsys.readouterr().out
+    assert (tmp_path / "throw-1" / "dataset.json").exists()
+    assert {file: file.stat().st_mtime_ns for file in kept} == kept

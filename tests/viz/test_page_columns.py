@@ -17,6 +17,7 @@ from odeform.models.base import Predictor
 from odeform.types import Floats
 from odeform_viz.columns import Column
 from odeform_viz.rendering.framing import Camera
+from odeform_viz.view import Frame
 
 pytestmark = [pytest.mark.slow, needs_chromium]
 
@@ -44,7 +45,12 @@ def _show(tab: Tab, count: int) -> None:
     app.columns.replace_all([first, *others])
     app.page.columns_changed()
     app.page.pause_at(0.1)
-    assert until(lambda: (f := app.presenter.frame) is not None and len(f.columns) == count and app.presenter.settled)
+    keys = [column.key for column in app.columns.all]  # not the frame of a test before, with as many columns
+    assert until(lambda: (f := app.presenter.frame) is not None and _keys(f) == keys and app.presenter.settled)
+
+
+def _keys(frame: Frame) -> list[int]:
+    return [shown.column.key for shown in frame.columns]
 
 
 def _is_of(viewport: tuple[int, int], size: tuple[int, int]) -> bool:
@@ -72,14 +78,7 @@ def _camera(tab: Tab, size: tuple[int, int]) -> Camera:
 
 def _bodies(tab: Tab) -> list[Floats]:
     """Where the vertices (N, 3) of each column are drawn, in m."""
-    views, out = tab.app.scene._views, []
-
-    def drawn() -> bool:
-        frame = tab.app.presenter.frame
-        return frame is not None and all(shown.column.key in views for shown in frame.columns)
-
-    assert until(drawn)
-    frame = tab.app.presenter.frame
+    views, frame, out = tab.app.scene._views, tab.app.presenter.frame, []
     assert frame is not None
     for shown in frame.columns:
         view = views[shown.column.key][1]
