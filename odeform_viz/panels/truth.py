@@ -197,11 +197,12 @@ class TruthPanel(Panel):
             self._job.start()
 
     def _simulated(self, sequence: MotionSequence) -> None:
-        self._show_working(False)
         try:
             self.open(sequence)
         except InputError as error:
             self._failed(str(error))
+        else:
+            self._show_working(False)  # only now: the sliders are at the truth when the next one can be started
 
     def _failed(self, message: str) -> None:
         self._show_working(False)

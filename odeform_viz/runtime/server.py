@@ -12,6 +12,7 @@ from typing import Any
 
 import viser
 import websockets.asyncio.server as websockets_server
+from viser.infra import WebsockMessageHandler
 
 from odeform.errors import InputError
 from odeform_viz.colors import HANDLE
@@ -43,10 +44,16 @@ def open_server(access: Access, port: int, title: str) -> viser.ViserServer:
     sys.setswitchinterval(SWITCH_INTERVAL)
     with contextlib.redirect_stdout(io.StringIO()), _guarded(access):  # viser prints a banner
         server = viser.ViserServer(host=access.host, port=port, verbose=False)
-    server._websock_server.get_message_buffer().message_event = _LoopEvent()
+    _send_from_any_thread(server._websock_server)
+    server._websock_server.on_client_connect(_send_from_any_thread)
     set_theme(server.gui)
     server.gui.set_panel_label(title)
     return server
+
+
+def _send_from_any_thread(sender: WebsockMessageHandler) -> None:
+    """Mend the messages to all clients, or those to a client that has just connected and hears nothing yet."""
+    sender.get_message_buffer().message_event = _LoopEvent()
 
 
 def set_theme(gui: viser.GuiApi, dark: bool = False) -> None:

@@ -8,6 +8,7 @@ import pytest
 import viser
 
 from odeform.errors import InputError
+from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import _LoopEvent, open_server
 
@@ -61,3 +62,17 @@ def test_many_threads_may_send(server: viser.ViserServer) -> None:
 def test_a_port_in_use_is_refused(server: viser.ViserServer) -> None:
     with pytest.raises(InputError, match="choose another with --port"):
         open_server(Access(), server.get_port(), "test")
+
+
+def test_many_threads_may_notify_a_client(server: viser.ViserServer) -> None:
+    server.gui.add_markdown("a page")
+    with LoopbackClient(server.get_port()) as client:
+        assert client.until(lambda: bool(server.get_clients()))
+        (handle,) = server.get_clients().values()
+        assert isinstance(handle._websock_connection.get_message_buffer().message_event, _LoopEvent)
+        threads = [threading.Thread(target=handle.add_notification, args=("", str(number))) for number in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert client.until(lambda: sorted(client.notifications) == [str(number) for number in range(8)])
