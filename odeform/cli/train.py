@@ -39,6 +39,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--without", default="", metavar="PART,...", help=f"leave out parts of odeform, of {', '.join(ABLATIONS)}"
     )
+    parser.add_argument(
+        "--object", nargs="+", default=[], metavar="NAME", help="train on these objects only, of a scene with several"
+    )
     parser.add_argument("--resume", action="store_true", help="continue an interrupted training from FILE.part")
 
 
@@ -50,4 +53,4 @@ def run(args: argparse.Namespace) -> None:
     options = ("minutes", "steps", "seed", "every", "stagger", "resume", "sequences")
     chosen = {name: getattr(args, name) for name in options}
     without = [name for name in args.without.split(",") if name]
-    train(dataset, args.out, args.model, window=window, without=without, **chosen)
+    train(dataset, args.out, args.model, window=window, without=without, objects=args.object, **chosen)

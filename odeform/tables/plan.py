@@ -6,9 +6,23 @@ Budgets are steps, so that the speed of a machine does not change the models.
 from collections.abc import Iterable
 from dataclasses import replace
 
+from odeform.tables.paper import UNSEEN_OBJECTS
 from odeform.tables.runs import Run
 
-__all__ = ["AHEAD", "BALLS", "DROP", "FORCE", "FRAMES", "IMPACT", "INTERVALS", "MINUTES", "PUSH", "UNTIL", "plan"]
+__all__ = [
+    "AHEAD",
+    "BALLS",
+    "DROP",
+    "FINAL",
+    "FORCE",
+    "FRAMES",
+    "IMPACT",
+    "INTERVALS",
+    "MINUTES",
+    "PUSH",
+    "UNTIL",
+    "plan",
+]
 
 DROP, FORCE = "mass-elastic", "contact-force"
 FRAMES = {DROP: (0, 151), "kick": (0, 121), FORCE: (0, 20)}
@@ -16,6 +30,8 @@ FRAMES = {DROP: (0, 151), "kick": (0, 121), FORCE: (0, 20)}
 BALLS = (DROP, "kick")
 PUSH = (11, 16)
 """Extrapolation of pushed objects, as in the paper: trained to frame 10, scored on the next five frames."""
+FINAL = (19, 20)
+"""The last frame of pushed objects: what `pe-gnn` predicts, and what the other models have there."""
 IMPACT = (30, 89)
 """Frames of the drop from just before the first contact to after the second; every 3rd, 5th and 8th ends beyond."""
 SEEDS = (0, 1, 2)
@@ -25,8 +41,10 @@ UNTIL, AHEAD = (40, 70), 10
 INTERVALS = (3, 5, 8)
 SOLVED = ("pod-rbf", "gp", "nearest")
 BASELINES = (*SOLVED, "direct", "node", "rnn")
-FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253)}
-"""Training sequences of the learning curve: about an eighth, a quarter and a half of all."""
+LAST_FRAME = ("odeform", *SOLVED, "pe-gnn")
+"""Models of pushed objects whose last frame is scored as well."""
+FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253), FORCE: (25, 50, 100)}
+"""Training sequences of the learning curve, of each object: about an eighth, a quarter and a half of all."""
 ABLATED = (
     (),
     ("correction",),
@@ -35,7 +53,7 @@ ABLATED = (
 )
 """Parts that ablations leave out. The regression of what is left would hide what the others give."""
 MINUTES = 4
-PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300}
+PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 4200}
 """Steps of all seven pushed objects together. They took about 8 minutes on one core, without the scores."""
 STEPS = {"direct": 2000, "node": 900, "rnn": 1400, "occupancy-flow": 590, "odeform-per-point": 460}
 ODEFORM_STEPS = {FRAMES[DROP][1]: 330, FRAMES["kick"][1]: 280, UNTIL[0]: 900, UNTIL[1]: 690}
@@ -48,7 +66,9 @@ SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}
 def plan(share: float = 1.0) -> dict[str, list[Run]]:
     """The runs of each table, with `share` of their steps."""
     tables = {
-        "II": [run for scene in BALLS for run in _unseen(scene)] + [_pushed(m) for m in ("odeform", *BASELINES)],
+        "I": [_pushed(model) for model in ("odeform", *BASELINES)] + list(_each_object()),
+        "II": [run for scene in BALLS for run in _unseen(scene)]
+        + [_pushed(model) for model in ("odeform", *BASELINES, "pe-gnn")],
         "III": [*_extrapolation(), *(_pushed(model, PUSH[0]) for model in ("odeform", *BASELINES))],
         "IV": list(_interpolation()),
         "ablations": [replace(run, without=parts) for run in _seeds() for parts in ABLATED],
@@ -76,8 +96,13 @@ def _whole(model: str, scene: str, seed: int = 0) -> Run:
 
 def _pushed(model: str, until: int | None = None) -> Run:
     """Trained on seven objects, on all frames or on the first `until`."""
-    scored = FRAMES[FORCE] if until is None else PUSH
-    return Run(model, FORCE, (scored,), PUSH_STEPS.get(model), until=until)
+    scored = (PUSH,) if until is not None else (FRAMES[FORCE], FINAL) if model in LAST_FRAME else (FRAMES[FORCE],)
+    return Run(model, FORCE, scored[-1:] if model == "pe-gnn" else scored, PUSH_STEPS.get(model), until=until)
+
+
+def _each_object() -> Iterable[Run]:
+    """`odeform` trained on one object at a time."""
+    return [replace(_pushed("odeform"), scored=(FRAMES[FORCE],), objects=(name,)) for name in UNSEEN_OBJECTS]
 
 
 def _unseen(scene: str) -> Iterable[Run]:
@@ -93,9 +118,10 @@ def _seeds() -> list[Run]:
 
 def _curve() -> Iterable[Run]:
     """Trained on fewer sequences."""
-    for run in [*_seeds(), *(_whole(model, scene) for scene in BALLS for model in SOLVED)]:
+    balls = [*_seeds(), *(_whole(model, scene) for scene in BALLS for model in SOLVED)]
+    for run in [*balls, *(_pushed(model) for model in ("odeform", *SOLVED))]:
         yield run
-        yield from (replace(run, sequences=count) for count in FEWER[run.scene])
+        yield from (replace(run, sequences=count, scored=run.scored[:1]) for count in FEWER[run.scene])
 
 
 def _extrapolation() -> Iterable[Run]:

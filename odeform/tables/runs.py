@@ -41,8 +41,8 @@ class Run:
     """A model trained on every k-th of the frames 0 to `until` (default: all) of a data set, and scored on `scored`.
 
     `scored` are half-open windows of frames at the scene's rate; `scene` is a bundled data set or a path. `steps` is
-    None for models without iterative training. `sequences` and `without` are those of
-    `TrainRequest`.
+    None for models without iterative training. `sequences`, `without` and `objects` are
+    those of `TrainRequest`.
     """
 
     model: str
@@ -55,6 +55,7 @@ class Run:
     stagger: bool = False
     sequences: int | None = None
     without: tuple[str, ...] = ()
+    objects: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -65,6 +66,7 @@ class Run:
         parts += ["staggered"] if self.stagger else []
         parts += [f"n{self.sequences}"] if self.sequences else []
         parts += [f"no-{name}" for name in self.without]
+        parts += self.objects
         return "_".join([*parts, f"s{self.seed}"])
 
     @property
@@ -77,7 +79,8 @@ class Run:
         """What to ask of the trainer."""
         window = (0, self.until) if self.until else None
         shared = {name: getattr(self, name) for name in ("model", "seed", "steps", "every", "stagger")}
-        return TrainRequest(**shared, window=window, sequences=self.sequences, without=self.without)
+        kept = {name: getattr(self, name) for name in ("sequences", "without", "objects")}
+        return TrainRequest(**shared, **kept, window=window)
 
 
 def complete_runs(runs: Sequence[Run], folder: Path, jobs: int, kept_only: bool = False) -> dict[Run, Result]:

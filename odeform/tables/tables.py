@@ -17,7 +17,7 @@ from odeform.io import atomic_write
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
 from odeform.tables.page import page
-from odeform.tables.plan import AHEAD, BALLS, DROP, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform.tables.plan import AHEAD, BALLS, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import KEPT, complete_runs, kept_scores
 from odeform.training.continuation import fit_dynamics
 
@@ -60,7 +60,7 @@ def _sha256(scene: str) -> str:
 
 def _shipped() -> Found:
     """Scores of the bundled checkpoints, which were trained longer."""
-    spans = [(scene, window) for scene, window in FRAMES.items()] + [(DROP, IMPACT)]
+    spans = [(scene, window) for scene, window in FRAMES.items()] + [(DROP, IMPACT), (FORCE, FINAL)]
     scores = {(s, w): evaluate(load(s), open_dataset(s), "test", w) for s, w in spans}
     return {f"{s} {w[0]}:{w[1]}": kept_scores(one) for (s, w), one in scores.items()}
 

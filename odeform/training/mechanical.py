@@ -11,24 +11,24 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.mechanics.law import MechanicalLaw
-from odeform.models.contact.inputs import ContactInputs
-from odeform.models.contact.regression import PARTS, ContactRegression, fit_contact_regression
 from odeform.models.mechanical.elastic_body import elastic_body
 from odeform.models.mechanical.model import MechanicalODeform
 from odeform.models.per_object import joined
 from odeform.motion.reduced_space import POSE
-from odeform.parallel import parallel_map
+from odeform.parallel import as_completed
+from odeform.progress import Progress
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.training import mechanical_law
+from odeform.training.mechanical_correction import fit_correction
 from odeform.training.mechanical_law import STEP, described, fit_law, relative_errors
 from odeform.training.pushes import Pushes, read_pushes
+from odeform.training.saved_laws import SHARED, SavedLaws
 from odeform.types import Arrays
 
-__all__ = ["fit_correction", "fit_mechanical"]
+__all__ = ["fit_mechanical"]
 
 SEQUENCES = 8  # of each body, to which the law that all share is fitted; it has ten numbers
 OWN_SEQUENCES = 32  # to which that of one body is
-ENERGY = 0.99  # of the deformations that are left to the correction, in the modes of their trajectories
 FIXED = {"pulse_s", "projectile_radius_m", "projectile_mass_kg"}
 MODES, LEFT_OUT = (120, 200), 0.2  # the second number of modes where the first leaves out more of the deformation
 Checkpointed = tuple[Arrays, dict[str, Any]]
@@ -39,8 +39,14 @@ QUALITIES = {
 }
 
 
-def fit_mechanical(dataset: Dataset, seed: int, report: Callable[[str], None]) -> Checkpoint:
-    """Train on the objects of a data set of the scene `contact-force`. `InputError` for other data."""
+def fit_mechanical(
+    dataset: Dataset, laws: SavedLaws, seed: int, report: Callable[[str], None], correct: bool = True
+) -> Checkpoint:
+    """Train on the objects of a data set of the scene `contact-force`; laws that are finished are kept in `laws`, and
+    those that it has are not fitted again.
+
+    Without `correct`, motions are those of the mechanics alone. `InputError` for other data.
+    """
     missing = [name for name in dataset.objects if name not in OBJECTS]
     if missing or not dataset.objects or not set(dataset.fixed) >= FIXED:
         raise InputError(
@@ -56,21 +62,39 @@ def fit_mechanical(dataset: Dataset, seed: int, report: Callable[[str], None]) -
             f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.squares)} modes leave out "
             f"{100.0 * pushes.share_left_out:.0f} % of the deformation"
         )
-    some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
-    shared = fit_law(some, pulse, MechanicalLaw(), report=report)
+    shared = laws.get(SHARED)
+    if shared is None:
+        some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
+        shared = fit_law(some, pulse, MechanicalLaw(), report=report)
+        laws.add(SHARED, shared)
+    evaluations = mechanical_law.EVALUATIONS
     bodies = [
         _Body(
-            pushes, read_pushes(dataset.of(name), "val", pushes.body), shared, pulse, seed, mechanical_law.EVALUATIONS
+            pushes,
+            read_pushes(dataset.of(name), "val", pushes.body),
+            shared,
+            laws.get(name),
+            pulse,
+            seed,
+            evaluations,
+            correct,
         )
         for name, pushes in each.items()
     ]
-    parts, spent = {}, time.process_time() - begin
-    for (name, pushes), (law, correction, seconds) in zip(
-        each.items(), parallel_map("bodies", _fitted, bodies), strict=True
-    ):
-        spent += seconds
+    found: dict[str, tuple[MechanicalLaw, Checkpointed | None]] = {}
+    spent, names = time.process_time() - begin, list(each)
+    progress = Progress("bodies", len(bodies))
+    for index, (law, correction, seconds) in as_completed(_fitted, bodies):
+        name, spent = names[index], spent + seconds
+        laws.add(name, law)
+        found[name] = law, correction
         report(f"{name}: {described(law)}")
-        parts[name] = _checkpoint(dataset.of(name), pushes, law, pulse, correction)
+        progress.advance(note=name)
+    progress.close()
+    parts = {
+        name: _checkpoint(dataset.of(name), pushes, found[name][0], pulse, found[name][1])
+        for name, pushes in each.items()
+    }
     whole = joined(dataset.schema, parts)
     return replace(whole, config={**whole.config, "val": {"seconds": spent}})
 
@@ -82,43 +106,34 @@ class _Body:
     train: Pushes
     val: Pushes
     shared: MechanicalLaw
+    own: MechanicalLaw | None
+    """Its law, if an interrupted training has finished it."""
     pulse: float
     seed: int
     evaluations: int
+    correct: bool
 
 
-def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpointed, float]:
-    """Its law, which is that of all bodies unless its own is better on validation motions, its correction, and the
-    seconds of processor time that they took.
+def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpointed | None, float]:
+    """Its law, its correction, and the seconds of processor time that they took."""
+    begin = time.process_time()
+    law = _law(body) if body.own is None else body.own
+    correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
+    return law, correction, time.process_time() - begin
+
+
+def _law(body: _Body) -> MechanicalLaw:
+    """That of all bodies unless its own is better on validation motions.
 
     Friction and damping of the simulator depend on how mass and vertices are spread in a body.
     """
-    begin = time.process_time()
     some = [body.train.some(OWN_SEQUENCES, body.seed)]
     own = fit_law(some, body.pulse, body.shared, report=lambda _: None, evaluations=2 * body.evaluations)
 
     def error(law: MechanicalLaw) -> float:
         return float(np.square(relative_errors(body.val, body.val.predicted(law, body.pulse, STEP))).sum())
 
-    law = min(own, body.shared, key=error)
-    correction = fit_correction(body.train, body.val, law, body.pulse)
-    return law, correction, time.process_time() - begin
-
-
-def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float) -> Checkpointed:
-    """Arrays and settings of the correction of one body: see `odeform.models.mechanical.correction`.
-
-    Shift, rotation and deformation are each corrected by the share, at most whole, that fits the validation motions.
-    """
-    known, asked = (ContactInputs(p.contacts, p.normals, p.forces) for p in (train, val))
-    left, left_val = (p.reduced - p.predicted(law, pulse, STEP) for p in (train, val))
-    arrays, settings = fit_contact_regression(known, asked, train.times, left, left_val, ENERGY)
-    found = ContactRegression(arrays, settings).predict(asked)
-    for part, columns in PARTS.items():
-        one, other = found[..., columns], left_val[..., columns]
-        share = float(np.clip((one * other).sum() / max(float((one * one).sum()), 1e-30), 0.0, 1.0))
-        settings["blend"][part] = [share * weight for weight in settings["blend"][part]]
-    return arrays, settings
+    return min(own, body.shared, key=error)
 
 
 def _training_pushes(dataset: Dataset, name: str) -> Pushes:

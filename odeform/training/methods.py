@@ -29,6 +29,7 @@ from odeform.training.points import Budget, fit_points
 from odeform.training.pruning import without_modes
 from odeform.training.qualities import with_qualities
 from odeform.training.request import TrainRequest
+from odeform.training.saved_laws import SavedLaws
 from odeform.types import Arrays
 
 __all__ = ["Run", "is_resumable", "train_model"]
@@ -67,16 +68,24 @@ def train_model(run: Run) -> Checkpoint:
     if name not in TRAINABLE:
         raise InputError(f"unknown model {name!r}: expected one of {', '.join(TRAINABLE)}")
     if run.dataset.objects and name == ODeform.model:
-        return fit_mechanical(_cut(run), run.request.seed, run.report)
+        return _train_mechanical(run)
     method = next(METHODS[kind] for kind in model_class(name).__mro__ if kind in METHODS)
     return _train_each(run, method) if run.dataset.objects else method(run)
+
+
+def _train_mechanical(run: Run) -> Checkpoint:
+    request, dataset = run.request, _cut(run)
+    laws = SavedLaws(run.part, dataset, request.seed, request.resume)
+    return fit_mechanical(dataset, laws, request.seed, run.report, "correction" not in request.without)
 
 
 def _cut(run: Run) -> Dataset:
     """The data of pushed objects up to the last frame asked for. `InputError` for frames that are left out."""
     request, dataset = run.request, run.dataset
-    if request.every > 1 or request.stagger or request.steps is not None or request.without:
-        raise InputError("odeform on pushed objects: expected no --every, --stagger, --steps or --without")
+    if request.every > 1 or request.stagger or request.steps is not None or set(request.without) - {"correction"}:
+        raise InputError(
+            "odeform on pushed objects: expected no --every, --stagger or --steps, and --without correction at most"
+        )
     window = dataset.schema.window
     last = (FrameSubsampling(request.window).count(dataset.schema) - 1) / window.rate
     return replace(dataset, schema=replace(dataset.schema, window=replace(window, stop=last)))

@@ -15,7 +15,7 @@ from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.mechanical.coordinates import coordinates_of
 from odeform.models.mechanical.elastic_body import ElasticBody
 from odeform.motion.reduced_space import POSE, decompose
-from odeform.types import Floats, Mesh, Vectors
+from odeform.types import Basis, Floats, Mesh, Perpoint, Vectors
 
 __all__ = ["Pushes", "read_pushes"]
 
@@ -77,8 +77,12 @@ class Pushes:
 
 
 def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:
-    """The pushes of one object. `InputError` for an empty split, or for another mesh than that of the body."""
+    """The pushes of one object, as they show at the vertices that have weight in the data.
+
+    `InputError` for an empty split, or for another mesh than that of the body.
+    """
     _, basis = coordinates_of(body)
+    project = np.zeros(0), np.zeros((0, 0))
     mesh, rate = Mesh(body.points, body.faces), dataset.schema.window.rate
     rows: list[tuple[Floats, ...]] = []
     for recorded in dataset.sequences(split):
@@ -89,8 +93,10 @@ def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:
         contact, force = (np.array([given[f"{name}_{axis}"] for axis in "xyz"]) for name in ("contact", "force"))
         point, centre = checked_contact(mesh, contact, force)
         pose, local = decompose(sequence, body.anchor, 0.0)
-        coefficients = np.einsum("tni,nik,n->tk", local, basis, body.weights)
-        total = (local**2).sum(axis=2) @ body.weights
+        if not np.array_equal(project[0], sequence.weights):
+            project = sequence.weights, _projection(basis, sequence.weights)
+        coefficients = local.reshape(len(local), -1) @ project[1]
+        total = (local**2).sum(axis=2) @ sequence.weights
         left = np.maximum(total - (coefficients**2).sum(axis=1), 0.0)
         reduced = np.concatenate([pose, coefficients], axis=1)
         rows.append((point.point - body.anchor, point.normal, centre - body.anchor, force, reduced, left))
@@ -100,3 +106,9 @@ def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:
     times = np.arange(reduced.shape[1]) / rate
     projectile = Projectile(dataset.fixed["projectile_radius_m"], dataset.fixed["projectile_mass_kg"])
     return Pushes(body, contacts, normals, centres, forces, projectile, times, reduced, left)
+
+
+def _projection(basis: Basis, weights: Perpoint) -> Float[np.ndarray, "entries modes"]:
+    """From displacements (3 N) to the coefficients of a basis (N, 3, K) that fit them best under the weights (N,)."""
+    flat, each = basis.reshape(-1, basis.shape[2]), np.repeat(weights, 3)[:, None]
+    return np.linalg.solve(flat.T @ (each * flat), (each * flat).T).T

@@ -41,6 +41,8 @@ class TrainRequest:
     """Train on the first n training sequences, of each object if there are several; default: all."""
     without: tuple[str, ...] = ()
     """Parts of `odeform` that are left out: names of `ABLATIONS`."""
+    objects: tuple[str, ...] = ()
+    """The objects to train on, of a scene with several; default: all."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.minutes < math.inf:
@@ -66,4 +68,5 @@ class TrainRequest:
         options += " --stagger" if self.stagger else ""
         options += f" --sequences {self.sequences}" if self.sequences else ""
         options += f" --without {','.join(self.without)}" if self.without else ""
+        options += f" --object {' '.join(self.objects)}" if self.objects else ""
         return f"odeform train DIR --out FILE{options}"

@@ -47,6 +47,7 @@ def train(
     resume: bool = False,
     sequences: int | None = None,
     without: Iterable[str] = (),
+    objects: Iterable[str] = (),
     parts: Iterable[tuple[int, int]] = (),
     report: Callable[[str], None] = print_line,
 ) -> Predictor:
@@ -65,6 +66,7 @@ def train(
         resume: Continue the interrupted training of which `OUT.part` is the state.
         sequences: Train on the first n training sequences, of each object if there are several; default: all.
         without: Parts of `odeform` to leave out: names of `odeform.training.request.ABLATIONS`.
+        objects: The objects to train on and to score, of a scene with several; default: all.
         parts: Half-open ranges of frames to score separately as well.
         report: Called with each line of progress; default: prints it to standard error.
 
@@ -82,13 +84,15 @@ def train(
         >>> predictor.model, predictor.checkpoint.scores["sequences"]
         ('nearest', 4)
     """
-    request = TrainRequest(model, seed, minutes, steps, window, every, stagger, resume, sequences, tuple(without))
+    request = TrainRequest(
+        model, seed, minutes, steps, window, every, stagger, resume, sequences, tuple(without), tuple(objects)
+    )
     part = Path(f"{out}.part")
     require_writable(Path(out))
     if resume and not (is_resumable(model) and part.exists()):
         raise InputError(f"resume: expected {part}, which an interrupted training of odeform leaves")
     begin = time.process_time()
-    dataset = replace(dataset, schema=replace(dataset.schema, objects=dataset.objects))
+    dataset = _of_objects(dataset, request.objects)
     dataset = dataset if sequences is None else _first(dataset, sequences)
     trained = train_model(Run(dataset, request, body_arrays(dataset), part, report))
     # the processor time of all sittings of a resumed training
@@ -98,6 +102,18 @@ def train(
     part.unlink(missing_ok=True)
     report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
     return load(out)
+
+
+def _of_objects(dataset: Dataset, names: tuple[str, ...]) -> Dataset:
+    """The data set of some objects, of all that it has by default. `InputError` for one that it has not."""
+    known = dataset.objects
+    for name in names:
+        if name not in known:
+            expected = f"one of {', '.join(known)}" if known else "data of several objects"
+            raise InputError(f"object {name!r}: expected {expected}")
+    kept = tuple(name for name in known if name in (names or known))
+    entries = tuple(entry for entry in dataset.entries if not known or entry.parameters.get(OBJECT) in kept)
+    return replace(dataset, schema=replace(dataset.schema, objects=kept), entries=entries)
 
 
 def _first(dataset: Dataset, count: int) -> Dataset:

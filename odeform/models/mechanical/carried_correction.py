@@ -47,9 +47,12 @@ class CarriedCorrection:
     """Part of what the trained body's mechanics leaves unexplained, at the nearest point of its surface."""
 
     def __init__(self, part: MechanicalODeform, body: ElasticBody, share: float) -> None:
-        """`share` is the part of the correction of `part` that is carried over to `body`."""
+        """`share` is the part of the correction of `part`, which has one, that is carried over to `body`."""
         shape = Mesh(body.points.astype(np.float32), body.faces)
-        self._part, self._share = part, share
+        assert part.correction is not None
+        self._part, self._correction, self._share = part, part.correction, share
+        self.shares = {name: 1.0 - share * (1.0 - kept) for name, kept in part.correction.shares.items()}
+        self.stop = part.correction.stop
         self._offset = standing_offset(shape, part.rest) + body.anchor
         there = Mesh(shape.points + standing_offset(shape, part.rest).astype(np.float32), shape.faces)
         values = part.evaluate_basis(there, 0.0).values.reshape(-1, len(body.points), 3)
@@ -58,11 +61,9 @@ class CarriedCorrection:
 
     def over_time(self, push: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
         """(T,) s -> (T, 6 + K), as that of `Correction`, in the coordinates of the other body."""
-        correction = self._part.correction
-        assert correction is not None
         near = nearest_on(self._part.rest, push.contact[0] + self._offset)
         anchor = self._part.body.anchor
-        known = correction.over_time(ContactInputs(near.point[None] - anchor, near.normal[None], push.force))
+        known = self._correction.over_time(ContactInputs(near.point[None] - anchor, near.normal[None], push.force))
 
         def carried(times: Floats) -> Floats:
             found = self._share * known(times)

@@ -8,26 +8,43 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from odeform.models.contact.inputs import ContactInputs
-from odeform.models.contact.regression import ContactRegression
+from odeform.models.contact.regression import PARTS, ContactRegression
 from odeform.types import Arrays, Floats
 
-__all__ = ["Correction"]
+__all__ = ["Correction", "coordinate_shares"]
+
+
+def coordinate_shares(shares: Mapping[str, float], coordinates: int) -> Float[np.ndarray, " y"]:
+    """(6 + K,) shares of the mechanics' motion for each coordinate, from those of shift, rotation and deformation."""
+    out = np.ones(coordinates)
+    for part, columns in PARTS.items():
+        out[columns] = shares[part]
+    return out
 
 
 class Correction:
-    """Adds to reduced motions of one body: kernel regression in the contact's frame, as the baseline `gp` does alone.
+    """Kernel regression in the contact's frame of reduced motions of one body, less a share of the mechanics' motion.
 
-    At rest it is zero. Beyond the trained window it keeps its last value, so that the motion there is the mechanics'.
+    The baseline `gp` is the same regression of whole motions. At rest it is zero.
     """
 
     def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
-        """From what `fit_contact_regression` returns. `KeyError` where something is missing."""
+        """From what `odeform.training.mechanical_correction` returns. `KeyError` where something is missing,
+        `ValueError` for a share that is none."""
         # weaker pushes were not trained, and without one nothing moves
         self._weakest = float(np.linalg.norm(arrays["gp.force"], axis=1).min())
         self._regression, self._times = ContactRegression(arrays, settings), arrays["times"].astype(float)
+        # files of before shares were fitted have none
+        self.shares = {part: float(settings.get("shares", {}).get(part, 1.0)) for part in PARTS}
+        if not all(0.0 <= share <= 1.0 for share in self.shares.values()):
+            raise ValueError(f"correction: expected shares from 0 to 1, got {self.shares}")
+
+    @property
+    def stop(self) -> float:
+        """s: the end of the trained window."""
+        return float(self._times[-1])
 
     def over_time(self, push: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
-        """The correction of one push at any times (T,) s: a cubic spline through the trained frames."""
+        """The regression of one push at times (T,) s in the trained window: a cubic spline through its frames."""
         share = min(float(np.linalg.norm(push.force)) / max(self._weakest, 1e-9), 1.0)
-        spline = CubicSpline(self._times, share * self._regression.predict(push)[0])
-        return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
+        return CubicSpline(self._times, share * self._regression.predict(push)[0])

@@ -12,17 +12,22 @@ from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
-from odeform.models.mechanical.correction import Correction
+from odeform.models.mechanical.corrected_trajectory import CorrectedTrajectory
+from odeform.models.mechanical.correction import Correction, coordinate_shares
 from odeform.models.mechanical.elastic_body import ElasticBody
+from odeform.models.mechanical.lifted_trajectory import LiftedTrajectory
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.reduced_motion import Trajectory
-from odeform.motion.reduced_space import ReducedSpace
+from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats
 
 __all__ = ["MechanicalODeform"]
+
+HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
+SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
 FALLBACK = SolverSettings("limex", step=2.5e-3, dtype="float64")
 FINER = {SolverSettings("limex", step=1.25e-4, dtype="float64"): 0.0}  # what solver errors are measured against
@@ -78,16 +83,18 @@ class MechanicalODeform(ReducedModel):
         )
         pushed = PushedBody(self.mechanics, push, self.pulse)
 
-        correction = None
-        if self.correction is not None:
-            known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])
-            correction = self.correction.over_time(known)
-
         def decode(times: Floats, states: Floats) -> Floats:
-            reduced = self.coordinates.reduced(*pushed.body_motion(states)[:3])
-            return reduced if correction is None else reduced + correction(times)
+            return self.coordinates.reduced(*pushed.body_motion(states)[:3])
 
         radius = self.space.gyration_radius
-        return LatentTrajectory(
+        solved: Trajectory = LatentTrajectory(
             pushed, decode, pushed.start, settings, FALLBACK, until, radius, lambda: (pushed, pushed.start), FINER
         )
+        if self.correction is not None:
+            known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])
+            shares = coordinate_shares(self.correction.shares, POSE + self.space.basis.modes)
+            rest = self.correction.over_time(known)
+            solved = CorrectedTrajectory(solved, shares, rest, self.correction.stop)
+        body, window = self.watched_body, self.schema.window
+        grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
+        return LiftedTrajectory(solved, lambda y: body.sample(y).lowest, body.limit + SPARE, grid)

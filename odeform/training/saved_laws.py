@@ -1,0 +1,59 @@
+"""The laws that an interrupted training of the mechanical model has finished."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from odeform.dataset.index import Dataset
+from odeform.errors import InputError
+from odeform.io import atomic_write, parse_json
+from odeform.mechanics.law import MechanicalLaw
+
+__all__ = ["SHARED", "SavedLaws"]
+
+SHARED = "all objects"
+"""The name of the law that is fitted to all objects together."""
+
+
+class SavedLaws:
+    """Laws by the name of their object, in a file that is written again whenever one is added."""
+
+    def __init__(self, path: Path, dataset: Dataset, seed: int, resume: bool = False) -> None:
+        """With `resume`, those that the file has. `InputError` if it is damaged or of another training."""
+        self.path = path
+        self._training = {"data": _digest(dataset), "window_s": dataset.schema.window.stop, "seed": seed}
+        self._laws = self._read() if resume else {}
+
+    def get(self, name: str) -> MechanicalLaw | None:
+        """None for a law that is not finished."""
+        return self._laws.get(name)
+
+    def add(self, name: str, law: MechanicalLaw) -> None:
+        """Keep a finished law."""
+        self._laws[name] = law
+        laws = {known: asdict(value) for known, value in self._laws.items()}
+        atomic_write(self.path, json.dumps({"training": self._training, "laws": laws}, indent=1).encode())
+
+    def _read(self) -> dict[str, MechanicalLaw]:
+        try:
+            data = self.path.read_bytes()
+        except OSError as error:
+            raise InputError(f"--resume: {self.path}: {error.strerror}; expected an interrupted training") from None
+        try:
+            known = parse_json(data, str(self.path))
+            training = known["training"]
+            laws = {name: MechanicalLaw(**values) for name, values in known["laws"].items()}
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            raise InputError(f"--resume: {self.path}: not a state of this training: {error}") from None
+        if training != self._training:
+            raise InputError(
+                f"--resume: {self.path}: state of another training: expected {self._training}, got {training}"
+            )
+        return laws
+
+
+def _digest(dataset: Dataset) -> str:
+    """Of the motions that are trained on and of those that choose."""
+    entries = [(entry.name, entry.split, entry.sha256) for entry in dataset.entries if entry.split != "test"]
+    return hashlib.sha256(json.dumps(entries).encode()).hexdigest()
