@@ -43,7 +43,10 @@ class SavedLaws:
         try:
             known = parse_json(data, str(self.path))
             training = known["training"]
-            laws = {name: MechanicalLaw(**values) for name, values in known["laws"].items()}
+            laws = {
+                name: MechanicalLaw(**{key: float(value) for key, value in values.items()})
+                for name, values in known["laws"].items()
+            }
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise InputError(f"--resume: {self.path}: not a state of this training: {error}") from None
         if training != self._training:

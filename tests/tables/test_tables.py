@@ -13,7 +13,7 @@ from odeform.models.registry import load
 from odeform.simulation.objects.catalog import OBJECTS
 from odeform.tables.cells import _led
 from odeform.tables.page import page
-from odeform.tables.plan import AHEAD, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform.tables.plan import AHEAD, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import ALONE, KEPT, Result, Run, complete_runs
 
 
@@ -89,7 +89,7 @@ def test_the_page_shows_every_model_and_leaves_missing_entries_empty() -> None:
         return {"command": run.name, "sha256": "", "parameters": 7, "seconds": 1.0, "scores": scores}
 
     some = dict.fromkeys(KEPT, 0.5)
-    spans = [*FRAMES.items(), ("mass-elastic", IMPACT)]
+    spans = [*FRAMES.items(), ("mass-elastic", IMPACT), (FORCE, FINAL)]
     simple = [f"{name} {u}:{u + AHEAD}" for name in ("continued", "hold-last", "ballistic") for u in UNTIL]
     simple += [f"spline {k}{way}" for k in INTERVALS for way in ("", " staggered")]
     runs = {table: {one: result(one) for one in of if one.scene != "kick"} for table, of in plan().items()}

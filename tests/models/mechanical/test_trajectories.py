@@ -1,0 +1,76 @@
+"""What is done to motions of the mechanics: a share of them, a regression of the rest, and a lift out of the floor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from odeform.models.mechanical.corrected_trajectory import CorrectedTrajectory
+from odeform.models.mechanical.correction import coordinate_shares
+from odeform.models.mechanical.lifted_trajectory import MOST, LiftedTrajectory
+from odeform.motion.base import SolveStats
+from odeform.types import Floats
+
+STOP = 0.2  # s
+SPEED = np.array([1.0, 2.0, -3.0, 0.1, 0.2, 0.3, 0.01, 0.02])
+SHARES = coordinate_shares({"shift": 0.5, "rotation": 1.0, "deformation": 0.0}, len(SPEED))
+
+
+STATS = SolveStats("none", 0, 0, 0, "ok", 0.0, lambda: None)
+
+
+@dataclass
+class Steady:
+    """Every coordinate grows at its own speed."""
+
+    last_good: float = 1.0
+    stats: SolveStats = STATS
+
+    def reduced(self, times: Floats) -> Floats:
+        return times[:, None] * SPEED
+
+
+def corrected() -> CorrectedTrajectory:
+    return CorrectedTrajectory(Steady(), SHARES, lambda times: 1.0 + 0.0 * times[:, None] * SPEED, STOP)
+
+
+def test_a_part_has_its_share_of_the_mechanics() -> None:
+    np.testing.assert_array_equal(SHARES, [0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 0.0, 0.0])
+    times = np.array([0.05, 0.15])
+    np.testing.assert_allclose(corrected().reduced(times), SHARES * times[:, None] * SPEED + 1.0)
+    assert not corrected().reduced(np.zeros(1)).any()
+
+
+def test_beyond_the_window_a_body_moves_as_the_mechanics_does() -> None:
+    times = np.array([STOP, 0.5, 0.7])
+    y = corrected().reduced(times)
+    np.testing.assert_allclose(np.diff(y, axis=0), np.diff(times)[:, None] * SPEED)
+    np.testing.assert_allclose(corrected().reduced(times[1:]), y[1:], atol=1e-15)
+    np.testing.assert_allclose(y[0], corrected().reduced(times[:1] - 1e-9)[0], atol=1e-7)
+
+
+@pytest.mark.parametrize("grid", [0.025, 0.0125])
+def test_a_body_is_lifted_by_what_is_too_deep(grid: float) -> None:
+    limit = -0.006
+    knots = np.arange(0.0, STOP + 1e-9, grid)
+
+    def lowest(y: Floats) -> Floats:
+        return 0.05 * y[:, 2]  # a leg that sinks at 0.15 m/s
+
+    lifted = LiftedTrajectory(Steady(), lowest, limit, knots)
+    times = np.array([0.01, 0.1])
+    below, deep = lowest(Steady().reduced(times)) - limit
+    assert below > 0.0 > deep > -MOST
+    y, own = lifted.reduced(times), Steady().reduced(times)
+    np.testing.assert_array_equal(y[0], own[0])
+    np.testing.assert_allclose(y[1] - own[1], [0.0, 0.0, -deep, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
+    assert lifted.last_good == 1.0
+
+
+def test_what_is_lost_is_not_lifted() -> None:
+    def nowhere(y: Floats) -> Floats:
+        return np.where(np.arange(len(y)) % 2, -1.0, np.nan)
+
+    lifted = LiftedTrajectory(Steady(), nowhere, 0.0, np.linspace(0.0, STOP, 9))
+    times = np.linspace(0.0, STOP, 5)
+    np.testing.assert_array_equal(lifted.reduced(times), Steady().reduced(times))
