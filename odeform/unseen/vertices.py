@@ -18,14 +18,14 @@ from odeform.dataset.store import open_dataset
 from odeform.io import atomic_write
 from odeform.models.base import Predictor
 from odeform.training.train import train
-from odeform.types import Mask, MotionSequence
+from odeform.types import Bools, MotionSequence
 
 __all__ = ["errors_at", "held_out", "main", "without_vertices"]
 
 SHARE = 0.1
 
 
-def held_out(count: int, share: float, seed: int) -> Mask:
+def held_out(count: int, share: float, seed: int) -> Bools:
     """(N,) which of `count` vertices are held out, at random."""
     chosen = np.zeros(count, dtype=bool)
     chosen[np.random.default_rng(seed).permutation(count)[: round(share * count)]] = True
@@ -57,8 +57,8 @@ def errors_at(predictor: Predictor, dataset: Dataset, share: float, seed: int) -
             error = np.square(predicted.astype(float) - truth.vertices)[1:].mean(axis=(0, 2))
             hidden = held_out(len(error), share, seed)
             squares.append([float(error[hidden].mean()), float(error[~hidden].mean())])
-        hidden, seen = 1e3 * np.sqrt(np.mean(squares, axis=0))
-        out[name] = {"held_out_mm": float(hidden), "others_mm": float(seen), "ratio": float(hidden / seen)}
+        there, elsewhere = 1e3 * np.sqrt(np.mean(squares, axis=0))
+        out[name] = {"held_out_mm": float(there), "others_mm": float(elsewhere), "ratio": float(there / elsewhere)}
     return out
 
 
