@@ -15,13 +15,15 @@ from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.step import Projectile
 from odeform.models.mechanical.coordinates import coordinates_of
 from odeform.models.mechanical.elastic_body import elastic_body
+from odeform.models.mechanical.model import MechanicalODeform
 from odeform.models.per_object import PerObject
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
-from odeform.training import mechanical_law, methods
+from odeform.training import mechanical, mechanical_law, methods
 from odeform.training.mechanical_law import fit_law, relative_errors
 from odeform.training.pushes import Pushes
+from odeform.training.saved_laws import SHARED, SavedLaws
 from odeform.training.train import train
 from odeform.types import MotionSequence
 
@@ -102,6 +104,34 @@ def test_a_trained_checkpoint_predicts_pushes(
     assert np.abs(still.vertices(0.19) - still.vertices(0.0)).max() < 1e-5
 
 
+@pytest.mark.slow
+def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "model.safetensors"
+    laws = SavedLaws(tmp_path / "model.safetensors.part", dataset, 0)
+    laws.add(SHARED, MechanicalLaw())
+    laws.add("donut", LAW)
+
+    def fit(*given: object, **more: object) -> None:
+        raise AssertionError("it is finished")
+
+    monkeypatch.setattr(mechanical, "fit_law", fit)
+    predictor = train(dataset, out, without=["correction"], resume=True, report=lambda _: None)
+    assert isinstance(predictor, PerObject)
+    part = predictor.parts["donut"]
+    assert isinstance(part, MechanicalODeform)
+    assert part.law == LAW
+    assert part.correction is None
+    assert not laws.path.exists(), "it is of no use any more"
+
+
+@pytest.mark.parametrize(("names", "expected"), [(["cat"], "expected one of donut"), (["donut", "dog"], "'dog'")])
+def test_an_object_that_the_data_do_not_have_is_refused(
+    dataset: Dataset, tmp_path: Path, names: list[str], expected: str
+) -> None:
+    with pytest.raises(InputError, match=expected):
+        train(dataset, tmp_path / "model.safetensors", "nearest", objects=names, report=lambda _: None)
+
+
 def test_other_data_are_refused(dataset: Dataset, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected data of scene contact-force"):
         train(replace(dataset, fixed={}), tmp_path / "model.safetensors", report=lambda _: None)
@@ -112,17 +142,18 @@ def test_frames_after_the_window_are_not_trained_on(
 ) -> None:
     seen = []
 
-    def fit(given: Dataset, seed: int, report: object) -> None:
-        seen.append((given.schema.window.stop, seed))
+    def fit(given: Dataset, laws: SavedLaws, seed: int, report: object, correct: bool) -> None:
+        seen.append((given.schema.window.stop, seed, correct))
         raise InputError("enough")
 
     monkeypatch.setattr(methods, "fit_mechanical", fit)
-    asked: tuple[dict[str, Any], ...] = ({"window": (0, 11)}, {})
+    asked: tuple[dict[str, Any], ...] = ({"window": (0, 11)}, {}, {"without": ["correction"]})
     for options in asked:
         with pytest.raises(InputError, match="enough"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)
-    assert seen == [(0.1, 0), (dataset.schema.window.stop, 0)]
-    refused: tuple[dict[str, Any], ...] = ({"every": 2}, {"steps": 10})
+    whole = dataset.schema.window.stop
+    assert seen == [(0.1, 0, True), (whole, 0, True), (whole, 0, False)]
+    refused: tuple[dict[str, Any], ...] = ({"every": 2}, {"steps": 10}, {"without": ["ode"]})
     for options in refused:
         with pytest.raises(InputError, match="expected no --every"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)
