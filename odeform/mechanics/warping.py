@@ -33,14 +33,14 @@ def surface_turns(points: Points, faces: Faces, shapes: Float[np.ndarray, "point
 
 
 def warped(displacement: Floats, turns: Floats) -> Floats:
-    """(..., 3) displacements of points that turn evenly by (..., 3) rad as they move."""
-    squares = (turns * turns).sum(axis=-1, keepdims=True) + SMALL * SMALL
+    """(..., 3, N) displacements of points that turn evenly by (..., 3, N) rad as they move."""
+    squares = (turns * turns).sum(axis=-2, keepdims=True) + SMALL * SMALL
     angle = np.sqrt(squares)
     half = np.sin(0.5 * angle) / angle
     even = (1.0 - np.sin(angle) / angle) / squares
-    once = turns[..., AFTER] * displacement[..., BEFORE] - turns[..., BEFORE] * displacement[..., AFTER]
-    along = (turns * displacement).sum(axis=-1, keepdims=True)
-    return (1.0 - even * squares) * displacement + 2.0 * half * half * once + even * along * turns
+    once = turns[..., AFTER, :] * displacement[..., BEFORE, :] - turns[..., BEFORE, :] * displacement[..., AFTER, :]
+    along = (turns * displacement).sum(axis=-2, keepdims=True)
+    return (1.0 - even * squares) * displacement + (2.0 * half * half) * once + (even * along) * turns
 
 
 def rotations(turns: Floats) -> Rotations:
