@@ -11,12 +11,11 @@ from jaxtyping import Float
 from scipy.linalg.lapack import dposv
 
 from odeform.mechanics.body import ReducedBody
-from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State, apart, extrapolated
-from odeform.mechanics.touching import Touching
+from odeform.mechanics.touching import Near, Touching
 from odeform.mechanics.turns import skew
 from odeform.types import Floats
 
@@ -79,8 +78,9 @@ class Steps:
         """One step of second order: twice two half steps less a whole one. Also returns its error (B,) in m: how far
         the two half steps are from the whole one."""
         # the whole step and the first half begin with the same contacts
-        begun = self._implicit(state, np.array([step, 0.5 * step]))
-        whole, fine = begun.after(0), self._implicit(begun.after(1), np.array([0.5 * step])).after(0)
+        near = self._touching[state.pushed].near(state, step)
+        begun = self._implicit(state, near, np.array([step, 0.5 * step]))
+        whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step])).after(0)
         between = apart(fine, whole)
         return extrapolated(whole, fine, between), self._size(between, fine.velocity - whole.velocity)
 
@@ -94,21 +94,18 @@ class Steps:
         local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
         _, rate = self._free(state, local)
         rate[:, inner] -= self._relaxation * self._squares * local[:, inner]
-        rate += self._contacts(state, 0.0).forces(local)
+        rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
         matrix = np.zeros((*local.shape, local.shape[1]))
         self._add_masses(matrix, self._masses[: local.shape[1]])
         return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
 
-    def _contacts(self, state: State, step: float) -> Contacts:
-        return self._touching[state.pushed].contacts(state, step)
-
-    def _implicit(self, state: State, steps: Float[np.ndarray, " steps"]) -> State:
-        """The states (H, B) after one step of first order of each of H lengths in s, the first of them the longest."""
+    def _implicit(self, state: State, near: Near, steps: Float[np.ndarray, " steps"]) -> State:
+        """The states (H, B) after one step of first order of each of H lengths in s."""
         velocity, step = _turned(state.velocity, state.rotation), steps[:, None, None]
         momentum, rate = self._free(state, velocity)
         momentum, size = momentum + step * rate, velocity.shape[1]
         masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]
-        contacts, velocity = self._contacts(state, float(steps[0])), velocity[None]
+        contacts, velocity = near.contacts(state), velocity[None]
         for _ in range(SWEEPS):
             matrix, impulse = contacts.resistance(velocity, step)
             self._add_masses(matrix, masses)

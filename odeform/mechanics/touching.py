@@ -1,5 +1,7 @@
 """Where bodies of a batch touch the floor, and the projectiles that push them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float
 
@@ -9,23 +11,62 @@ from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State
 from odeform.mechanics.turns import skew
-from odeform.mechanics.warping import rotations, warped
+from odeform.mechanics.warping import Turning
 from odeform.types import Floats, Ints, Rotations
 
-__all__ = ["Touching"]
+__all__ = ["Near", "Touching"]
 
-MARGIN = 3e-3  # m; samples farther from contact than this and the way of two steps are left out
-FLOOR, PUSH = 32, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
+MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
+FLOOR, PUSH = 64, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
 UP_FIRST = [2, 0, 1]  # the scene's axes, as those of contacts with the floor
 
 
+@dataclass(frozen=True, eq=False)
+class Near:
+    """C samples of each of B bodies that may touch something in a step: the first F the floor, the others a sphere."""
+
+    push: Push
+    radius: float
+    """m, of the spheres."""
+    points: Float[np.ndarray, "batch 3 contacts"]
+    """m at rest, from the mass centre."""
+    rows: Float[np.ndarray, "batch 6 contacts directions"]
+    """What the directions of deformation do there, as in `Push`."""
+    level: Float[np.ndarray, "batch floor"]
+    """m, as in `Floor`."""
+    springs: Float[np.ndarray, "4 batch contacts"]
+    """As of `Contacts`."""
+
+    def contacts(self, state: State) -> Contacts:
+        """Linearised about a state, in axes of the bodies, in which samples need no rotation."""
+        turning, place = _bent(self.points, self.rows, state)
+        floor, at_sphere = self.level.shape[1], place[..., self.level.shape[1] :]
+        axes = np.empty((len(place), place.shape[2], 3, 3))
+        gap = np.empty((len(place), place.shape[2]))
+        gap[:, :floor] = _heights(place[..., :floor], self.level, state)
+        axes[:, :floor] = state.rotation[:, None, UP_FIRST]
+        if state.pushed:
+            away = at_sphere - _centre(self.push, state)
+            distance = np.sqrt((away * away).sum(axis=1))
+            gap[:, floor:] = distance - self.radius
+            axes[:, floor:] = _axes((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
+        out = np.empty((*axes.shape[:3], state.velocity.shape[1]))
+        out[..., :3] = axes
+        np.matmul(axes, skew(-place.swapaxes(1, 2)), out=out[..., 3:6])
+        np.matmul(axes @ turning.rotations, self.rows[:, :3].swapaxes(1, 2), out=out[..., 6 : state.body])
+        if state.pushed:
+            out[:, :floor, :, -1] = 0.0
+            guides = self.push.guides[:, None] @ state.rotation
+            np.matmul(axes[:, floor:], -guides[..., None], out=out[:, floor:, :, state.body :])
+        return Contacts(out, gap, *self.springs)
+
+
 class Touching:
-    """Finds the contacts of B pushed bodies, in their own axes, in which samples need no rotation."""
+    """Finds where B pushed bodies may touch something."""
 
     def __init__(self, push: Push, floor: Floor, law: MechanicalLaw, radius: float) -> None:
         """Spheres of `radius` m push for as long as states hold them."""
-        self._push, self._law, self._radius = push, law, radius
-        self._level = floor.level
+        self._push, self._law, self._radius, self._level = push, law, radius, floor.level
         batch, _, samples = push.points.shape
         self._springs = np.empty((4, batch, samples))
         stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
@@ -37,67 +78,47 @@ class Touching:
         self._first = samples * np.arange(batch)[:, None]  # of each body, among all samples
         self._row = samples * np.arange(6)[:, None]
 
-    def contacts(self, state: State, step: float) -> Contacts:
-        """Those that may resist in a step of `step` seconds, and some more. There may be none."""
+    def near(self, state: State, step: float) -> Near:
+        """The samples that may touch something in a step of `step` seconds, and some more. There may be none."""
         push = self._push
-        batch, _, samples = push.points.shape
-        motion = (push.rows.reshape(batch, 6 * samples, -1) @ state.modes[..., None]).reshape(batch, 6, samples)
-        motion[:, :3] = push.points + warped(motion[:, :3], motion[:, 3:])
-        gap = np.empty((batch, samples))
-        chosen = self._on_floor(state, step, motion, gap)
-        stand = chosen.shape[1]
+        _, place = _bent(push.points, push.rows, state)
+        height = _heights(place[..., : push.support], self._level, state)
+        down = min(float(state.velocity[:, 2].min()), 0.0)
+        chosen = stand = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
         if state.pushed:
-            chosen = np.concatenate([chosen, self._at_sphere(state, step, motion, gap)], axis=1)
-        there = motion.ravel().take((6 * self._first + chosen)[:, None] + self._row)
-        gap = gap.ravel().take(self._first + chosen)
-        axes = np.empty((*gap.shape, 3, 3))
-        axes[:, :stand] = state.rotation[:, None, UP_FIRST]
-        if state.pushed:
-            away = there[:, :3, stand:] - self._centre(state)[..., None]
-            axes[:, stand:] = _axes((away / np.maximum(gap[:, None, stand:] + self._radius, 1e-9)).swapaxes(1, 2))
-        jacobian = self._jacobian(state, chosen, there, axes, stand)
-        springs = self._springs.reshape(4, -1).take(self._first + chosen, axis=1)
-        return Contacts(jacobian, gap, *springs)
+            away = place[..., push.support :] - _centre(push, state)
+            distance = np.sqrt((away * away).sum(axis=1))
+            speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
+            way = (2.0 * step + self._law.push_damping) * float(np.sqrt((speed * speed).sum(axis=1).max()))
+            pushed = push.support + _nearest(distance, self._radius + MARGIN + way, PUSH)
+            chosen = np.concatenate([stand, pushed], axis=1)
+        return Near(
+            push,
+            self._radius,
+            push.points.ravel().take((3 * self._first + chosen)[:, None] + self._row[:3]),
+            push.rows.reshape(-1, push.rows.shape[-1]).take((6 * self._first + chosen)[:, None] + self._row, axis=0),
+            self._level.take(stand),
+            self._springs.reshape(4, -1).take(self._first + chosen, axis=1),
+        )
 
-    def _on_floor(self, state: State, step: float, motion: Floats, gap: Floats) -> Ints:
-        """(B, C) samples near the floor; fills their gaps in."""
-        support = self._push.support
-        height = (state.rotation[:, 2:] @ motion[:, :3, :support])[:, 0] + (state.shift[:, 2:] + self._level)
-        gap[:, :support] = height
-        ahead = 2.0 * step + self._law.floor_damping
-        return _nearest(height, MARGIN - ahead * min(float(state.velocity[:, 2].min()), 0.0), FLOOR)
 
-    def _at_sphere(self, state: State, step: float, motion: Floats, gap: Floats) -> Ints:
-        """(B, C) samples near the sphere; fills their gaps in."""
-        push = self._push
-        away = motion[:, :3, push.support :] - self._centre(state)[..., None]
-        off = np.sqrt((away * away).sum(axis=1)) - self._radius
-        gap[:, push.support :] = off
-        speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
-        ahead = 2.0 * step + self._law.push_damping
-        margin = MARGIN + ahead * float(np.sqrt((speed * speed).sum(axis=1).max()))
-        return push.support + _nearest(off, margin, PUSH)
+def _bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
+    """How much samples turn, and where they are, in m from the mass centre."""
+    batch, _, samples, size = rows.shape
+    motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)
+    turning = Turning(motion[:, 3:])
+    return turning, points + turning.warped(motion[:, :3])
 
-    def _centre(self, state: State) -> Float[np.ndarray, "batch 3"]:
-        """m, of the spheres, in axes of the bodies."""
-        place = self._push.centres + state.projectile * self._push.guides - state.shift
-        return (place[:, None] @ state.rotation)[:, 0]
 
-    def _jacobian(self, state: State, chosen: Ints, there: Floats, axes: Rotations, stand: int) -> Floats:
-        """(B, C, 3, V): velocities of the chosen samples, which are at `there` (B, 6, C), in `axes` of the contacts."""
-        push = self._push
-        place, turns = there[:, :3].swapaxes(1, 2), there[:, 3:].swapaxes(1, 2)
-        out = np.empty((*axes.shape[:3], state.velocity.shape[1]))
-        out[..., :3] = axes
-        np.matmul(axes, skew(-place), out=out[..., 3:6])
-        rows = push.rows.reshape(-1, push.rows.shape[-1])
-        shapes = rows.take((6 * self._first + chosen)[:, None] + self._row[:3], axis=0).swapaxes(1, 2)
-        np.matmul(axes @ rotations(turns), shapes, out=out[..., 6 : state.body])
-        if state.pushed:
-            out[:, :stand, :, state.body] = 0.0
-            guides = push.guides[:, None] @ state.rotation
-            np.matmul(axes[:, stand:], -guides[..., None], out=out[:, stand:, :, state.body :])
-        return out
+def _heights(place: Floats, level: Floats, state: State) -> Float[np.ndarray, "batch samples"]:
+    """m above the floor."""
+    return (state.rotation[:, 2:] @ place)[:, 0] + (state.shift[:, 2:] + level)
+
+
+def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
+    """m, of the spheres, from the mass centres."""
+    place = push.centres + state.projectile * push.guides - state.shift
+    return state.rotation.swapaxes(1, 2) @ place[..., None]
 
 
 def _nearest(gap: Floats, margin: float, most: int) -> Ints:
@@ -112,4 +133,6 @@ def _axes(normals: Float[np.ndarray, "*batch 3"]) -> Rotations:
     half = normals.copy()
     half[..., 0] += sign
     scale = sign / np.abs(half[..., 0])
-    return (scale[..., None] * half)[..., None] * half[..., None, :] - sign[..., None, None] * np.eye(3)
+    out = (scale[..., None] * half)[..., None] * half[..., None, :]
+    out.reshape(*sign.shape, 9)[..., ::4] -= sign[..., None]
+    return out
