@@ -100,7 +100,8 @@ def reduce_body(
     corners = surface[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
-    rows = np.concatenate([modes.transpose(2, 1, 0), turns.transpose(1, 0, 2)])
+    # in this order in memory too, or else a gather of some samples copies all of them first
+    rows = np.ascontiguousarray(np.concatenate([modes.transpose(2, 1, 0), turns.transpose(1, 0, 2)]))
     areas *= 0.5 * solid.mass / areas.sum()
     around *= 0.5 * solid.mass / around.sum()
     everywhere = Samples(

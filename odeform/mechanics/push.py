@@ -70,9 +70,17 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
     points[..., :count], points[..., count:] = support.points.T, surface.points[near].swapaxes(1, 2)
     masses[:, :count], masses[:, count:] = support.masses, surface.masses[near]
     for index in range(batch):
-        rows[index, :, :count] = support.rows @ modes[index]
-        rows[index, :, count:] = surface.rows.take(near[index], axis=1) @ modes[index]
+        for row, stand, touched in zip(rows[index], support.rows, surface.rows, strict=True):
+            # one component after the other: what is gathered stays in the cache
+            _fill(row[:count], stand, modes[index], soft)
+            _fill(row[count:], touched.take(near[index], axis=0), modes[index], soft)
     return Push(modes, squares, count, points, rows, masses, centres, guides, strength)
+
+
+def _fill(out: Floats, values: Floats, modes: Floats, soft: int) -> None:
+    """`out` (N, K): what directions do, from what modes do (N, M). The first `soft` are modes themselves."""
+    out[:, :soft] = values[:, :soft]
+    out[:, soft:] = values[:, soft:] @ modes[soft:, soft:]
 
 
 def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -> tuple[Floats, Floats]:
@@ -81,9 +89,11 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     patches = body.surface.masses[around] * np.exp(-away / np.square(WIDTHS)[:, None, None])
     patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1)
     stiff, batch = body.squares[soft:], len(around)
-    # (B, 3, widths, M)
-    loads = np.stack([p @ body.surface.rows[:3].take(i, axis=1) for p, i in zip(patches, around, strict=True)])
-    loads = loads.transpose(0, 3, 1, 2)[:, soft:].reshape(batch, len(stiff), -1)
+    loads = np.empty((batch, len(stiff), 3, len(WIDTHS)))
+    for load, patch, loaded in zip(loads, patches, around, strict=True):
+        for axis in range(3):
+            load[:, axis] = (patch @ body.surface.rows[axis].take(loaded, axis=0))[:, soft:].T
+    loads = loads.reshape(batch, len(stiff), -1)
     local = np.linalg.qr(loads / stiff[:, None])[0]
     squares, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))
     modes = np.zeros((batch, len(body.squares), soft + squares.shape[1]))
