@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg.lapack import dposv
+from scipy.linalg import get_lapack_funcs
 
 from odeform.mechanics.body import ReducedBody
 from odeform.mechanics.floor import GRAVITY, Floor, stand
@@ -22,6 +22,7 @@ from odeform.types import Floats
 __all__ = ["Mechanics", "Projectile", "Steps"]
 
 AHEAD = 0.02  # s: errors of velocities count by how far they carry in that time
+(SOLVE,) = get_lapack_funcs(("posv",), dtype=np.float64)
 SWEEPS = 2  # solves of a step: contacts and friction of the second are those that the first finds
 
 
@@ -141,7 +142,7 @@ def _turned(velocity: Floats, rotation: Floats) -> Floats:
 
 
 def _solved(matrices: Floats, right: Floats) -> Floats:
-    """(..., V) solutions for symmetric positive matrices (..., V, V), which are overwritten; not finite where one is not.
+    """(..., V) solutions for symmetric positive matrices (..., V, V), which are overwritten; NaN where one is not.
 
     These are too small for `numpy.linalg.solve`: its checks take longer than the factors.
     """
@@ -149,7 +150,7 @@ def _solved(matrices: Floats, right: Floats) -> Floats:
     for matrix, known, found in zip(
         matrices.reshape(-1, size, size), right.reshape(-1, size), out.reshape(-1, size), strict=True
     ):
-        _, found[:], failed = dposv(matrix.T, known, overwrite_a=True)
+        _, found[:], failed = SOLVE(matrix.T, known, overwrite_a=True)
         if failed:
             found[:] = np.nan
     return out

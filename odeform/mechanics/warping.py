@@ -45,7 +45,8 @@ class Turning:
     def warped(self, displacement: Float[np.ndarray, "*batch 3 points"]) -> Float[np.ndarray, "*batch 3 points"]:
         """Where displacements of the modes, which do not turn with the points, take them."""
         turns, rest = self._turns, 1.0 - self._once
-        cross = turns[..., AFTER, :] * displacement[..., BEFORE, :] - turns[..., BEFORE, :] * displacement[..., AFTER, :]
+        cross = turns[..., AFTER, :] * displacement[..., BEFORE, :]
+        cross -= turns[..., BEFORE, :] * displacement[..., AFTER, :]
         along = (turns * displacement).sum(axis=-2, keepdims=True) * (rest / self._squares)
         return self._once * displacement + self._twice * cross + along * turns
 

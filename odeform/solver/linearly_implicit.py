@@ -36,7 +36,8 @@ class _Stepper:
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
         """One step from `state` (n,) at `time` in s: the state after it, and the slope there."""
-        if field is not self._known:  # asking a protocol takes as long as several array operations
+        if self._known is None or field is not self._known:
+            # asking a protocol takes as long as several array operations
             if not isinstance(field, StiffField):
                 raise InputError("solver limex: expected the field of a mechanical model")
             self._known = field

@@ -13,7 +13,8 @@ def test_a_point_that_turns_evenly_moves_along_an_arc(angle: float) -> None:
     turns = angle * axis / np.linalg.norm(axis, axis=1, keepdims=True)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     way = [Rotation.from_rotvec(0.5 * (s + 1.0) * turns).apply(displacement) for s in nodes]
-    np.testing.assert_allclose(Turning(turns.T).warped(displacement.T).T, 0.5 * np.tensordot(weights, way, 1), atol=1e-12)
+    found = Turning(turns.T).warped(displacement.T).T
+    np.testing.assert_allclose(found, 0.5 * np.tensordot(weights, way, 1), atol=1e-12)
 
 
 def test_rotations() -> None:
