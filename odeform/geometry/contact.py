@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
-from odeform.types import Faces, Floats, Mesh, Points, Vector
+from odeform.types import Faces, Floats, Ints, Mesh, Perpoint, Points, Vector
 
 __all__ = [
     "CONE",
@@ -49,25 +50,51 @@ class SurfacePoint:
         return self.shares @ np.asarray(vertices, dtype=float)[faces[self.face]]
 
 
+class _Surface:
+    """What all searches of nearest points on a mesh share."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        points = np.asarray(mesh.points, dtype=float)
+        self.normals = vertex_normals(points, mesh.faces)
+        self.corners = points[mesh.faces]
+        sides = self.corners - np.roll(self.corners, 1, axis=1)
+        self.longest = float(np.linalg.norm(sides, axis=-1).max())
+
+    def around(self, distances: Perpoint, faces: Faces, reach: float) -> Ints:
+        """Faces that may be within `reach` m of a point, from the distances (N,) of the vertices in m."""
+        return np.flatnonzero((distances <= reach + self.longest)[faces].any(axis=1))
+
+
+_surfaces: WeakKeyDictionary[Mesh, _Surface] = WeakKeyDictionary()
+
+
+def _surface_of(mesh: Mesh) -> _Surface:
+    found = _surfaces.get(mesh)
+    if found is None:
+        found = _surfaces[mesh] = _Surface(mesh)
+    return found
+
+
 def surface_point(mesh: Mesh, face: int, shares: Floats, distance: float = 0.0) -> SurfacePoint:
     """The point of a face with barycentric coordinates `shares` (3,)."""
-    vertices, corners = np.asarray(mesh.points, dtype=float), mesh.faces[face]
-    normal = np.asarray(shares) @ vertex_normals(vertices, mesh.faces)[corners]
+    surface = _surface_of(mesh)
+    corners = surface.corners[face]
+    normal = np.asarray(shares) @ surface.normals[mesh.faces[face]]
     size = float(np.linalg.norm(normal))
     if size < 1e-9:
-        a, b, c = vertices[corners]
+        a, b, c = corners
         normal = np.cross(b - a, c - a)
         size = max(float(np.linalg.norm(normal)), 1e-20)
-    return SurfacePoint(np.asarray(shares) @ vertices[corners], normal / size, int(face), np.asarray(shares), distance)
+    return SurfacePoint(np.asarray(shares) @ corners, normal / size, int(face), np.asarray(shares), distance)
 
 
 def nearest_on(mesh: Mesh, point: Floats) -> SurfacePoint:
     """The point of a mesh that is nearest to `point` (3,) m."""
-    corners = np.asarray(mesh.points, dtype=float)[mesh.faces]
-    distance = np.linalg.norm(mesh.points - point, axis=1)[mesh.faces].min(axis=1)
-    faces = np.flatnonzero(distance <= distance.min() + _longest(corners))  # no other can be as near
-    corners = corners[faces]
-    feet = trimesh.triangles.closest_point(corners, np.broadcast_to(np.asarray(point, dtype=float), (len(corners), 3)))
+    surface, point = _surface_of(mesh), np.asarray(point, dtype=float)
+    distances = np.linalg.norm(mesh.points - point, axis=1)
+    faces = surface.around(distances, mesh.faces, float(distances.min()))  # no other can be as near
+    corners = surface.corners[faces]
+    feet = trimesh.triangles.closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
     away = ((feet - point) ** 2).sum(axis=1)
     near = int(away.argmin())
     shares = trimesh.triangles.points_to_barycentric(corners[near : near + 1], feet[near : near + 1])[0]
@@ -81,24 +108,22 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
     The centre lies on the outward normal, at the distance at which the sphere touches the faces: its radius on flat
     and convex parts. It does not fit where another part of the surface or the floor z = 0 is in its way.
     """
-    corners = np.asarray(mesh.points, dtype=float)[mesh.faces]
-    corners = corners[np.linalg.norm(corners - contact.point, axis=-1).min(axis=1) < 4.0 * RADIUS + _longest(corners)]
+    surface, reach = _surface_of(mesh), RADIUS + CREVICE
+    distances = np.linalg.norm(mesh.points - contact.point, axis=1)
+    corners = surface.corners[surface.around(distances, mesh.faces, 2.0 * reach)]
     height = RADIUS
     for _ in range(20):
         centre = contact.point + height * contact.normal
         feet = trimesh.triangles.closest_point(corners, np.broadcast_to(centre, (len(corners), 3)))
-        gap = RADIUS - float(np.linalg.norm(feet - centre, axis=1).min())
+        away = np.linalg.norm(feet - centre, axis=1)
+        gap = RADIUS - float(away.min())
+        corners = corners[away <= away.min() + 2.0 * CREVICE]  # it only moves outward, by less than a crevice
         height += gap
         if height > RADIUS + CREVICE or centre[2] < RADIUS:
             return None
         if abs(gap) < 1e-7:
             break
     return contact.point + height * contact.normal
-
-
-def _longest(corners: Floats) -> float:
-    """Length of the longest side of triangles (F, 3, 3)."""
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max())
 
 
 def in_cone(normal: Floats, force: Floats) -> bool:

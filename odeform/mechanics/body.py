@@ -21,22 +21,15 @@ class Samples:
 
     points: Points
     """(S, 3) m."""
-    modes: Float[np.ndarray, "samples 3 modes"]
-    """Displacement by each mode, m per root kilogram."""
-    turns: Float[np.ndarray, "samples 3 modes"]
-    """Rotation of the surface there by each mode, rad per root kilogram."""
+    rows: Float[np.ndarray, "6 samples modes"]
+    """What each mode does there: displacement (3) in m and rotation of the surface (3) in rad per root kilogram."""
     masses: Perpoint
     """(S,) kg of the body that each stands for, by its share of the surface."""
 
-    @cached_property
-    def flat(self) -> Floats:
-        """(K, 3 S): the modes, for one product."""
-        return np.ascontiguousarray(self.modes.reshape(-1, self.modes.shape[2]).T)
-
-    @cached_property
-    def flat_turns(self) -> Floats:
-        """(K, 3 S): the turns, for one product."""
-        return np.ascontiguousarray(self.turns.reshape(-1, self.turns.shape[2]).T)
+    @property
+    def modes(self) -> Float[np.ndarray, "samples 3 modes"]:
+        """The displacements."""
+        return self.rows[:3].transpose(1, 0, 2)
 
     @cached_property
     def tree(self) -> KDTree:
@@ -107,24 +100,23 @@ def reduce_body(
     corners = surface[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
-    shapes = modes.transpose(1, 2, 0)
+    # in this order in memory too, or else a gather of some samples copies all of them first
+    rows = np.ascontiguousarray(np.concatenate([modes.transpose(2, 1, 0), turns.transpose(1, 0, 2)]))
     areas *= 0.5 * solid.mass / areas.sum()
     around *= 0.5 * solid.mass / around.sum()
     everywhere = Samples(
         np.concatenate([surface, corners.mean(axis=1)]),
-        np.concatenate([shapes, shapes[faces].mean(axis=1)]),
-        np.concatenate([turns, turns[faces].mean(axis=1)]),
+        np.concatenate([rows, rows[:, faces].mean(axis=2)], axis=1),
         np.concatenate([around, areas]),
     )
-    return ReducedBody(solid, squares, _support(surface, shapes, turns, solid.mass), everywhere)
+    return ReducedBody(solid, squares, _support(surface, rows, solid.mass), everywhere)
 
 
-def _support(points: Points, modes: Floats, turns: Floats, mass: float) -> Samples:
+def _support(points: Points, rows: Floats, mass: float) -> Samples:
     low = int(points[:, 2].argmin())
     bottom = np.flatnonzero(points[:, 2] < points[low, 2] + NEAR_FLOOR)
     kept = bottom[spread(points[bottom], NEAREST, int(np.flatnonzero(bottom == low)[0]))]
     chosen = np.unique(np.concatenate([spread(points, SUPPORT, low), kept]))
     owner = KDTree(points[chosen]).query(points)[1]
-    return Samples(
-        points[chosen], modes[chosen], turns[chosen], mass * np.bincount(owner, minlength=len(chosen)) / len(points)
-    )
+    masses = mass * np.bincount(owner, minlength=len(chosen)) / len(points)
+    return Samples(points[chosen], rows[:, chosen], masses)

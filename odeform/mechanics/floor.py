@@ -20,8 +20,9 @@ TOUCHING = 4.0  # inverse of the share of a body's surface that typically stands
 class Floor:
     """A body's springs to the floor, in equilibrium with its weight where it rests."""
 
-    offset: Perpoint
-    """(S,) m added to the heights of the support's samples: with it, the springs balance weight and torque."""
+    level: Perpoint
+    """(S,) m added to the heights of the support's samples above the mass centre at rest, for their gaps: with it, the
+    springs balance weight and torque."""
     stiffness: Perpoint
     """(S,) N/m of each sample."""
     preload: Float[np.ndarray, " modes"]
@@ -48,4 +49,4 @@ def stand(body: ReducedBody, law: MechanicalLaw) -> Floor:
     plane = minimize(energy, np.array([1.0, 0.0, 0.0]), jac=True, method="BFGS", options={"gtol": 1e-10}).x
     offset = -law.sink * (plane @ shape)
     force = stiffness * np.maximum(-(low + offset), 0.0)
-    return Floor(offset - z.min() - body.solid.height, stiffness, np.einsum("s,sk->k", force, body.support.modes[:, 2]))
+    return Floor(offset - z.min(), stiffness, force @ body.support.rows[2])

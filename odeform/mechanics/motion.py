@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State
-from odeform.mechanics.step import Mechanics
+from odeform.mechanics.step import Mechanics, Steps
 from odeform.types import Floats
 
 __all__ = ["Nodes", "push_body"]
@@ -44,9 +44,9 @@ def push_body(mechanics: Mechanics, push: Push, pulse: float, until: float, step
     step = pulse / count
     turns = np.broadcast_to(np.eye(3), (batch, 3, 3))
     rest = (np.zeros((batch, n)) for n in (size, 1, 7 + size))
-    states = [State(np.zeros((batch, 3)), turns, *rest)]
+    states, steps = [State(np.zeros((batch, 3)), turns, *rest)], Steps(mechanics, push)
     for index in range(max(int(np.ceil(until / step - 1e-9)), 1)):
         if index == count:
             states[-1] = states[-1].without_projectile()
-        states.append(mechanics.advance(states[-1], push, step)[0])
+        states.append(steps.advance(states[-1], step)[0])
     return Nodes(step * np.arange(len(states)), states)

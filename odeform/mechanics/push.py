@@ -1,6 +1,6 @@
-"""Bodies about to be pushed: the deformations that each push excites, and where the projectile may touch."""
+"""Bodies about to be pushed: the deformations that each push excites, and where they may touch floor and projectile."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,29 +29,27 @@ class Push:
     """Amplitudes of the body's modes by those of the K directions."""
     squares: Float[np.ndarray, "batch directions"]
     """Squared angular frequencies, 1/s^2."""
-    support: Float[np.ndarray, "batch directions flat"]
-    """Displacement of the body's support, (S, 3) flat, by the directions."""
-    support_turns: Float[np.ndarray, "batch directions flat"]
-    """Its rotation."""
+    support: int
+    """The first samples are those that may touch the floor; the sphere may touch the others."""
+    points: Float[np.ndarray, "batch 3 samples"]
+    """m: samples of the surface."""
+    rows: Float[np.ndarray, "batch 6 samples directions"]
+    """Their displacement (3) and rotation (3) by the directions."""
+    masses: Float[np.ndarray, "batch samples"]
+    """kg behind each."""
     centres: Float[np.ndarray, "batch 3"]
     """m, of the spheres at the start, relative to the mass centre of the body at rest."""
     guides: Float[np.ndarray, "batch 3"]
     """Of unit length."""
     forces: Float[np.ndarray, "batch 1"]
     """N along the guide."""
-    points: Float[np.ndarray, "batch near 3"]
-    """m: samples of the surface that the sphere may touch."""
-    shapes: Float[np.ndarray, "batch entries directions"]
-    """Their displacement by the directions, (N, 3) flat."""
-    turns: Float[np.ndarray, "batch entries directions"]
-    """Their rotation, as flat."""
-    masses: Float[np.ndarray, "batch near"]
-    """kg behind each."""
 
     @cached_property
-    def twice(self) -> "Push":
-        """For a batch of 2 B."""
-        return Push(*(np.concatenate([getattr(self, f.name)] * 2) for f in fields(self)))
+    def over(self) -> "Push":
+        """The same without the samples that the sphere may touch."""
+        parts = (self.points[..., : self.support], self.rows[:, :, : self.support], self.masses[:, : self.support])
+        points, rows, masses = (np.ascontiguousarray(part) for part in parts)
+        return replace(self, points=points, rows=rows, masses=masses)
 
 
 def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors, forces: Vectors) -> Push:
@@ -64,25 +62,25 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
     strength, inward = np.linalg.norm(forces, axis=1, keepdims=True), contacts - centres
     ahead = inward / np.linalg.norm(inward, axis=1, keepdims=True)
     guides = np.where(strength > 0.0, forces / np.where(strength > 0.0, strength, 1.0), ahead)
-    near, surface = around[:, :NEAR], body.surface
-    batch, count = near.shape
-    shapes = surface.modes[near].reshape(batch, 3 * count, -1) @ modes
-    support = modes.transpose(0, 2, 1) @ body.support.flat
-    turns = surface.turns[near].reshape(batch, 3 * count, -1) @ modes
-    support_turns = modes.transpose(0, 2, 1) @ body.support.flat_turns
-    return Push(
-        modes,
-        squares,
-        support,
-        support_turns,
-        centres,
-        guides,
-        strength,
-        surface.points[near],
-        shapes,
-        turns,
-        surface.masses[near],
-    )
+    near, support, surface = around[:, :NEAR], body.support, body.surface
+    batch, count = len(near), len(support.points)
+    samples = count + near.shape[1]
+    points, masses = np.empty((batch, 3, samples)), np.empty((batch, samples))
+    rows = np.empty((batch, 6, samples, modes.shape[2]))
+    points[..., :count], points[..., count:] = support.points.T, surface.points[near].swapaxes(1, 2)
+    masses[:, :count], masses[:, count:] = support.masses, surface.masses[near]
+    for index in range(batch):
+        for row, stand, touched in zip(rows[index], support.rows, surface.rows, strict=True):
+            # one component after the other: what is gathered stays in the cache
+            _fill(row[:count], stand, modes[index], soft)
+            _fill(row[count:], touched.take(near[index], axis=0), modes[index], soft)
+    return Push(modes, squares, count, points, rows, masses, centres, guides, strength)
+
+
+def _fill(out: Floats, values: Floats, modes: Floats, soft: int) -> None:
+    """`out` (N, K): what directions do, from what modes do (N, M). The first `soft` are modes themselves."""
+    out[:, :soft] = values[:, :soft]
+    out[:, soft:] = values[:, soft:] @ modes[soft:, soft:]
 
 
 def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -> tuple[Floats, Floats]:
@@ -90,10 +88,13 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     away = ((body.surface.points[around] - contacts[:, None]) ** 2).sum(axis=2)
     patches = body.surface.masses[around] * np.exp(-away / np.square(WIDTHS)[:, None, None])
     patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1)
-    stiff, (batch, count) = body.squares[soft:], around.shape
-    loads = patches @ body.surface.modes[around].reshape(batch, count, -1)
-    loads = loads.reshape(batch, len(WIDTHS), 3, -1).transpose(0, 3, 2, 1)[:, soft:]
-    local = np.linalg.qr(loads.reshape(*loads.shape[:2], -1) / stiff[:, None])[0]
+    stiff, batch = body.squares[soft:], len(around)
+    loads = np.empty((batch, len(stiff), 3, len(WIDTHS)))
+    for load, patch, loaded in zip(loads, patches, around, strict=True):
+        for axis in range(3):
+            load[:, axis] = (patch @ body.surface.rows[axis].take(loaded, axis=0))[:, soft:].T
+    loads = loads.reshape(batch, len(stiff), -1)
+    local = np.linalg.qr(loads / stiff[:, None])[0]
     squares, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))
     modes = np.zeros((batch, len(body.squares), soft + squares.shape[1]))
     modes[:, range(soft), range(soft)] = 1.0

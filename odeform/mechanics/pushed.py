@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State
-from odeform.mechanics.step import Mechanics
+from odeform.mechanics.step import Mechanics, Steps
 from odeform.mechanics.turns import skew
 from odeform.types import Floats, Rotations, Vectors
 
@@ -30,6 +30,10 @@ class PushedBody:
     """One push."""
     pulse: float
 
+    @cached_property
+    def _steps(self) -> Steps:
+        return Steps(self.mechanics, self.push)
+
     @property
     def directions(self) -> int:
         """Number K of directions of deformation."""
@@ -43,7 +47,7 @@ class PushedBody:
     def __call__(self, time: float, state: Floats) -> Floats:
         """The slope of a state (20 + 2 K,) at `time` in s."""
         now = self._unpacked(state, time < self.pulse)
-        return self._slope(now, self.mechanics.slope(now, self.push)[0])
+        return self._slope(now, self._steps.slope(now)[0])
 
     def advance(self, time: float, state: Floats, step: float) -> tuple[Floats, Floats, float]:
         """The state (20 + 2 K,) after `step` seconds, to second order, the slope there, and the error in m.
@@ -60,7 +64,7 @@ class PushedBody:
 
     def _step(self, state: Floats, pushing: bool, step: float) -> tuple[Floats, Floats, float]:
         now = self._unpacked(state, pushing)
-        after, error = self.mechanics.advance(now, self.push, step)
+        after, error = self._steps.advance(now, step)
         slope = self._slope(after, (after.velocity - now.velocity)[0] / step)
         return self._packed(after, state), slope, float(error[0])
 

@@ -1,23 +1,28 @@
-"""One step in time of reduced mechanics: linearly implicit, so that stiff contacts and fast modes do not limit it."""
+"""One step in time of reduced mechanics: linearly implicit, so that stiff contacts and fast modes do not limit it.
+
+It is solved for in axes of the bodies, in which their inertia is constant.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import get_lapack_funcs
 
 from odeform.mechanics.body import ReducedBody
-from odeform.mechanics.contacts import Contacts, floor_contacts, joined, push_contacts
 from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.push import Push
-from odeform.mechanics.state import State, extrapolated
-from odeform.mechanics.turns import skew, turn
+from odeform.mechanics.state import State, apart, extrapolated
+from odeform.mechanics.touching import Near, Touching
+from odeform.mechanics.turns import skew
 from odeform.types import Floats
 
-__all__ = ["Mechanics", "Projectile"]
+__all__ = ["Mechanics", "Projectile", "Steps"]
 
 AHEAD = 0.02  # s: errors of velocities count by how far they carry in that time
+(SOLVE,) = get_lapack_funcs(("posv",), dtype=np.float64)
 SWEEPS = 2  # solves of a step: contacts and friction of the second are those that the first finds
 
 
@@ -33,7 +38,7 @@ class Projectile:
 
 @dataclass(frozen=True, eq=False)
 class Mechanics:
-    """The right-hand side: a body under a law of contact and material, and what it is pushed by."""
+    """A body under a law of contact and material, and what it is pushed by."""
 
     body: ReducedBody
     law: MechanicalLaw
@@ -49,82 +54,103 @@ class Mechanics:
         """Ratio of damping to stiffness, s."""
         return self.law.damping * self.body.solid.damping
 
-    def advance(self, state: State, push: Push, step: float) -> tuple[State, Floats]:
+
+class Steps:
+    """The right-hand side for B pushes, and steps in time."""
+
+    def __init__(self, mechanics: Mechanics, push: Push) -> None:
+        """What all steps share is computed here."""
+        law, solid = mechanics.law, mechanics.body.solid
+        batch, size = push.squares.shape
+        self._solid, self._relaxation, self._forces = solid, mechanics.relaxation, push.forces
+        self._squares, self._preload = law.stiffness * push.squares, mechanics.floor.preload @ push.modes
+        self._masses = np.concatenate([np.full(3, solid.mass), np.zeros(3), np.ones(size), [mechanics.projectile.mass]])
+        self._stiffness = np.zeros((batch, len(self._masses)))
+        self._stiffness[:, 6:-1] = self._squares
+        # mean square displacement of the body by a unit of each coordinate, m^2
+        self._spread = np.full(6 + size, 1.0 / solid.mass)
+        self._spread[:3], self._spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
+        self._touching = {
+            pushed: Touching(push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius)
+            for pushed in (True, False)
+        }
+
+    def advance(self, state: State, step: float) -> tuple[State, Floats]:
         """One step of second order: twice two half steps less a whole one. Also returns its error (B,) in m: how far
         the two half steps are from the whole one."""
-        steps = np.repeat([[step], [0.5 * step]], len(state.shift), axis=0)
-        # the whole step and the first half are one batch
-        whole, half = self._implicit(state.twice(), push.twice, steps).halves()
-        fine = self._implicit(half, push, steps[len(state.shift) :])
-        return extrapolated(whole, fine), self._distance(whole, fine)
+        # the whole step and the first half begin with the same contacts
+        near = self._touching[state.pushed].near(state, step)
+        begun = self._implicit(state, near, np.array([step, 0.5 * step]))
+        whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step])).after(0)
+        between = apart(fine, whole)
+        return extrapolated(whole, fine, between), self._size(between, fine.velocity - whole.velocity)
 
-    def _distance(self, one: State, other: State) -> Floats:
+    def _size(self, between: Floats, speed: Floats) -> Floats:
         """(B,) about the RMS distance in m, now and with the velocities of each `AHEAD` from now."""
-        turned = turn(one.rotation @ other.rotation.transpose(0, 2, 1))
-        at = np.concatenate([one.shift - other.shift, turned, one.modes - other.modes], axis=1)
-        speed = (one.velocity - other.velocity)[:, : one.body]
-        return np.sqrt(((at * at + (AHEAD * AHEAD) * (speed * speed)) * self._squares(one.body)).sum(axis=1))
+        ahead = AHEAD * speed[:, : between.shape[1]]
+        return np.sqrt((between * between + ahead * ahead) @ self._spread)
 
-    def _squares(self, count: int) -> Floats:
-        """(count,) m^2: mean square displacement of the body by a unit of each coordinate."""
-        mass = self.body.solid.mass
-        squares = np.full(count, 1.0 / mass)
-        squares[:3], squares[3:6] = 1.0, np.diag(self.body.solid.inertia) / mass
-        return squares
-
-    def slope(self, state: State, push: Push) -> Floats:
+    def slope(self, state: State) -> Floats:
         """(B, V) accelerations."""
-        still = np.zeros((len(state.shift), 1))
-        matrix, momentum = self._free(state, push, still)
-        # without a step in time, momentum is that of now; one second of forces is added
-        force = self._free(state, push, still + 1.0)[1] - momentum
-        inner = slice(6, state.body)
-        force[:, inner] -= self.relaxation * self.law.stiffness * push.squares * state.velocity[:, inner]
-        contacts = self._contacts(state, push, 0.0)
-        if contacts is not None:
-            pushes = contacts.forces(state.velocity)
-            force += np.einsum("bcin,bci->bn", contacts.jacobian, pushes)
-        return np.linalg.solve(matrix, force[..., None])[..., 0]
+        local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
+        _, rate = self._free(state, local)
+        rate[:, inner] -= self._relaxation * self._squares * local[:, inner]
+        rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
+        matrix = np.zeros((*local.shape, local.shape[1]))
+        self._add_masses(matrix, self._masses[: local.shape[1]])
+        return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
 
-    def _contacts(self, state: State, push: Push, step: float) -> Contacts | None:
-        contacts = floor_contacts(self.body, self.floor, self.law, state, push, step)
-        if not state.pushed:
-            return contacts
-        return joined(contacts, push_contacts(push, self.projectile.radius, self.law, state, step))
-
-    def _implicit(self, state: State, push: Push, step: Float[np.ndarray, "batch 1"]) -> State:
-        """One step of first order."""
-        matrix, momentum = self._free(state, push, step)
-        contacts = self._contacts(state, push, float(step.max()))
-        if contacts is None:
-            return state.moved(np.linalg.solve(matrix, momentum[..., None])[..., 0], step)
-        velocity = state.velocity
+    def _implicit(self, state: State, near: Near, steps: Float[np.ndarray, " steps"]) -> State:
+        """The states (H, B) after one step of first order of each of H lengths in s."""
+        velocity, step = _turned(state.velocity, state.rotation), steps[:, None, None]
+        momentum, rate = self._free(state, velocity)
+        momentum, size = momentum + step * rate, velocity.shape[1]
+        masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]
+        contacts, velocity = near.contacts(state), velocity[None]
         for _ in range(SWEEPS):
-            stiff, impulse = contacts.resistance(velocity, step)
-            velocity = np.linalg.solve(matrix + stiff, (momentum + impulse)[..., None])[..., 0]
-        return state.moved(velocity, step)
+            matrix, impulse = contacts.resistance(velocity, step)
+            self._add_masses(matrix, masses)
+            velocity = _solved(matrix, momentum + impulse)
+        return state.moved(_turned(velocity, state.rotation.swapaxes(-1, -2)), step)
 
-    def _free(self, state: State, push: Push, step: Float[np.ndarray, "batch 1"]) -> tuple[Floats, Floats]:
-        """Matrix (B, V, V) and momentum (B, V) of a step without contacts."""
-        body, law, velocity = self.body, self.law, state.velocity
-        (batch, size), count = velocity.shape, state.body
-        squares = law.stiffness * push.squares
-        masses = np.empty((batch, size))
-        masses[:, :3] = body.solid.mass
-        masses[:, 3:6] = 0.0
-        masses[:, 6:count] = 1.0
-        masses[:, count:] = self.projectile.mass
-        inertia = state.rotation @ body.solid.inertia @ state.rotation.transpose(0, 2, 1)
+    def _free(self, state: State, velocity: Floats) -> tuple[Floats, Floats]:
+        """Momentum (B, V) and its rate without contacts and damping, in axes of the bodies."""
         spin = velocity[:, 3:6]
-        turning = (inertia @ spin[..., None])[..., 0]
-        momentum = masses * velocity
-        momentum[:, 2] -= step[:, 0] * (body.solid.mass * GRAVITY)
-        momentum[:, 3:6] = turning - step * (skew(spin) @ turning[..., None])[..., 0]
-        momentum[:, 6:count] -= step * (squares * state.modes + self.floor.preload @ push.modes)
-        if state.pushed:
-            momentum[:, count:] += step * push.forces
-        masses[:, 6:count] += step * (step + self.relaxation) * squares
-        matrix = np.zeros((batch, size, size))
-        matrix[:, np.arange(size), np.arange(size)] = masses
-        matrix[:, 3:6, 3:6] = inertia
-        return matrix, momentum
+        turning = spin @ self._solid.inertia
+        momentum = self._masses[: velocity.shape[1]] * velocity
+        momentum[:, 3:6] = turning
+        rate = np.empty_like(velocity)
+        rate[:, :3] = -self._solid.mass * GRAVITY * state.rotation[:, 2]
+        rate[:, 3:6] = (turning[:, None] @ skew(spin))[:, 0]
+        rate[:, 6 : state.body] = -self._squares * state.modes - self._preload
+        rate[:, state.body :] = self._forces[:, : int(state.pushed)]
+        return momentum, rate
+
+    def _add_masses(self, matrix: Floats, masses: Floats) -> None:
+        """To matrices (..., V, V): masses (..., V), and inertia."""
+        size = matrix.shape[-1]
+        matrix.reshape(*matrix.shape[:-2], -1)[..., :: size + 1] += masses
+        matrix[..., 3:6, 3:6] += self._solid.inertia
+
+
+def _turned(velocity: Floats, rotation: Floats) -> Floats:
+    """Velocities (..., V) of which shift and spin are turned by the inverse of rotations (..., 3, 3)."""
+    out = velocity.copy()
+    parts = velocity[..., :6].reshape(*velocity.shape[:-1], 2, 3) @ rotation
+    out[..., :6] = parts.reshape(*velocity.shape[:-1], 6)
+    return out
+
+
+def _solved(matrices: Floats, right: Floats) -> Floats:
+    """(..., V) solutions for symmetric positive matrices (..., V, V), which are overwritten; NaN where one is not.
+
+    These are too small for `numpy.linalg.solve`: its checks take longer than the factors.
+    """
+    out, size = np.empty_like(right), right.shape[-1]
+    for matrix, known, found in zip(
+        matrices.reshape(-1, size, size), right.reshape(-1, size), out.reshape(-1, size), strict=True
+    ):
+        _, found[:], failed = SOLVE(matrix.T, known, overwrite_a=True)
+        if failed:
+            found[:] = np.nan
+    return out

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 
 from odeform.mechanics.turns import skew
-from odeform.types import Faces, Floats, Points, Rotations
+from odeform.types import Faces, Floats, Points
 
-__all__ = ["rotations", "surface_turns", "warped"]
+__all__ = ["Turning", "surface_turns"]
 
 SMALL = 1e-9  # rad, in place of 0 / 0
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]  # of each axis, in a cross product
@@ -32,20 +32,30 @@ def surface_turns(points: Points, faces: Faces, shapes: Float[np.ndarray, "point
     return np.linalg.solve(matrix, (gather @ moments.reshape(len(here), -1)).reshape(shapes.shape))
 
 
-def warped(displacement: Floats, turns: Floats) -> Floats:
-    """(..., 3) displacements of points that turn evenly by (..., 3) rad as they move."""
-    squares = (turns * turns).sum(axis=-1, keepdims=True) + SMALL * SMALL
-    angle = np.sqrt(squares)
-    half = np.sin(0.5 * angle) / angle
-    even = (1.0 - np.sin(angle) / angle) / squares
-    once = turns[..., AFTER] * displacement[..., BEFORE] - turns[..., BEFORE] * displacement[..., AFTER]
-    along = (turns * displacement).sum(axis=-1, keepdims=True)
-    return (1.0 - even * squares) * displacement + 2.0 * half * half * once + even * along * turns
+class Turning:
+    """Points that turn evenly by (..., 3, N) rad as they move."""
 
+    def __init__(self, turns: Float[np.ndarray, "*batch 3 points"]) -> None:
+        self._turns = turns
+        self._squares = (turns * turns).sum(axis=-2, keepdims=True) + SMALL * SMALL
+        angle = np.sqrt(self._squares)
+        half = np.sin(0.5 * angle) / angle
+        self._once, self._twice = np.sin(angle) / angle, 2.0 * half * half
 
-def rotations(turns: Floats) -> Rotations:
-    """(..., 3) rotation vectors in rad -> (..., 3, 3)."""
-    angle = (np.sqrt((turns * turns).sum(axis=-1)) + SMALL)[..., None, None]
-    cross = skew(turns)
-    half = np.sin(0.5 * angle) / angle
-    return np.eye(3) + (np.sin(angle) / angle) * cross + (2.0 * half * half) * (cross @ cross)
+    def warped(self, displacement: Float[np.ndarray, "*batch 3 points"]) -> Float[np.ndarray, "*batch 3 points"]:
+        """Where displacements of the modes, which do not turn with the points, take them."""
+        turns, rest = self._turns, 1.0 - self._once
+        cross = turns[..., AFTER, :] * displacement[..., BEFORE, :]
+        cross -= turns[..., BEFORE, :] * displacement[..., AFTER, :]
+        along = (turns * displacement).sum(axis=-2, keepdims=True) * (rest / self._squares)
+        return self._once * displacement + self._twice * cross + along * turns
+
+    @property
+    def rotations(self) -> Float[np.ndarray, "*batch points 3 3"]:
+        """Of each point, once it has moved."""
+        turns = self._turns.swapaxes(-1, -2)
+        once, twice = self._once.swapaxes(-1, -2), self._twice.swapaxes(-1, -2)
+        out = (twice * turns)[..., None] * turns[..., None, :]
+        out += skew(once * turns)
+        out.reshape(*turns.shape[:-1], 9)[..., ::4] += 1.0 - twice * self._squares.swapaxes(-1, -2)
+        return out

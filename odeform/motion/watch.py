@@ -90,8 +90,9 @@ class Watch:
         latest = float(times.max(initial=self._window.start))
         end = self._after_window(latest) if latest > self._window.stop else None
         out = times if end is None else np.where(times > self._window.stop, np.minimum(times, end.time), times)
-        inside = np.flatnonzero((out <= self._window.stop) & (out > self._window.start))
-        wrong = inside[self._faults(out[inside]) != SOUND] if len(inside) else inside
+        inside = (out <= self._window.stop) & (out > self._window.start)
+        # all are evaluated, also those that cannot be wrong: they are what is asked for next
+        wrong = np.flatnonzero(inside & (self._faults(out) != SOUND)) if inside.any() else []
         if len(wrong):
             out = out.copy()
             out[wrong] = [self._last_sound(float(time)).time for time in out[wrong]]

@@ -32,13 +32,17 @@ class _Stepper:
 
     def __init__(self) -> None:
         self._error = np.zeros(1)
+        self._known: StiffField | None = None
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
         """One step from `state` (n,) at `time` in s: the state after it, and the slope there."""
-        if not isinstance(field, StiffField):
-            raise InputError("solver limex: expected the field of a mechanical model")
+        if self._known is None or field is not self._known:
+            # asking a protocol takes as long as several array operations
+            if not isinstance(field, StiffField):
+                raise InputError("solver limex: expected the field of a mechanical model")
+            self._known = field
         with np.errstate(all="ignore"):  # an overflow ends the integration with a status
-            after, slope, error = field.advance(time, state, step)
+            after, slope, error = self._known.advance(time, state, step)
         self._error = np.array([error])
         return after, slope
 

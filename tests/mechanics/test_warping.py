@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from odeform.mechanics.warping import rotations, surface_turns, warped
+from odeform.mechanics.warping import Turning, surface_turns
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-6, 0.3, 2.0])
@@ -13,14 +13,15 @@ def test_a_point_that_turns_evenly_moves_along_an_arc(angle: float) -> None:
     turns = angle * axis / np.linalg.norm(axis, axis=1, keepdims=True)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     way = [Rotation.from_rotvec(0.5 * (s + 1.0) * turns).apply(displacement) for s in nodes]
-    np.testing.assert_allclose(warped(displacement, turns), 0.5 * np.tensordot(weights, way, 1), atol=1e-12)
+    found = Turning(turns.T).warped(displacement.T).T
+    np.testing.assert_allclose(found, 0.5 * np.tensordot(weights, way, 1), atol=1e-12)
 
 
 def test_rotations() -> None:
     turns = np.random.default_rng(0).normal(size=(4, 5, 3))
     expected = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(4, 5, 3, 3)
-    np.testing.assert_allclose(rotations(turns), expected, atol=1e-8)
-    np.testing.assert_array_equal(rotations(np.zeros((2, 3))), np.broadcast_to(np.eye(3), (2, 3, 3)))
+    np.testing.assert_allclose(Turning(turns.swapaxes(1, 2)).rotations, expected, atol=1e-8)
+    np.testing.assert_array_equal(Turning(np.zeros((3, 2))).rotations, np.broadcast_to(np.eye(3), (2, 3, 3)))
 
 
 def test_the_turns_of_a_surface_that_turns_as_a_whole_are_that_turn() -> None:

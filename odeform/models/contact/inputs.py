@@ -1,6 +1,7 @@
 """What a regression knows of a push at a point of a body: contact, normal, force and torque, in several frames."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -36,8 +37,30 @@ class ContactInputs:
     normal: Rows
     force: Rows
 
+    @cached_property
+    def _in_frames(self) -> dict[str, tuple[Rotations, list[Floats], Rows]]:
+        """Rotations and features in the frames asked for so far: several regressions ask for the same."""
+        return {}
+
     def frames(self, frame: str) -> Rotations:
         """(S, 3, 3) rotations from the axes of the body to those of one of `FRAMES`."""
+        return self._in(frame)[0]
+
+    def features(self, frame: str) -> tuple[list[Floats], Rows]:
+        """Groups of inputs (S, n), and the force (S, 3) in that frame.
+
+        In the body's own axes these are contact and force alone, else contact, normal, force, its part along the normal
+        and its torque about the centre of mass.
+        """
+        return self._in(frame)[1:]
+
+    def _in(self, frame: str) -> tuple[Rotations, list[Floats], Rows]:
+        if frame not in self._in_frames:
+            turn = self._turns(frame)
+            self._in_frames[frame] = (turn, *self._features(frame, turn))
+        return self._in_frames[frame]
+
+    def _turns(self, frame: str) -> Rotations:
         if frame == "body":
             return np.broadcast_to(np.eye(3), (len(self.contact), 3, 3))
         if frame == "azimuth":
@@ -46,15 +69,9 @@ class ContactInputs:
         across = _unit(np.cross(UP, self.normal), np.array([0.0, 1.0, 0.0]))
         return np.stack([self.normal, across, np.cross(self.normal, across)], axis=1)
 
-    def features(self, frame: str) -> tuple[list[Floats], Rows]:
-        """Groups of inputs (S, n), and the force (S, 3) in that frame.
-
-        In the body's own axes these are contact and force alone, else contact, normal, force, its part along the normal
-        and its torque about the centre of mass.
-        """
+    def _features(self, frame: str, turn: Rotations) -> tuple[list[Floats], Rows]:
         if frame == "body":
             return [self.contact, self.force], self.force
-        turn = self.frames(frame)
         force = np.einsum("sij,sj->si", turn, self.force)
         torque = np.einsum("sij,sj->si", turn, np.cross(self.contact, self.force))
         inward = (self.force * self.normal).sum(axis=1, keepdims=True)

@@ -1,0 +1,138 @@
+"""Where bodies of a batch touch the floor, and the projectiles that push them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.mechanics.contacts import Contacts
+from odeform.mechanics.floor import Floor
+from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.push import Push
+from odeform.mechanics.state import State
+from odeform.mechanics.turns import skew
+from odeform.mechanics.warping import Turning
+from odeform.types import Floats, Ints, Rotations
+
+__all__ = ["Near", "Touching"]
+
+MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
+FLOOR, PUSH = 64, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
+UP_FIRST = [2, 0, 1]  # the scene's axes, as those of contacts with the floor
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """C samples of each of B bodies that may touch something in a step: the first F the floor, the others a sphere."""
+
+    push: Push
+    radius: float
+    """m, of the spheres."""
+    points: Float[np.ndarray, "batch 3 contacts"]
+    """m at rest, from the mass centre."""
+    rows: Float[np.ndarray, "batch 6 contacts directions"]
+    """What the directions of deformation do there, as in `Push`."""
+    level: Float[np.ndarray, "batch floor"]
+    """m, as in `Floor`."""
+    springs: Float[np.ndarray, "4 batch contacts"]
+    """As of `Contacts`."""
+
+    def contacts(self, state: State) -> Contacts:
+        """Linearised about a state, in axes of the bodies, in which samples need no rotation."""
+        turning, place = _bent(self.points, self.rows, state)
+        floor, at_sphere = self.level.shape[1], place[..., self.level.shape[1] :]
+        axes = np.empty((len(place), place.shape[2], 3, 3))
+        gap = np.empty((len(place), place.shape[2]))
+        gap[:, :floor] = _heights(place[..., :floor], self.level, state)
+        axes[:, :floor] = state.rotation[:, None, UP_FIRST]
+        if state.pushed:
+            away = at_sphere - _centre(self.push, state)
+            distance = np.sqrt((away * away).sum(axis=1))
+            gap[:, floor:] = distance - self.radius
+            axes[:, floor:] = _axes((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
+        out = np.empty((*axes.shape[:3], state.velocity.shape[1]))
+        out[..., :3] = axes
+        np.matmul(axes, skew(-place.swapaxes(1, 2)), out=out[..., 3:6])
+        np.matmul(axes @ turning.rotations, self.rows[:, :3].swapaxes(1, 2), out=out[..., 6 : state.body])
+        if state.pushed:
+            out[:, :floor, :, -1] = 0.0
+            guides = self.push.guides[:, None] @ state.rotation
+            np.matmul(axes[:, floor:], -guides[..., None], out=out[:, floor:, :, state.body :])
+        return Contacts(out, gap, *self.springs)
+
+
+class Touching:
+    """Finds where B pushed bodies may touch something."""
+
+    def __init__(self, push: Push, floor: Floor, law: MechanicalLaw, radius: float) -> None:
+        """Spheres of `radius` m push for as long as states hold them."""
+        self._push, self._law, self._radius, self._level = push, law, radius, floor.level
+        batch, _, samples = push.points.shape
+        self._springs = np.empty((4, batch, samples))
+        stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
+        mass = push.masses[:, push.support :]
+        stands[0], stands[1], stands[2] = floor.stiffness, law.floor_damping, law.floor_friction
+        stands[3] = law.floor_grip * push.masses[:, : push.support]
+        pushed[0], pushed[1], pushed[2] = law.push_stiffness * mass, law.push_damping, law.push_friction
+        pushed[3] = law.push_grip * mass
+        self._first = samples * np.arange(batch)[:, None]  # of each body, among all samples
+        self._row = samples * np.arange(6)[:, None]
+
+    def near(self, state: State, step: float) -> Near:
+        """The samples that may touch something in a step of `step` seconds, and some more. There may be none."""
+        push = self._push
+        _, place = _bent(push.points, push.rows, state)
+        height = _heights(place[..., : push.support], self._level, state)
+        down = min(float(state.velocity[:, 2].min()), 0.0)
+        chosen = stand = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
+        if state.pushed:
+            away = place[..., push.support :] - _centre(push, state)
+            distance = np.sqrt((away * away).sum(axis=1))
+            speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
+            way = (2.0 * step + self._law.push_damping) * float(np.sqrt((speed * speed).sum(axis=1).max()))
+            pushed = push.support + _nearest(distance, self._radius + MARGIN + way, PUSH)
+            chosen = np.concatenate([stand, pushed], axis=1)
+        return Near(
+            push,
+            self._radius,
+            push.points.ravel().take((3 * self._first + chosen)[:, None] + self._row[:3]),
+            push.rows.reshape(-1, push.rows.shape[-1]).take((6 * self._first + chosen)[:, None] + self._row, axis=0),
+            self._level.take(stand),
+            self._springs.reshape(4, -1).take(self._first + chosen, axis=1),
+        )
+
+
+def _bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
+    """How much samples turn, and where they are, in m from the mass centre."""
+    batch, _, samples, size = rows.shape
+    motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)
+    turning = Turning(motion[:, 3:])
+    return turning, points + turning.warped(motion[:, :3])
+
+
+def _heights(place: Floats, level: Floats, state: State) -> Float[np.ndarray, "batch samples"]:
+    """m above the floor."""
+    return (state.rotation[:, 2:] @ place)[:, 0] + (state.shift[:, 2:] + level)
+
+
+def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
+    """m, of the spheres, from the mass centres."""
+    place = push.centres + state.projectile * push.guides - state.shift
+    return state.rotation.swapaxes(1, 2) @ place[..., None]
+
+
+def _nearest(gap: Floats, margin: float, most: int) -> Ints:
+    """(B, C) the samples with the smallest gaps, as many as the motion with the most below `margin` has, or `most`."""
+    count = min(int(np.count_nonzero(gap < margin, axis=1).max()), most)
+    return np.argpartition(gap, max(count, 1) - 1, axis=1)[:, :count]
+
+
+def _axes(normals: Float[np.ndarray, "*batch 3"]) -> Rotations:
+    """(..., 3, 3) orthonormal rows of which the first is the normal: a reflection that carries it to an axis."""
+    sign = np.copysign(1.0, normals[..., 0])
+    half = normals.copy()
+    half[..., 0] += sign
+    scale = sign / np.abs(half[..., 0])
+    out = (scale[..., None] * half)[..., None] * half[..., None, :]
+    out.reshape(*sign.shape, 9)[..., ::4] -= sign[..., None]
+    return out
