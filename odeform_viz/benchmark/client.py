@@ -15,6 +15,7 @@ import numpy as np
 import viser
 import zstandard
 from PIL import Image
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 __all__ = ["Control", "LoopbackClient"]
@@ -103,6 +104,10 @@ class LoopbackClient:
         """Cut the connection without a word, as a killed browser does."""
         with contextlib.suppress(OSError):
             self._socket.socket.shutdown(socket.SHUT_RDWR)
+        # websockets takes it for an error if it is closed while data that has arrived is still being read
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                self._socket.recv()
         self._socket.close()
 
     def _send(self, kind: str, **content: Any) -> None:
