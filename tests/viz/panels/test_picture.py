@@ -1,0 +1,29 @@
+"""Pictures and films; `test_page_downloads` takes them in a browser."""
+
+from typing import Any
+
+import pytest
+import viser
+
+from odeform_viz.app import App
+from odeform_viz.benchmark.client import LoopbackClient
+from odeform_viz.panels.picture import PicturePanel
+
+
+@pytest.mark.parametrize("control", ["Screenshot (.png)", "Film (.webp)"])
+def test_whoever_has_a_picture_can_ask_for_the_next_at_once(
+    stubbed: tuple[App, LoopbackClient], monkeypatch: pytest.MonkeyPatch, control: str
+) -> None:
+    app, client = stubbed
+    panel, answered = app.panel(PicturePanel), []
+    send = viser.ClientHandle.send_file_download
+
+    def sent(handle: viser.ClientHandle, *file: Any, **how: Any) -> None:
+        panel._run(handle, lambda _: answered.append(file[0]))
+        send(handle, *file, **how)
+
+    monkeypatch.setattr(viser.ClientHandle, "send_file_download", sent)
+    client.click(control)
+    name = "screenshot.png" if control.startswith("Screenshot") else "motion.webp"
+    assert client.until(lambda: client.downloaded(name) is not None)
+    assert answered == [name]
