@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 import viser
 
@@ -62,3 +63,13 @@ def test_a_connection_is_cut_without_a_word_while_data_arrives(
         client.vanish()
     assert not connection.recv_events_thread.is_alive()
     assert caplog.text == ""
+
+
+def test_controls_keep_no_messages(server: viser.ViserServer) -> None:
+    plot = server.gui.add_uplot((np.arange(3.0), np.arange(3.0)), ({}, {"label": "plotted"}), title="plot")
+    with LoopbackClient(server.get_port()) as client:
+        control = client._controls[plot._impl.uuid]
+        assert all(column.base is None for column in control.props["data"])
+        plot.data = (np.arange(4.0), np.arange(4.0))
+        assert client.until(lambda: len(control.props["data"][0]) == 4)
+        assert all(column.base is None for column in control.props["data"])
