@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import Future
 
 import numpy as np
 import viser
@@ -118,5 +119,23 @@ class PicturePanel(Panel):
 
 def _draw(client: viser.ClientHandle, width: int, height: int) -> Picture:
     # coloured meshes are decoded by the browser while it goes on: the first picture may show the one before
-    client.get_render(16, 16, timeout=TIMEOUT)
-    return np.asarray(client.get_render(height, width, timeout=TIMEOUT))[..., :3]
+    _render(client, 16, 16)
+    return _render(client, width, height)
+
+
+def _render(client: viser.ClientHandle, width: int, height: int) -> Picture:
+    """What the browser draws. `InputError` if it takes too long; viser's own limit is one of the wall clock, which may
+    jump."""
+    drawn: Future[Picture] = Future()
+
+    def render() -> None:
+        try:
+            drawn.set_result(np.asarray(client.get_render(height, width))[..., :3])
+        except Exception as error:
+            drawn.set_exception(error)
+
+    threading.Thread(target=render, name="odeform-picture", daemon=True).start()
+    try:
+        return drawn.result(TIMEOUT)
+    except TimeoutError:
+        raise InputError(f"the browser has drawn nothing within {TIMEOUT:g} s") from None
