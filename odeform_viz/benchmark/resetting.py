@@ -11,7 +11,7 @@ from odeform_viz.columns import Column
 __all__ = ["moment_of", "reset"]
 
 LATEST = 0.3  # s; bundled scenes with an impact are deformed then
-DRAWN = {"colour by": "own colours", "exaggerate": 1.0, "ghost": False, "wireframe": False}  # for the vertices
+SETTINGS = {"colour by": "own colours", "exaggerate": 1.0, "ghost": False, "wireframe": False, "loop": True}
 ENDINGS = ("Cancel", "Cancel the fit", "Cancel the film", "Stop recording")
 BACK = ("Back to the trained body", "Back to the trained bodies")
 DEADLINE = 120.0  # s, for a busy machine
@@ -40,7 +40,7 @@ def reset(visitors: Visitors, rest: float = 3.0) -> None:
         for label in (*ENDINGS, *BACK):
             if label in client.controls and client.controls[label].visible:
                 client.click(label)
-        for label, value in {**DRAWN, **_defaults(app)}.items():
+        for label, value in {**SETTINGS, **_defaults(app)}.items():
             if label in client.controls:
                 client.set(label, value)
         first = next(c for c in app.columns.all if c.predictor and c.pinned is None)

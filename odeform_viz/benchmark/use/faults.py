@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from odeform_viz.benchmark.client import DEADLINE
 from odeform_viz.benchmark.use.fits import CANCEL, STEP, choose_truth
 from odeform_viz.benchmark.use.fits import START as FIT
 from odeform_viz.benchmark.use.recordings import stop_recording
@@ -16,7 +17,8 @@ from odeform_viz.panels.truth import NONE
 __all__ = ["fill_disk", "kill_fit", "kill_simulator", "set_clock"]
 
 KILLED = "the process was ended by SIGKILL"
-FULL = 100_000  # bytes in a file, from which on the disk counts as full
+FULL = "can no longer be written (File too large"
+ROOM = 100_000  # bytes in a file, from which on the disk counts as full
 JUMPS = (-1e7, -3600.0, 0.0, 3600.0, 1e9)  # s
 
 
@@ -51,8 +53,11 @@ def fill_disk(visitors: Visitors) -> None:
         visitors.first.set("file", path.name)
         visitors.first.click("Start recording")
         visitors.expect_control("Stop recording")
-        visitors.first.click("Play")
-        _expect_text(visitors, "can no longer be written (File too large")
+        # a recording is written while there are frames
+        end = time.monotonic() + DEADLINE
+        while not _says(visitors, FULL) and time.monotonic() < end:
+            visitors.drag(visitors.second, 5)
+        _expect_text(visitors, FULL)
         visitors.drag(visitors.second, 5)
     visitors.expect_control("Start recording")
     path.unlink()
@@ -66,16 +71,20 @@ def set_clock(visitors: Visitors) -> None:
         visitors.first.set("file", path.name)
         visitors.first.click("Start recording")
         visitors.expect_control("Stop recording")
-        visitors.first.click("Play")
         visitors.drag(visitors.second, 10)
         began = visitors.app.clock.time()
+        visitors.first.click("Play")
         visitors.expect("time to go on", lambda: visitors.app.clock.time() != began)
         stop_recording(visitors)
     path.unlink()
 
 
 def _expect_text(visitors: Visitors, part: str) -> None:
-    visitors.expect(f"{part!r} in all browsers", lambda: all(part in client.text() for client in visitors.clients))
+    visitors.expect(f"{part!r} in all browsers", lambda: _says(visitors, part))
+
+
+def _says(visitors: Visitors, part: str) -> bool:
+    return all(part in client.text() for client in visitors.clients)
 
 
 def _kill_processes() -> None:
@@ -85,11 +94,11 @@ def _kill_processes() -> None:
 
 @contextmanager
 def _full_disk() -> Iterator[None]:
-    """No file of this process may grow beyond `FULL`: the same error to a program as that of a full disk."""
+    """No file of this process may grow beyond `ROOM`: the same error to a program as that of a full disk."""
     import resource  # there is none on Windows
 
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (FULL, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
     try:
         yield
     finally:
