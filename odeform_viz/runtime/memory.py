@@ -7,14 +7,20 @@ import threading
 
 __all__ = ["Tidier", "share_arenas"]
 
-M_ARENA_MAX = -8  # option of mallopt
+M_MMAP_THRESHOLD, M_ARENA_MAX = -3, -8  # options of mallopt
+LARGE = 1 << 20  # bytes
 DELAY = 2.0  # s
 
 
 def share_arenas(count: int = 2) -> None:
-    """Let threads started later share `count` malloc arenas (glibc): each of viser's many would keep its own."""
+    """Let threads started later share `count` malloc arenas (glibc): each of viser's many would keep its own.
+
+    Arrays from a megabyte on stay out of them. By default that limit grows to 32 MB as such arrays are freed, and small
+    blocks that last then keep the space around them.
+    """
     if (libc := _glibc()) is not None:
         libc.mallopt(M_ARENA_MAX, count)
+        libc.mallopt(M_MMAP_THRESHOLD, LARGE)
 
 
 class Tidier:
