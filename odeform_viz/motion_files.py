@@ -41,11 +41,14 @@ def write_rrd(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape | 
     with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
         path = Path(folder) / "motion.rrd"
         recorder = Recorder(path)
-        for frame in _frames(motion, times, fit):
-            recorder.log(frame)
-        for note in caveats(motion, times):
-            recorder.note(note)
-        recorder.close()
+        try:
+            for frame in _frames(motion, times, fit):
+                recorder.log(frame)
+            for note in caveats(motion, times):
+                recorder.note(note)
+            recorder.close()
+        finally:
+            recorder.abandon()  # if a frame could not be logged
         with path.open("rb") as whole:
             shutil.copyfileobj(whole, file)
 

@@ -9,7 +9,16 @@ from odeform.errors import InputError
 from odeform_viz.coloring.colorist import Colorist
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import Session
-from odeform_viz.view import Coloring, ColorScale, Description, DisplayOptions, Frame, ViewRequest, same_motions
+from odeform_viz.view import (
+    COLOR_BY,
+    Coloring,
+    ColorScale,
+    Description,
+    DisplayOptions,
+    Frame,
+    ViewRequest,
+    same_motions,
+)
 
 __all__ = ["Output", "Presenter", "Recording"]
 
@@ -125,7 +134,7 @@ class Presenter:
 
     def _show(self, frame: Frame, options: DisplayOptions) -> None:
         # columns in one place are told apart by their own colours
-        coloring = None if options.overlay else self._colorist.color(frame, options.color_by)
+        coloring = self._colorist.color(frame, COLOR_BY[0] if options.overlay else options.color_by)
         self.scale = coloring.scale if coloring else None
         self._settled = self.frame is not None and same_motions(frame, self.frame)
         self._output.publish(frame, options, coloring)

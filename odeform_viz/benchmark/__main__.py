@@ -117,7 +117,7 @@ def _soak(models: list[Predictor], truth: Column | None, requests: int, minutes:
     with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
         app = App([*columns, truth] if truth is not None else columns, port=0, workspace=folder)
         try:
-            result = soak(app, requests, Path(folder), minutes=minutes)
+            result = soak(app, requests, Path(folder), minutes=minutes, report=lambda line: print(line, flush=True))
         finally:
             app.close()
     print(f"{result.requests} requests in {result.wall_s:.0f} s, {result.refused} refused, {len(result.errors)} errors")

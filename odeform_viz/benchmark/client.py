@@ -15,6 +15,7 @@ import numpy as np
 import viser
 import zstandard
 from PIL import Image
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 __all__ = ["Control", "LoopbackClient"]
@@ -103,6 +104,10 @@ class LoopbackClient:
         """Cut the connection without a word, as a killed browser does."""
         with contextlib.suppress(OSError):
             self._socket.socket.shutdown(socket.SHUT_RDWR)
+        # websockets takes it for an error if it is closed while data that has arrived is still being read
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                self._socket.recv()
         self._socket.close()
 
     def _send(self, kind: str, **content: Any) -> None:
@@ -204,7 +209,7 @@ class LoopbackClient:
             self._send("GetRenderResponseMessage", payload=picture.getvalue(), render_uuid=message["render_uuid"])
         elif kind.startswith("Gui") and props:
             name = kind.removeprefix("Gui").removesuffix("Message")
-            self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), props)
+            self._controls[message["uuid"]] = Control(message["uuid"], name, message.get("value"), _copied(props))
         elif "name" in message and "props" in message:
             self.nodes.add(message["name"])
 
@@ -212,7 +217,7 @@ class LoopbackClient:
         control = self._controls.get(changed)
         if control is not None:
             control.value = updates.get("value", control.value)
-            control.props.update({name: value for name, value in updates.items() if name in control.props})
+            control.props.update({name: _copied(value) for name, value in updates.items() if name in control.props})
 
     def downloaded(self, suffix: str) -> bytes | None:
         """The first complete download whose name ends in `suffix`."""
@@ -243,6 +248,15 @@ class LoopbackClient:
                 if message.get("name") == node and prop in message.get("updates", {}):
                     return message["updates"][prop]
         return None
+
+
+def _copied(value: Any) -> Any:
+    """The same, whose arrays are no longer part of a message, which they would keep as a whole."""
+    if isinstance(value, dict):
+        return {key: _copied(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_copied(item) for item in value]
+    return value.copy() if isinstance(value, np.ndarray) else value
 
 
 def _decode(raw: bytes) -> list[dict[str, Any]]:

@@ -1,5 +1,7 @@
 """Brings the page back to one model with default parameters, so that what follows can be compared."""
 
+import sys
+import threading
 import time
 
 from odeform.errors import InputError
@@ -8,13 +10,14 @@ from odeform_viz.app import App
 from odeform_viz.benchmark.visitors import Visitors
 from odeform_viz.columns import Column
 
-__all__ = ["moment_of", "reset"]
+__all__ = ["are_callbacks_done", "moment_of", "reset"]
 
 LATEST = 0.3  # s; bundled scenes with an impact are deformed then
-DRAWN = {"colour by": "own colours", "exaggerate": 1.0, "ghost": False, "wireframe": False}  # for the vertices
+SETTINGS = {"colour by": "own colours", "exaggerate": 1.0, "ghost": False, "wireframe": False, "loop": True}
 ENDINGS = ("Cancel", "Cancel the fit", "Cancel the film", "Stop recording")
 BACK = ("Back to the trained body", "Back to the trained bodies")
 DEADLINE = 120.0  # s, for a busy machine
+POOLS = ("ThreadPoolExecutor-", "asyncio_")  # names of the threads that callbacks run in
 
 
 def moment_of(app: App) -> float:
@@ -32,7 +35,7 @@ def reset(visitors: Visitors, rest: float = 3.0) -> None:
     end, turn = time.monotonic() + DEADLINE, rest / 3.0
     while time.monotonic() < end:
         visitors.collect(turn)
-        rested = rested + turn if _is_reset(app) else 0.0
+        rested = rested + turn if are_callbacks_done() and _is_reset(app) else 0.0
         if rested >= rest - 1e-9:
             return
         if rested:
@@ -40,7 +43,7 @@ def reset(visitors: Visitors, rest: float = 3.0) -> None:
         for label in (*ENDINGS, *BACK):
             if label in client.controls and client.controls[label].visible:
                 client.click(label)
-        for label, value in {**DRAWN, **_defaults(app)}.items():
+        for label, value in {**SETTINGS, **_defaults(app)}.items():
             if label in client.controls:
                 client.set(label, value)
         first = next(c for c in app.columns.all if c.predictor and c.pinned is None)
@@ -75,6 +78,13 @@ def _is_reset(app: App) -> bool:
         and request.quality == "balanced"
         and request.parameters == _default_parameters(app, columns[0])
     )
+
+
+def are_callbacks_done() -> bool:
+    """Whether no callback of the page is running or waits for another: what was clicked would happen later."""
+    frames = sys._current_frames()
+    pooled = [frames.get(t.ident or 0) for t in threading.enumerate() if t.name.startswith(POOLS)]
+    return all(frame is None or frame.f_code.co_name == "_worker" for frame in pooled)
 
 
 def _is_plain(column: Column) -> bool:

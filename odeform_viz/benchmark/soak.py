@@ -5,7 +5,7 @@ import io
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,10 +74,12 @@ def soak(
     parts: int = 10,
     minutes: float | None = None,
     seed: int = 0,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Soak:
     """Send `requests` random inputs to an app at `rate` Hz, in `parts`, each followed by all scripts in random order.
 
     With `minutes`, parts of the same size are sent until that time is over. `folder` is the workspace of the app.
+    `report` is called with a line about each part.
     """
     rng, begin = np.random.default_rng(seed), time.monotonic()
     port, newest, resident = app.server.get_port(), [], []
@@ -97,6 +99,8 @@ def soak(
                 client.downloads.clear()  # memory of the client, not of the viewer
             visitors.collect(REST)  # in which the viewer returns what it has freed
             resident.append(_resident_mb())
+            line = f"{time.monotonic() - begin:.0f} s: {resident[-1]:.0f} MB, newest frame after {newest[-1]:.2f} s"
+            report("; ".join([line, *missed]))
         refused = len(first.notifications)
         sent = visitors.sent + first.sent + second.sent
     return Soak(sent, refused, tuple(errors), tuple(newest), tuple(resident), time.monotonic() - begin)

@@ -15,7 +15,10 @@ USED = 0.99  # quantile of the values that the scale reaches: single vertices do
 
 
 class Colorist:
-    """Computes the values, and fits one scale to all visible columns. It keeps what depends on shapes alone."""
+    """Computes the values, and fits one scale to all visible columns.
+
+    It keeps what depends on shapes alone, as long as frames have these columns and this truth.
+    """
 
     def __init__(self) -> None:
         self._fitter = ScaleFitter()
@@ -24,11 +27,18 @@ class Colorist:
 
     def color(self, frame: Frame, quantity: str) -> Coloring | None:
         """The values of each column; None where no visible column has any, as for errors without a truth."""
+        self._forget(frame)
         values = {c.column.key: found for c in frame.columns if (found := self._values(c, frame, quantity)) is not None}
         if not values:
             return None
         largest = max(float(np.quantile(found, USED)) for found in values.values())
         return Coloring(self._fitter.fit(quantity, largest), values)
+
+    def _forget(self, frame: Frame) -> None:
+        """Forget what belongs to columns or a truth that a frame does not have: whole sequences would be kept."""
+        keys, truth = {column.key for column in frame.request.columns}, frame.truth.motion if frame.truth else None
+        self._strains = {key: known for key, known in self._strains.items() if key in keys}
+        self._carried = {key: known for key, known in self._carried.items() if key in keys and known[0] is truth}
 
     def _values(self, shown: ColumnFrame, frame: Frame, quantity: str) -> Perpoint | None:
         rest = shown.column.geometry

@@ -86,6 +86,8 @@ class RecordingControl:
                 print(f"error: {error}", file=sys.stderr)
 
     def _fail(self, error: InputError) -> None:
+        if self._recorder is not None:  # a frame that cannot be logged has not ended it
+            self._recorder.abandon()
         self._recorder = self._requested = None
         self.report(RecordingStatus("failed", error=str(error)))
         # a user who started it from the command line may not have its tab open

@@ -21,6 +21,7 @@ from odeform_viz.recording.entities import END, FORMAT, FRAME, HEADER, REQUEST, 
 from odeform_viz.recording.logged_column import LoggedColumn
 from odeform_viz.recording.provenance import versions
 from odeform_viz.recording.shown_points import ShownBudget
+from odeform_viz.recording.streams import end_unused_streams, send_blueprint
 from odeform_viz.recording.surroundings import log_surroundings
 from odeform_viz.view import Frame
 
@@ -42,6 +43,7 @@ class Recorder:
         self._still: Geometry | None = None
         self._budget = ShownBudget()
         self._file = self._open()
+        end_unused_streams()  # those of earlier recordings
         # fewer, longer chunks than by default: each takes a kilobyte in the file and, until the end, in memory
         batches = rr.ChunkBatcherConfig(flush_tick=FLUSH)
         self._stream = rr.RecordingStream("odeform", recording_id=uuid.uuid4(), batcher_config=batches)
@@ -70,7 +72,7 @@ class Recorder:
         known = list(self._columns.values())
         visible = [(self._column(shown.column), shown) for shown in frame.columns]
         if list(self._columns.values()) != known:
-            self._stream.send_blueprint(make_blueprint(self._columns.values()), make_default=True)
+            send_blueprint(self._stream, make_blueprint(self._columns.values()))
         self._clear_hidden({logged.name: logged for logged, _ in visible})
         if self.frames == 0 or frame.still is not self._still:
             self._still = frame.still
@@ -96,6 +98,13 @@ class Recorder:
         self._write_taken()
         self._write(self._drain.close())
         self._file.close()
+
+    def abandon(self) -> None:
+        """End the recording with the last message that was written as a whole, unless it has ended."""
+        self._drain.close()
+        if not self._file.closed:
+            with self._file, contextlib.suppress(OSError):
+                self._file.truncate(self._written)
 
     def _column(self, column: Column) -> LoggedColumn:
         """The column with its current shape; a new shape starts a new entity."""
@@ -144,9 +153,8 @@ class Recorder:
 
     def _ended(self, reason: str) -> InputError:
         """End the recording with the last message that was written as a whole; the error to raise."""
-        self._drain.close()
-        with self._file, contextlib.suppress(OSError):
-            self._file.truncate(self._written)
+        self.abandon()
+        with contextlib.suppress(OSError):
             free = shutil.disk_usage(self.path.parent).free >> 20
             reason += f", {free:,} MiB free"
         kept = f"it holds the first {self._written_frames} frames" if self._written_frames else "it holds no frame"

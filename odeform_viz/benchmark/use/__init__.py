@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from odeform_viz.benchmark.use.columns import compare
 from odeform_viz.benchmark.use.downloads import export, take_pictures
+from odeform_viz.benchmark.use.faults import fill_disk, kill_fit, kill_simulator, set_clock
 from odeform_viz.benchmark.use.fits import fit
 from odeform_viz.benchmark.use.recordings import record
 from odeform_viz.benchmark.use.shapes import load_shapes
@@ -24,4 +25,8 @@ SCRIPTS: tuple[tuple[Callable[[Visitors], None], str], ...] = (
     (simulate, "Simulate this"),
     (save_and_restore, "Save state"),
     (come_and_go, "time (s)"),
+    (kill_simulator, "Simulate this"),
+    (kill_fit, "Fit to the truth"),
+    (fill_disk, "Start recording"),
+    (set_clock, "Start recording"),
 )

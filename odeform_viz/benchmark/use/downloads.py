@@ -19,6 +19,7 @@ def export(visitors: Visitors) -> None:
     client = visitors.first
     formats = client.controls["format"].props["options"]
     visitors.allow(OUTSIDE)
+    client.downloads.clear()  # an earlier file would be taken for one of these
     for label in visitors.rng.permutation(formats)[:AT_ONCE]:
         client.set("format", str(label))
         client.click("Download")
@@ -28,6 +29,7 @@ def export(visitors: Visitors) -> None:
 
 def take_pictures(visitors: Visitors) -> None:
     """A screenshot, a film that is cancelled, and one whose browser closes."""
+    visitors.first.downloads.clear()  # an earlier screenshot would be taken for this one
     visitors.first.click("Screenshot (.png)")
     _expect_download(visitors, "screenshot.png")
     with _slowly(visitors.first) as client:

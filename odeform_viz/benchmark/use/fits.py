@@ -3,7 +3,7 @@
 from odeform_viz.benchmark.visitors import Visitors
 from odeform_viz.panels.truth import NONE
 
-__all__ = ["fit"]
+__all__ = ["choose_truth", "fit"]
 
 START, CANCEL, USE = "Fit to the truth", "Cancel the fit", "Set sliders to the estimate"
 DONE, STEP = "Misfit", "misfit"  # in the text of the panel
@@ -12,7 +12,7 @@ DONE, STEP = "Misfit", "misfit"  # in the text of the panel
 def fit(visitors: Visitors) -> None:
     """Fit a test sequence; see the description of this module."""
     app, client = visitors.app, visitors.first
-    _choose(visitors)
+    choose_truth(visitors)
     with visitors.another() as other:
         other.click(START)
         visitors.expect_control(CANCEL)
@@ -22,7 +22,7 @@ def fit(visitors: Visitors) -> None:
     client.click(USE)
     estimate = next(c.pinned for c in reversed(app.columns.all) if c.pinned is not None)
     visitors.expect("sliders at the estimate", lambda: _near(app.request().parameters, estimate))
-    for leave in (lambda: _choose(visitors), lambda: visitors.second.click(CANCEL)):
+    for leave in (lambda: choose_truth(visitors), lambda: visitors.second.click(CANCEL)):
         visitors.expect_control(START)
         client.click(START)
         visitors.expect("steps of a fit", lambda: STEP in client.text())
@@ -31,7 +31,7 @@ def fit(visitors: Visitors) -> None:
     client.set("test sequence", NONE)
 
 
-def _choose(visitors: Visitors) -> None:
+def choose_truth(visitors: Visitors) -> None:
     """Another sequence than the present one."""
     control = visitors.first.controls["test sequence"]
     others = [option for option in control.props["options"] if option not in (NONE, control.value)]

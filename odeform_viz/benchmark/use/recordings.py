@@ -7,7 +7,7 @@ import tempfile
 from odeform_viz.benchmark.client import DEADLINE
 from odeform_viz.benchmark.visitors import Missed, Visitors
 
-__all__ = ["record"]
+__all__ = ["record", "stop_recording"]
 
 
 def record(visitors: Visitors) -> None:
@@ -22,9 +22,7 @@ def record(visitors: Visitors) -> None:
     visitors.drag(visitors.second, 20)
     visitors.first.click("Play")
     visitors.collect(1.0)
-    visitors.first.click("Stop recording")
-    visitors.expect_control("Start recording")
-    visitors.expect("the end of the recording", lambda: not visitors.app.recording.active)
+    stop_recording(visitors)
     with tempfile.TemporaryFile("w+") as output:
         command = [sys.executable, "-m", "odeform_viz.start", "--replay", str(path)]
         with subprocess.Popen(command, stdout=output, stderr=output, text=True) as process:
@@ -36,3 +34,10 @@ def record(visitors: Visitors) -> None:
             output.seek(0)
             raise Missed(f"a replay ended with exit code {process.returncode}: {output.read()[-500:]}")
     path.unlink()
+
+
+def stop_recording(visitors: Visitors) -> None:
+    """Stop it, and wait for its end."""
+    visitors.first.click("Stop recording")
+    visitors.expect_control("Start recording")
+    visitors.expect("the end of the recording", lambda: not visitors.app.recording.active)

@@ -30,13 +30,15 @@ def test_random_input_to_all_panels_breaks_nothing(
         truth_column("mass-elastic/mass-elastic_00001"),
     ]
     app = App(columns, port=0, workspace=tmp_path)
+    lines: list[str] = []
     try:
-        result = soak(app, 200, tmp_path, parts=1)
+        result = soak(app, 200, tmp_path, parts=1, report=lines.append)
     finally:
         app.close()
     assert result.errors == ()
     assert np.isfinite(result.newest_s).all()
     assert result.requests > 200
+    assert len(lines) == 1
 
 
 def at_rest(report: jobs.Report, scene: str, parameters: dict[str, float], rate: float) -> MotionSequence:

@@ -1,11 +1,14 @@
 """What colors show, on motions that are formulas."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from stubs import PEAK, StubPredictor, recorded
 
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import PointCloud
+from odeform.types import Mesh, PointCloud
 from odeform_viz.coloring.colorist import Colorist
 from odeform_viz.columns import Column, Columns
 from odeform_viz.session import Session
@@ -53,3 +56,19 @@ def test_errors_need_a_truth_and_are_carried_to_the_model() -> None:
     assert values == pytest.approx(1.0, abs=1e-2)  # mm, everywhere
     assert coloring.scale.top == pytest.approx(1.0, abs=0.5)
     assert Colorist().color(_frame(model, truth), "own colours") is None
+
+
+@pytest.mark.parametrize("left", ["own colours", "error"])
+def test_nothing_is_kept_of_a_removed_column_or_truth(left: str) -> None:
+    stub, colorist = StubPredictor(), Colorist()
+    record = RecordedMotion(stub.schema, recorded(stub, {"mass": 0.5}))
+    model, truth = Column("stub", stub, stub.rest), Column("truth", record, record.geometry)
+    other = Column("other", stub, Mesh(stub.rest.points.copy(), stub.rest.faces))
+    frame = _frame(model, truth, other)
+    for quantity in ("error", "strain"):
+        assert colorist.color(frame, quantity) is not None
+    removed = [weakref.ref(record), weakref.ref(other.geometry)]
+    colorist.color(_frame(model), left)
+    del record, truth, other, frame
+    gc.collect()
+    assert [reference() for reference in removed] == [None, None]
