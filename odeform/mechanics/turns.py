@@ -19,7 +19,7 @@ def skew(vectors: Floats) -> Floats:
 
 
 def turned(rotation: Float[np.ndarray, "*#batch 3 3"], vector: Float[np.ndarray, "*#batch 3"]) -> Floats:
-    """Rotations, turned further by rotation vectors in radians in the axes of the scene."""
+    """Rotations (..., 3, 3), turned further by rotation vectors (..., 3) in radians in the axes of the scene."""
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None] + TINY
     cross = skew(vector)
     once = cross @ rotation
