@@ -1,6 +1,7 @@
 """The `odeform-viz` command."""
 
 import argparse
+import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -69,10 +70,24 @@ def _serve(args: argparse.Namespace) -> None:
         if not is_loopback(args.host):
             print(f"warning: any machine that reaches {app.url} can drive this viewer", file=sys.stderr, flush=True)
         print(f"ODeform {columns[0].source.schema.scene}: open {app.url} (Ctrl-C to stop)", flush=True)
-        while True:
-            time.sleep(WAKING)
+        _wait_for_interrupt()
     finally:
         app.close()
+
+
+def _wait_for_interrupt() -> None:
+    """Return never, but by `KeyboardInterrupt` within `WAKING` seconds of a Ctrl-C.
+
+    It is noted, not raised where it comes: a finalizer or a callback of a library may run then, which would swallow it.
+    """
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    try:
+        while not asked:
+            time.sleep(WAKING)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:

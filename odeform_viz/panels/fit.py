@@ -20,6 +20,7 @@ LABEL = "fit"
 NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
+NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
 
 
@@ -134,6 +135,8 @@ class _Search:
     """What has to be known of the estimates."""
     misfits: list[str] = field(default_factory=list)
     key: int | None = None
+    hidden: str = ""
+    """Why there is no column for it; the search goes on without one."""
 
     def progress(self, report: float | tuple[dict[str, float], float]) -> None:
         """Show a step, or how far a calibration is."""
@@ -152,7 +155,7 @@ class _Search:
         estimate = {name: one.value for name, one in found.parameters.items()}
         self._place(estimate)
         text = describe_identification(found, self.page.schema, self.truth)
-        self.show("\n\n".join(filter(None, (text, self.note))), {**self.fixed, **estimate})
+        self.show("\n\n".join(filter(None, (text, self.note, self.hidden))), {**self.fixed, **estimate})
 
     def failed(self, message: str) -> None:
         """Say why there are none."""
@@ -167,7 +170,12 @@ class _Search:
             self.key = mine[0].key
             columns.change(lambda all_: [_moved(c, column) if c.key == self.key else c for c in all_])
         else:
-            columns.add(column)
+            try:
+                columns.add(column)
+            except InputError as error:  # too many
+                self.hidden = NO_COLUMN.format(error)
+                return
+            self.hidden = ""
             self.key = next(c.key for c in reversed(columns.all) if c.pinned == column.pinned)
         self.page.columns_changed()
 

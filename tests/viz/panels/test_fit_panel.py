@@ -2,6 +2,7 @@
 
 import io
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from odeform.identification.identify import Identification, Identified
 from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.columns import Column
+from odeform_viz.columns import MOST, Column
 from odeform_viz.panels import fit
 from odeform_viz.panels.fit import FitPanel, describe_identification
 from odeform_viz.panels.parameters import ParameterPanel
@@ -95,6 +96,18 @@ def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.
     assert not panel._job._process.is_alive()
     assert client.until(lambda: "misfit" not in client.text())
     assert not client.controls[USE].visible
+
+
+def test_a_search_without_room_for_a_column_goes_on_and_says_so(dropped: View) -> None:
+    app, client = dropped
+    _open(app, client)
+    model = app.columns.all[0]
+    while len(app.columns.all) < MOST:
+        app.columns.add(replace(model, label="pinned", pinned=dict(ENTRY.parameters), visible=False))
+    client.click(START)
+    assert client.until(lambda: "The motion found is not shown" in client.text())
+    assert "model and noise explain the motion" in client.text()
+    assert len(app.columns.all) == MOST
 
 
 def test_a_search_that_fails_says_why(dropped: View, monkeypatch: pytest.MonkeyPatch) -> None:
