@@ -41,8 +41,8 @@ UNTIL, AHEAD = (40, 70), 10
 INTERVALS = (3, 5, 8)
 SOLVED = ("pod-rbf", "gp", "nearest")
 BASELINES = (*SOLVED, "direct", "node", "rnn")
-LAST_FRAME = ("odeform", *SOLVED, "pe-gnn")
-"""Models of pushed objects whose last frame is scored as well."""
+SCORED_PUSHES = {"pe-gnn": (FINAL,), **dict.fromkeys(("odeform", *SOLVED), (FRAMES[FORCE], FINAL))}
+"""Windows of pushed objects on which models are scored, if not on all frames alone."""
 FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253), FORCE: (25, 50, 100)}
 """Training sequences of the learning curve, of each object: about an eighth, a quarter and a half of all."""
 ABLATED = (
@@ -53,8 +53,8 @@ ABLATED = (
 )
 """Parts that ablations leave out. The regression of what is left would hide what the others give."""
 MINUTES = 4
-PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 4200}
-"""Steps of all seven pushed objects together. They took about 8 minutes on one core, without the scores."""
+PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 8400}
+"""Steps of all seven pushed objects together. They took 5 to 8 minutes on one core, without the scores."""
 STEPS = {"direct": 2000, "node": 900, "rnn": 1400, "occupancy-flow": 590, "odeform-per-point": 460}
 ODEFORM_STEPS = {FRAMES[DROP][1]: 330, FRAMES["kick"][1]: 280, UNTIL[0]: 900, UNTIL[1]: 690}
 """Steps of `odeform` by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials and random
@@ -96,8 +96,8 @@ def _whole(model: str, scene: str, seed: int = 0) -> Run:
 
 def _pushed(model: str, until: int | None = None) -> Run:
     """Trained on seven objects, on all frames or on the first `until`."""
-    scored = (PUSH,) if until is not None else (FRAMES[FORCE], FINAL) if model in LAST_FRAME else (FRAMES[FORCE],)
-    return Run(model, FORCE, scored[-1:] if model == "pe-gnn" else scored, PUSH_STEPS.get(model), until=until)
+    scored = SCORED_PUSHES.get(model, (FRAMES[FORCE],)) if until is None else (PUSH,)
+    return Run(model, FORCE, scored, PUSH_STEPS.get(model), until=until)
 
 
 def _each_object() -> Iterable[Run]:
