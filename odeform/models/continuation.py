@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
-from odeform.motion.base import SolveStats
+from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
 from odeform.motion.splines import catmull_rom
@@ -115,7 +115,7 @@ def without_continuation(checkpoint: Checkpoint) -> Checkpoint:
     return replace(checkpoint, arrays=arrays, schema=replace(checkpoint.schema, window=window))
 
 
-class ContinuedTrajectory:
+class ContinuedTrajectory(ChangedTrajectory):
     """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on.
 
     Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
@@ -123,19 +123,10 @@ class ContinuedTrajectory:
     """
 
     def __init__(self, solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> None:
-        self._solved, self._dynamics, self._theta = solved, dynamics, theta
+        super().__init__(solved)
+        self._dynamics, self._theta = dynamics, theta
         self._stop, self._rate = window.stop, window.rate
         self._frames: list[Floats] = []
-
-    @property
-    def stats(self) -> SolveStats:
-        """Those of the trajectory within the trained window."""
-        return self._solved.stats
-
-    @property
-    def last_good(self) -> float:
-        """Seconds up to which the integration within the trained window succeeded."""
-        return self._solved.last_good
 
     def reduced(self, times: Floats) -> Floats:
         """(T,) seconds -> (T, 6 + K)."""
@@ -143,12 +134,12 @@ class ContinuedTrajectory:
         later = times > self._stop
         # a trajectory that failed within the window stays at its last state
         if not later.any() or self.last_good < self._stop:
-            return self._solved.reduced(np.minimum(times, self._stop))
+            return self.own.reduced(np.minimum(times, self._stop))
         after = self._between(self._rate * (times[later] - self._stop))
         if later.all():
             return after
         y = np.empty((len(times), after.shape[1]))
-        y[~later], y[later] = self._solved.reduced(times[~later]), after
+        y[~later], y[later] = self.own.reduced(times[~later]), after
         return y
 
     def _between(self, frames: Floats) -> Floats:
@@ -162,7 +153,7 @@ class ContinuedTrajectory:
 
     def _extend(self, count: int) -> None:
         if not self._frames:
-            self._frames = list(self._solved.reduced(self._stop - np.array([1.0, 0.0]) / self._rate))
+            self._frames = list(self.own.reduced(self._stop - np.array([1.0, 0.0]) / self._rate))
         while len(self._frames) < count:
             before, now = (frame[None] for frame in self._frames[-2:])
             self._frames.append(self._dynamics.next(before, now, self._theta[None])[0])

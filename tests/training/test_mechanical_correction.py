@@ -12,7 +12,7 @@ from odeform.models.mechanical.elastic_body import elastic_body
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
 from odeform.training.mechanical_correction import fit_correction
-from odeform.training.pushes import Pushes
+from odeform.training.pushes import Pushes, _projection
 from odeform.types import Floats
 
 COUNT, FRAMES, MODES = 40, 5, 3
@@ -71,8 +71,6 @@ def test_a_share_that_is_none_is_refused() -> None:
 
 
 def test_vertices_without_weight_do_not_count() -> None:
-    from odeform.training.pushes import _projection
-
     rng = np.random.default_rng(0)
     basis, weights = rng.normal(size=(30, 3, 4)), np.full(30, 1.0 / 27)
     weights[:3] = 0.0

@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
-from odeform.motion.base import SolveStats
+from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.types import Floats, Times
 
 __all__ = ["CorrectedTrajectory"]
 
 
-class CorrectedTrajectory:
+class CorrectedTrajectory(ChangedTrajectory):
     """Within the trained window y = share * mechanics + rest. Beyond it, what that adds to the mechanics stays as it is
     at the end: the motion there is the mechanics'."""
 
@@ -25,22 +25,13 @@ class CorrectedTrajectory:
     ) -> None:
         """`own` is the motion of the mechanics, `shares` and `rest` are those of its correction, which ends at `stop`
         seconds."""
-        self._own, self._taken, self._rest, self._stop = own, 1.0 - shares, rest, stop
-
-    @property
-    def stats(self) -> SolveStats:
-        """Those of the mechanics."""
-        return self._own.stats
-
-    @property
-    def last_good(self) -> float:
-        """As for the mechanics."""
-        return self._own.last_good
+        super().__init__(own)
+        self._taken, self._rest, self._stop = 1.0 - shares, rest, stop
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K), zero at time 0."""
-        own, inside = self._own.reduced(times), np.minimum(times, self._stop)
+        own, inside = self.own.reduced(times), np.minimum(times, self._stop)
         added = self._rest(inside)
         if self._taken.any():
-            added -= self._taken * (own if (times <= self._stop).all() else self._own.reduced(inside))
+            added -= self._taken * (own if (times <= self._stop).all() else self.own.reduced(inside))
         return own + added * (times > 0.0)[:, None]

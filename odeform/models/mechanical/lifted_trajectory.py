@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from odeform.motion.base import SolveStats
+from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.types import Floats, Times
 
@@ -15,7 +15,7 @@ __all__ = ["LiftedTrajectory"]
 MOST = 0.01  # m; a motion that would have to be lifted farther is lost, and is left to the watch
 
 
-class LiftedTrajectory:
+class LiftedTrajectory(ChangedTrajectory):
     """Lifts a body where its motion, within the trained window, takes it deeper into the floor than it may be.
 
     Springs of the floor stand for the compression of what rests on it, so a leg under load sinks. Where that is more
@@ -27,27 +27,18 @@ class LiftedTrajectory:
     ) -> None:
         """`lowest` maps coordinates (T, 6 + K) to the height of the lowest point (T,) in m, which may be `limit`. The
         lift is linear between the times `grid` in s, and stays as it is after them."""
-        self._own, self._lowest, self._limit, self._grid = own, lowest, limit, grid
-
-    @property
-    def stats(self) -> SolveStats:
-        """Those of the motion as it was."""
-        return self._own.stats
-
-    @property
-    def last_good(self) -> float:
-        """As for the motion as it was."""
-        return self._own.last_good
+        super().__init__(own)
+        self._lowest, self._limit, self._grid = lowest, limit, grid
 
     @cached_property
     def _lift(self) -> Floats:
         """(G,) m at the times of the grid."""
-        deeper = self._limit - self._lowest(self._own.reduced(self._grid))
+        deeper = self._limit - self._lowest(self.own.reduced(self._grid))
         return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K)."""
-        y = self._own.reduced(times)
+        y = self.own.reduced(times)
         if self._lift.any():
             y = y.copy()
             y[:, 2] += np.interp(times, self._grid, self._lift)

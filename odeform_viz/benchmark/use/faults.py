@@ -47,35 +47,35 @@ def kill_fit(visitors: Visitors) -> None:
 
 def fill_disk(visitors: Visitors) -> None:
     """Record until the disk is full; the page says why the recording ended, and everything else goes on."""
-    path = visitors.folder / "full.rrd"
-    path.unlink(missing_ok=True)
-    with _full_disk():
-        visitors.first.set("file", path.name)
-        visitors.first.click("Start recording")
-        visitors.expect_control("Stop recording")
+    with _full_disk(), _recording(visitors, "full.rrd"):
         # a recording is written while there are frames
         end = time.monotonic() + DEADLINE
         while not _says(visitors, FULL) and time.monotonic() < end:
             visitors.drag(visitors.second, 5)
         _expect_text(visitors, FULL)
         visitors.drag(visitors.second, 5)
-    visitors.expect_control("Start recording")
-    path.unlink()
+        visitors.expect_control("Start recording")
 
 
 def set_clock(visitors: Visitors) -> None:
     """Play and record while the wall clock jumps by hours and years."""
-    path = visitors.folder / "jumps.rrd"
-    path.unlink(missing_ok=True)
-    with _jumping_clock():
-        visitors.first.set("file", path.name)
-        visitors.first.click("Start recording")
-        visitors.expect_control("Stop recording")
+    with _jumping_clock(), _recording(visitors, "jumps.rrd"):
         visitors.drag(visitors.second, 10)
         began = visitors.app.clock.time()
         visitors.first.click("Play")
         visitors.expect("time to go on", lambda: visitors.app.clock.time() != began)
         stop_recording(visitors)
+
+
+@contextmanager
+def _recording(visitors: Visitors, name: str) -> Iterator[None]:
+    """Begins with a recording that has started; its file is gone at the end."""
+    path = visitors.folder / name
+    path.unlink(missing_ok=True)
+    visitors.first.set("file", name)
+    visitors.first.click("Start recording")
+    visitors.expect_control("Stop recording")
+    yield
     path.unlink()
 
 
