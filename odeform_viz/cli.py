@@ -81,7 +81,9 @@ def _wait_for_interrupt() -> None:
     It is noted, not raised where it comes: a finalizer or a callback of a library may run then, which would swallow it.
     """
     asked: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.SIG_IGN:  # as in the background of a script
+        signal.signal(signal.SIGINT, lambda number, _: asked.append(number))
     try:
         while not asked:
             time.sleep(WAKING)
