@@ -94,10 +94,11 @@ class Dataset:
             if entry.status == "ok" and split in ("all", entry.split) and object in (None, entry.parameters.get(OBJECT))
         ]
 
-    def of(self, object: str) -> "Dataset":
-        """The sequences of one object alone, failed ones included. `InputError` for an object that is not there."""
-        schema = replace(self.schema, objects=(self.schema.check_object(object),))
-        entries = tuple(entry for entry in self.entries if entry.parameters.get(OBJECT) == object)
+    def of(self, *objects: str) -> "Dataset":
+        """The sequences of these objects alone, failed ones included. `InputError` for an object that is not there."""
+        wanted = {self.schema.check_object(name) for name in objects}
+        schema = replace(self.schema, objects=tuple(name for name in self.schema.objects if name in wanted))
+        entries = tuple(entry for entry in self.entries if entry.parameters.get(OBJECT) in wanted)
         return replace(self, schema=schema, entries=entries)
 
     def sequences(self, split: str, object: str | None = None) -> Iterator[MotionSequence]:

@@ -38,7 +38,7 @@ def evaluate(
     Args:
         predictor: A model of the data's scene. One that cannot extrapolate is scored on its trained window only; data
             that end before that window begins are taken to be cut out of longer motions, and to start where it does.
-        dataset: Motions with known parameters.
+        dataset: Motions with known parameters. Of several objects, those that the model knows are scored.
         split: "train", "val", "test" or "all".
         window: Half-open range of frames to score, counted at the scene's rate; default: all.
         quality: Name of one of the predictor's solver settings, or solver settings.
@@ -59,8 +59,10 @@ def evaluate(
         >>> scores["sequences"], scores["rmse_pooled_mm"] < 1.0
         (50, True)
     """
-    schema = dataset.schema
     check_scene(predictor, dataset)
+    if known := [name for name in dataset.objects if name in predictor.schema.objects]:
+        dataset = dataset.of(*known)
+    schema = dataset.schema
     behind = not predictor.extrapolates and predictor.schema.window.start > schema.window.stop
     clock = predictor.schema.window.start if behind else 0.0
     spans = _spans(predictor, schema, window, clock)

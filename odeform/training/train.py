@@ -92,7 +92,8 @@ def train(
     if resume and not (is_resumable(model) and part.exists()):
         raise InputError(f"resume: expected {part}, which an interrupted training of odeform leaves")
     begin = time.process_time()
-    dataset = _of_objects(dataset, request.objects)
+    if names := request.objects or dataset.objects:
+        dataset = dataset.of(*names)
     dataset = dataset if sequences is None else _first(dataset, sequences)
     trained = train_model(Run(dataset, request, body_arrays(dataset), part, report))
     # the processor time of all sittings of a resumed training
@@ -102,18 +103,6 @@ def train(
     part.unlink(missing_ok=True)
     report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
     return load(out)
-
-
-def _of_objects(dataset: Dataset, names: tuple[str, ...]) -> Dataset:
-    """The data set of some objects, of all that it has by default. `InputError` for one that it has not."""
-    known = dataset.objects
-    for name in names:
-        if name not in known:
-            expected = f"one of {', '.join(known)}" if known else "data of several objects"
-            raise InputError(f"object {name!r}: expected {expected}")
-    kept = tuple(name for name in known if name in (names or known))
-    entries = tuple(entry for entry in dataset.entries if not known or entry.parameters.get(OBJECT) in kept)
-    return replace(dataset, schema=replace(dataset.schema, objects=kept), entries=entries)
 
 
 def _first(dataset: Dataset, count: int) -> Dataset:

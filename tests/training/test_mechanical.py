@@ -124,7 +124,9 @@ def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, mo
     assert not laws.path.exists(), "it is of no use any more"
 
 
-@pytest.mark.parametrize(("names", "expected"), [(["cat"], "expected one of donut"), (["donut", "dog"], "'dog'")])
+@pytest.mark.parametrize(
+    ("names", "expected"), [(["cat"], "'cat': scene contact-force has donut"), (["donut", "dog"], "'dog'")]
+)
 def test_an_object_that_the_data_do_not_have_is_refused(
     dataset: Dataset, tmp_path: Path, names: list[str], expected: str
 ) -> None:

@@ -30,6 +30,14 @@ def nearest(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Predi
     return train(dataset, tmp_path_factory.mktemp("models") / "nearest.safetensors", "nearest", report=lambda _: None)
 
 
+def test_a_model_of_one_object_is_that_of_all_for_it(dataset: Dataset, nearest: Predictor, tmp_path: Path) -> None:
+    one = train(dataset, tmp_path / "one.safetensors", "nearest", objects=["plate"], report=lambda _: None)
+    assert one.schema.objects == ("plate",)
+    # the others are not scored: it does not know them
+    scores = evaluate(one, dataset, "test")["per_object"]
+    assert scores == {"plate": evaluate(nearest, dataset, "test")["per_object"]["plate"]}
+
+
 def test_every_object_has_its_own_model(dataset: Dataset, nearest: Predictor) -> None:
     assert isinstance(nearest, PerObject)
     assert nearest.model == "nearest"
