@@ -70,7 +70,10 @@ function keepSelection(box) {
     if (whole) box.select();
   };
   Object.defineProperty(box, "value", { get: own.get, set: write, configurable: true });
-  box.setSelectionRange = (...range) => isWhole() || HTMLInputElement.prototype.setSelectionRange.apply(box, range);
+  box.setSelectionRange = (...range) => {
+    // the caret belongs to whom types: viser would set it for a value that the page wrote, and that did not arrive
+    if (!isWhole() && !confirmed.has(box)) HTMLInputElement.prototype.setSelectionRange.apply(box, range);
+  };
 }
 
 function dropSelection(box) {

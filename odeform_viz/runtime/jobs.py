@@ -19,8 +19,18 @@ from odeform.identification.observation import Observation
 from odeform.models.base import Predictor
 from odeform.types import Geometry, MotionSequence
 
-__all__ = ["Job", "Report", "fit_parameters", "own_body_of", "simulate_motion", "simulate_own_body", "stability_image"]
+__all__ = [
+    "JOB",
+    "Job",
+    "Report",
+    "fit_parameters",
+    "own_body_of",
+    "simulate_motion",
+    "simulate_own_body",
+    "stability_image",
+]
 
+JOB = "odeform-job"  # the name of the processes
 Report = Callable[[Any], None]
 """Called with the progress of the work: the fraction that is done, 0 to 1, or what else the work says it is."""
 
@@ -59,10 +69,10 @@ class Job:
         # spawn, not fork: this process has threads, and a fork would copy their locks in any state
         context = multiprocessing.get_context("spawn")
         self._inbox, outbox = context.Pipe(duplex=False)
-        self._process = context.Process(target=_run, args=(outbox, self.work, self.args), daemon=True)
+        self._process = context.Process(target=_run, args=(outbox, self.work, self.args), name=JOB, daemon=True)
         self._process.start()
         outbox.close()
-        self._thread = threading.Thread(target=self._listen, name="odeform-job", daemon=True)
+        self._thread = threading.Thread(target=self._listen, name=JOB, daemon=True)
         self._thread.start()
 
     def cancel(self) -> None:

@@ -20,6 +20,7 @@ from odeform_viz.screenshots import CHROMIUM, FLAGS
 __all__ = ["PHONE", "Tab", "needs_chromium", "open_tab", "until"]
 
 VIEW = {"width": 800, "height": 480}
+PATIENCE = 180.0  # s, for a busy machine
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium on the PATH (Debian: chromium)")
@@ -54,12 +55,12 @@ class Tab:
         self.row(label, "input").click()
         self.page.get_by_role("option", name=option, exact=True).click()
 
-    def says(self, text: str, seconds: float = 60.0) -> bool:
+    def says(self, text: str, seconds: float = PATIENCE) -> bool:
         return until(lambda: self.page.get_by_text(re.compile(text)).count() > 0, seconds)
 
     def picture(self) -> np.ndarray:
         """(H, W, 3) pixels of the viewport left of the panel and above the plots."""
-        shot = self.page.screenshot(clip={"x": 0, "y": 0, "width": 460, "height": 300}, timeout=60_000)
+        shot = self.page.screenshot(clip={"x": 0, "y": 0, "width": 460, "height": 300}, timeout=1e3 * PATIENCE)
         return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)
 
     def settled(self) -> np.ndarray:
@@ -73,12 +74,12 @@ class Tab:
             last = now
         return last
 
-    def changes(self, before: np.ndarray, seconds: float = 60.0) -> bool:
+    def changes(self, before: np.ndarray, seconds: float = PATIENCE) -> bool:
         """Whether the picture becomes another than before."""
         return until(lambda: (np.abs(self.picture() - before).max(axis=2) > 24).mean() > 1e-3, seconds)
 
 
-def until(holds: Callable[[], bool], seconds: float = 60.0) -> bool:
+def until(holds: Callable[[], bool], seconds: float = PATIENCE) -> bool:
     """Wait for what a click brings about, however busy the machine is."""
     end = time.monotonic() + seconds
     while not holds() and time.monotonic() < end:
@@ -94,11 +95,12 @@ def open_tab(*columns: Column, workspace: str | Path = ".", control: str = "mass
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
             tab = Tab(browser.new_page(**{"viewport": VIEW, **device}), app)
+            tab.page.set_default_timeout(1e3 * PATIENCE)
             tab.page.on("console", lambda message: tab.errors.append(message.text) if message.type == "error" else None)
             tab.page.on("pageerror", lambda error: tab.errors.append(str(error)))
             tab.page.goto(app.url)
-            tab.page.wait_for_selector("canvas", timeout=60_000)
-            tab.page.get_by_text(control).wait_for(state="attached", timeout=60_000)
+            tab.page.wait_for_selector("canvas", timeout=1e3 * PATIENCE)
+            tab.page.get_by_text(control).wait_for(state="attached", timeout=1e3 * PATIENCE)
             yield tab
             browser.close()
     finally:

@@ -25,7 +25,7 @@ def kicked(kick: Predictor) -> Iterator[Tab]:
 
 def test_it_moves_by_itself(kicked: Tab) -> None:
     first = kicked.page.evaluate(SLIDERS)
-    kicked.page.wait_for_function(f"first => {SLIDERS} !== first", arg=first, timeout=60_000)
+    kicked.page.wait_for_function(f"first => {SLIDERS} !== first", arg=first)
     assert kicked.changes(kicked.picture())
     assert kicked.errors == []
 
@@ -79,9 +79,9 @@ def test_keys_play_step_and_help(kicked: Tab) -> None:
     page.keyboard.press("p")
     assert until(lambda: not app.clock.playing and app.clock.time() > 0.005)
     page.keyboard.press("h")
-    page.get_by_role("dialog").wait_for(timeout=60_000)
+    page.get_by_role("dialog").wait_for()
     kicked.button("Close").click()
-    page.get_by_role("dialog").wait_for(state="detached", timeout=60_000)
+    page.get_by_role("dialog").wait_for(state="detached")
     kicked.turn_to("Explore")
     assert kicked.errors == []
 

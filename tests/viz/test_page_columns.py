@@ -116,7 +116,7 @@ def test_every_body_is_whole_and_unobscured(tab: Tab, count: int, size: tuple[in
 
 def _drawn(tab: Tab, middles: list[Floats], path: Path) -> bool:
     """Whether a screenshot shows each body at its place: its checkerboard is not the background."""
-    tab.page.screenshot(path=path, timeout=60_000)
+    tab.page.screenshot(path=path)
     picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
     around = [picture[y - 3 : y + 4, x - 3 : x + 4] for x, y in np.round(middles).astype(int)]
     return all(np.ptp(pixels, axis=2).max() > 20 for pixels in around)

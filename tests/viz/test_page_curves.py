@@ -21,7 +21,7 @@ def test_a_click_on_a_curve_goes_to_that_time(tab: Tab) -> None:
     box = tab.row("time (s)", "input[@inputmode='decimal']")
     assert until(lambda: box.input_value() == "0.1")
     plot = tab.page.locator("svg[data-time-slider]").first
-    plot.wait_for(timeout=60_000)
+    plot.wait_for()
     where = plot.bounding_box()
     assert where is not None
     # the middle of the area that is drawn on: 34 to 202 of 208; a click of the locator waits until the plot stays still

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from browsing import VIEW, Tab, needs_chromium, open_tab, until
+from browsing import PATIENCE, VIEW, Tab, needs_chromium, open_tab, until
 from PIL import Image
 
 from odeform.dataset.store import open_dataset
@@ -34,7 +34,7 @@ def tab(drop: Predictor) -> Iterator[Tab]:
 
 
 def _saved(tab: Tab, button: str, folder: Path) -> Path:
-    with tab.page.expect_download(timeout=120_000) as found:
+    with tab.page.expect_download() as found:
         tab.button(button).click()
     path = folder / found.value.suggested_filename
     found.value.save_as(path)
@@ -84,12 +84,12 @@ def test_whole_motions(tab: Tab, drop: Predictor, suffix: str, tmp_path: Path) -
         requests: list[str] = []
         other.on("request", lambda request: requests.append(request.url))
         other.goto(path.as_uri())
-        other.wait_for_selector("canvas", timeout=60_000)
+        other.wait_for_selector("canvas", timeout=1e3 * PATIENCE)
         shot = np.zeros(0)
 
         def drawn() -> bool:
             nonlocal shot
-            shot = np.asarray(Image.open(io.BytesIO(other.screenshot(timeout=60_000))).convert("RGB"))
+            shot = np.asarray(Image.open(io.BytesIO(other.screenshot(timeout=1e3 * PATIENCE))).convert("RGB"))
             return bool(shot[120:360, 200:600].std() > 3.0)
 
         assert until(drawn)

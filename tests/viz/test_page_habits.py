@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browsing import PHONE, Tab, needs_chromium, open_tab, until
+from browsing import PATIENCE, PHONE, Tab, needs_chromium, open_tab, until
 
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column
@@ -102,12 +102,12 @@ def test_keys_belong_to_a_focused_field_and_are_hot_keys_elsewhere(dark: Tab) ->
     dark.choose("quality", "draft")
     assert until(lambda: page.evaluate("document.activeElement === document.body"))
     page.keyboard.press("h")
-    page.get_by_role("dialog").wait_for(timeout=60_000)
+    page.get_by_role("dialog").wait_for()
     assert dark.row("quality", "input").input_value() == "draft"
     assert not clock.playing
     assert not dark.app.page.options().overlay
     page.keyboard.press("h")
-    page.get_by_role("dialog").wait_for(state="detached", timeout=60_000)
+    page.get_by_role("dialog").wait_for(state="detached")
 
 
 def test_space_plays_and_arrows_step_also_after_a_click(dark: Tab) -> None:
@@ -156,7 +156,7 @@ def test_on_a_phone_the_panel_is_folded_until_tapped(dark: Tab) -> None:
         page.goto(dark.app.url)
         start = page.get_by_role("button", name="start", exact=True)
         bar = page.get_by_text("ODeform · kick").first
-        bar.wait_for(timeout=60_000)
+        bar.wait_for(timeout=1e3 * PATIENCE)
         assert until(lambda: not start.is_visible())
         until(lambda: bar.bounding_box()["y"] > 700)  # pyright: ignore[reportOptionalSubscript]
         bar.click()

@@ -5,6 +5,7 @@ import random
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 
 from odeform_viz.benchmark.client import DEADLINE
 from odeform_viz.benchmark.use.fits import CANCEL, STEP, choose_truth
@@ -13,6 +14,7 @@ from odeform_viz.benchmark.use.recordings import stop_recording
 from odeform_viz.benchmark.use.simulations import START as SIMULATE
 from odeform_viz.benchmark.visitors import Visitors
 from odeform_viz.panels.truth import NONE
+from odeform_viz.runtime.jobs import JOB
 
 __all__ = ["fill_disk", "kill_fit", "kill_simulator", "set_clock"]
 
@@ -25,7 +27,7 @@ JUMPS = (-1e7, -3600.0, 0.0, 3600.0, 1e9)  # s
 def kill_simulator(visitors: Visitors) -> None:
     """Kill the process of a simulation; the page says so, and another one can be started."""
     visitors.first.click(SIMULATE)
-    visitors.expect("a process of the simulator", lambda: bool(multiprocessing.active_children()))
+    visitors.expect("a process of the simulator", lambda: bool(_jobs()))
     visitors.expect_control("Cancel")
     _kill_processes()
     _expect_text(visitors, f"**The simulation failed**: {KILLED}")
@@ -88,8 +90,13 @@ def _says(visitors: Visitors, part: str) -> bool:
 
 
 def _kill_processes() -> None:
-    for process in multiprocessing.active_children():
+    for process in _jobs():
         process.kill()
+
+
+def _jobs() -> list[BaseProcess]:
+    """The viewer's own: libraries keep processes too."""
+    return [process for process in multiprocessing.active_children() if process.name == JOB]
 
 
 @contextmanager
