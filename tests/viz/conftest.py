@@ -48,11 +48,17 @@ def serve(port: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Itera
             client = stack.enter_context(LoopbackClient(port))
             client.set("time (s)", moment)
             assert client.until(lambda: app.clock.time() == moment and not app.clock.playing)
-            assert client.until(lambda: app.presenter.settled)
+            assert client.until(lambda: _shows(app, moment))
             return app, client
 
         yield start
     assert "Traceback" not in capfd.readouterr().err
+
+
+def _shows(app: App, moment: float) -> bool:
+    """Whether the page shows this moment, and not the one before."""
+    frame = app.presenter.frame
+    return frame is not None and frame.request.time == moment and app.presenter.settled
 
 
 @pytest.fixture
