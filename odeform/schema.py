@@ -27,8 +27,8 @@ LATER = 0.05
 """How far a model's clock may exceed the trained window and its reach, in windows. A ball at rest then stays so; at
 twice that, some motions of the bundled models deform several times as much as ever before, at ten times that, all."""
 MOST_FRAMES = 1_000_000
-REACH = 0.5
-"""Windows beyond the trained one over which models that extrapolate keep their clock running."""
+REACH = 3.0
+"""Windows beyond the trained one over which models with a continuation keep their clock running."""
 
 
 def soft_clip(values: Floats, limit: float, margin: float) -> Floats:

@@ -9,7 +9,6 @@ from odeform.motion.base import Motion, SolveStats
 from odeform.motion.limits import DEPTH
 from odeform.motion.recorded import RecordedMotion
 from odeform.motion.watch import Stop
-from odeform.schema import REACH as CONTINUED
 from odeform.types import Floats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
@@ -30,7 +29,7 @@ __all__ = [
 ]
 
 INVISIBLE = 1e-4  # m; a third of a pixel for a body of 0.1 m that is 720 pixels high
-REACH = 1.0 + CONTINUED  # length of the time slider in trained windows: as far as models continue
+REACH = 2.0  # length of the time slider in trained windows
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,12 @@
 
 import argparse
 import shlex
+from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from odeform.checkpoint import Checkpoint
 from odeform.cli import train as training
 from odeform.cli.options import add_json, positive, write_json
 from odeform.errors import InputError
@@ -22,6 +25,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--keep", required=True, metavar="DIR", help="folder of the new ones; what it holds is kept")
     parser.add_argument(
         "--steps", type=int, metavar="N", help="steps of those that take steps, in place of the recorded budget"
+    )
+    parser.add_argument(
+        "--only",
+        choices=("continuation",),
+        help="keep the models, and fit again only what continues their motions beyond the trained window",
     )
     add_json(parser)
 
@@ -42,13 +50,18 @@ def run(args: argparse.Namespace) -> None:
     for name in names:
         out = folder / f"{name.replace('/', '_')}.safetensors"
         recorded = load(name).checkpoint
-        command = _command(name, recorded.provenance, out, args.steps)
-        if not out.exists():
-            parser = argparse.ArgumentParser()
-            training.add_options(parser)
-            training.run(parser.parse_args(command))
+        if args.only:
+            shown = f"odeform retrain {name} --only {args.only}"
+            if not out.exists():
+                _refit(name, recorded, out, shown)
+        else:
+            command = _command(name, recorded.provenance, out, args.steps)
+            if not out.exists():
+                parser = argparse.ArgumentParser()
+                training.add_options(parser)
+                training.run(parser.parse_args(command))
+            shown = " ".join(["odeform train", *command])
         again = load(out).checkpoint
-        shown = " ".join(["odeform train", *command])
         found[name] = {"command": shown, "recorded": _scores(recorded.scores), "again": _scores(again.scores)}
         print(_line(name, found[name]))
     write_json(found, args.json)
@@ -66,6 +79,16 @@ def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None
         at = tokens.index(budget)
         tokens[at : at + 2] = ["--steps", str(steps)]
     return tokens
+
+
+def _refit(name: str, recorded: Checkpoint, out: Path, command: str) -> None:
+    """Write the bundled checkpoint of this name with another continuation."""
+    from odeform.checkpoint import write_checkpoint
+    from odeform.dataset.store import open_dataset
+    from odeform.training.continuation import refitted
+
+    known = {**recorded.provenance, "continuation": {"command": command, "versions": {"odeform": version("odeform")}}}
+    write_checkpoint(out, refitted(replace(recorded, provenance=known), open_dataset(name.split("/")[0])))
 
 
 def _scores(scores: dict[str, Any] | None) -> dict[str, float]:

@@ -9,6 +9,7 @@ import numpy as np
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
+from odeform.motion.basis import DisplacementBasis
 from odeform.motion.reduced_space import ReducedSpace, decompose, fit_modes, make_space, to_canonical
 from odeform.schema import Schema, Window
 from odeform.types import Basis, Bools, Floats, Mesh, MotionSequence, Perpoint, Times, Vector
@@ -18,6 +19,7 @@ __all__ = ["FILLED_WEIGHT", "TrainingData", "prepare"]
 SPLITS = ("train", "val")
 TRUNCATION = 5e-3  # share of the RMS deformation that may be left out
 MOST_MODES = 64
+PULSE = "pulse_s"  # of a scene's fixed values: how long a force drives the body
 FILLED_WEIGHT = 1e-3
 """Weight in training of a frame that a spline fills in: it constrains what no observed frame does."""
 
@@ -45,6 +47,8 @@ class TrainingData:
     """RMS of the deformation that the modes leave out, by split."""
     identity: str
     """SHA-256 of all inputs: the sequences, the frames, the number of modes."""
+    first_free: int = 0
+    """The first frame from which on nothing but the ground drives the body."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +81,25 @@ class _Motions:
         return float(np.mean([(shares * motion**2).sum(axis=(1, 2)).mean() for motion in self.deformations]))
 
 
-def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsampling | None = None) -> TrainingData:
+def prepare(
+    dataset: Dataset,
+    modes: int | DisplacementBasis | None = None,
+    subsampling: FrameSubsampling | None = None,
+) -> TrainingData:
     """Decompose all training and validation sequences; fit the deformation basis to the training sequences alone.
 
-    Without `modes`, the fewest that leave out at most `TRUNCATION` of the RMS deformation of the validation sequences.
+    `modes` is their number, or the basis of a model that is trained already. Without it, the fewest that leave out at
+    most `TRUNCATION` of the RMS deformation of the validation sequences.
     `InputError` for a split without sequences, and for sequences of different meshes.
     """
     subsampling = subsampling or FrameSubsampling()
     count = subsampling.count(dataset.schema)
     body = _body(dataset, count)
     motions = {split: _decomposed(dataset, split, subsampling, count, body) for split in SPLITS}
-    basis = fit_modes(motions["train"].deformations, body.weights, modes or MOST_MODES)
+    if isinstance(modes, DisplacementBasis):
+        basis, modes = modes.values(body.rest.points).astype(float), modes.modes
+    else:
+        basis = fit_modes(motions["train"].deformations, body.weights, modes or MOST_MODES)
     coefficients = {split: motions[split].coefficients(basis, body.weights) for split in SPLITS}
     total = {split: motions[split].mean_square(body.weights) for split in SPLITS}
     by_mode = {split: np.mean([(c**2).mean(axis=0) for c in coefficients[split]], axis=0) for split in SPLITS}
@@ -113,6 +125,7 @@ def prepare(dataset: Dataset, modes: int | None = None, subsampling: FrameSubsam
         observed={split: subsampling.observed(count, len(reduced[split])) for split in SPLITS},
         truncation_mm={split: float(1e3 * np.sqrt(left_out[split])) for split in SPLITS},
         identity=_identity(dataset, subsampling, count, kept),
+        first_free=int(np.searchsorted(body.times, float(dataset.fixed.get(PULSE, 0.0)) - 1e-9)),
     )
 
 

@@ -1,13 +1,15 @@
 """The motion beyond the trained window: a learned autonomous dynamics in phase space.
 
 A latent state that depends on the time knows nothing of times it was not trained on. What a body does next follows
-from its position, motion and deformation, at any time. From frame to frame of the trained rate,
+from its position and motion, at any time. From frame to frame of the trained rate,
 
-    y[k+1] = flight(y[k], y[k-1]) + sum_j weights[j] exp(-|features(y[k], y[k-1], theta) - centers[j]|^2 / 2).
+    y[k+1] = flight(y[k], y[k-1]) + near * sum_j weights[j] exp(-|features(y[k], y[k-1], theta) - centers[j]|^2 / 2).
 
-`flight` is the prior: constant acceleration of the shift, constant rate of rotation, no deformation. The sum is how
-training motions differ from it, at contacts: kernel ridge regression on centres chosen among them (Rasmussen and
-Williams, Gaussian Processes for Machine Learning, 8.3.1). Far from all centres it is zero, and the body flies.
+`flight` is what a body does by itself: constant acceleration of the shift, constant rate of rotation, no deformation.
+The sum is what contacts add, and `near` is zero off the ground: kernel ridge regression on centres chosen among
+training motions (Rasmussen and Williams, Gaussian Processes for Machine Learning, 8.3.1). Pose and deformation have a
+sum each. The deformation also follows from the side of the body that is down. It is that of the contact: it neither
+decides where the body goes nor outlasts the contact.
 """
 
 from dataclasses import dataclass, replace
@@ -16,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
+from odeform.geometry.rigid import rotation_from_vector
 from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
@@ -23,9 +26,20 @@ from odeform.motion.splines import catmull_rom
 from odeform.schema import Window
 from odeform.types import Arrays, Floats
 
-__all__ = ["LATER_ERRORS", "ContinuedTrajectory", "Dynamics", "kernel", "without_continuation"]
+__all__ = [
+    "LATER_ERRORS",
+    "ContinuedTrajectory",
+    "Dynamics",
+    "Regression",
+    "has_continuation",
+    "kernel",
+    "without_continuation",
+    "without_side",
+]
 
 PREFIX = "continuation."
+PARTS = ("pose", "deformation")
+UPRIGHT = np.array([0.0, 0.0, 1.0])  # the upward direction, in axes of a body that has not turned
 LATER_ERRORS = "val.later_mm"
 """Validation errors of the continuation, by frames after the last that it was given."""
 
@@ -39,6 +53,18 @@ def kernel(
 
 
 @dataclass(frozen=True, eq=False)
+class Regression:
+    """A sum of Gaussian kernels of features."""
+
+    centers: Float[np.ndarray, "centers features"]
+    weights: Float[np.ndarray, "centers outputs"]
+
+    def __call__(self, features: Float[np.ndarray, "states features"]) -> Float[np.ndarray, "states outputs"]:
+        """The sum at each of the features."""
+        return kernel(features, self.centers) @ self.weights
+
+
+@dataclass(frozen=True, eq=False)
 class Dynamics:
     """The next frame of a motion from its last two. Heights are those of the anchor above its rest position."""
 
@@ -47,10 +73,12 @@ class Dynamics:
     touch: float
     """The height in metres below which a body that has not turned is in contact."""
     width: float
-    """Metres below `touch` over which the features of the motion set in."""
+    """Metres below `touch` over which contacts set in."""
     gains: Float[np.ndarray, "features"]
-    centers: Float[np.ndarray, "centers features"]
-    weights: Float[np.ndarray, "centers y"]
+    """Of all features."""
+    pose: Regression
+    """Its features are those without the side that is down."""
+    deformation: Regression
 
     def flight(self, before: Float[np.ndarray, "*batch y"], now: Float[np.ndarray, "*batch y"]) -> Floats:
         """The next frame (..., 6 + K) of a body without contact."""
@@ -64,17 +92,15 @@ class Dynamics:
         before: Float[np.ndarray, "*batch y"],
         now: Float[np.ndarray, "*batch y"],
         theta: Float[np.ndarray, "*batch parameters"],
-    ) -> Floats:
-        """(..., features): depths below `touch`, motion since the last frame, deformation and parameters.
-
-        An undeformed body off the ground has zero features: free flight is a single point, at any height and speed.
-        """
+    ) -> tuple[Floats, Floats]:
+        """(..., features): depths below `touch`, motion since the last frame, parameters, and which side of the body is
+        down. And (..., 1) how near the ground is, 0 to 1. All are zero off the ground."""
         ahead = 2.0 * now[..., 2:3] - before[..., 2:3] + self.gravity[2]
         depths = np.maximum(self.touch - np.concatenate([ahead, now[..., 2:3]], axis=-1), 0.0)
         near = np.tanh(depths.sum(axis=-1, keepdims=True) / self.width)
-        change = now - before
-        parts = [depths, near * change[..., :POSE], now[..., POSE:], change[..., POSE:], near * theta]
-        return self.gains * np.concatenate(parts, axis=-1)
+        side = rotation_from_vector(now[..., 3:POSE])[..., 2, :] - UPRIGHT
+        moving = np.concatenate([(now - before)[..., :POSE], theta, side], axis=-1)
+        return self.gains * np.concatenate([depths, near * moving], axis=-1), near
 
     def next(
         self,
@@ -83,29 +109,56 @@ class Dynamics:
         theta: Float[np.ndarray, "states parameters"],
     ) -> Float[np.ndarray, "states y"]:
         """The next frame (S, 6 + K) from the last two."""
-        return self.flight(before, now) + kernel(self.features(before, now, theta), self.centers) @ self.weights
+        features, near = self.features(before, now, theta)
+        out = self.flight(before, now)
+        out[:, :POSE] += near * self.pose(without_side(features))
+        out[:, POSE:] += near * self.deformation(features)
+        return out
 
     def arrays(self) -> Arrays:
         """The float32 arrays of a checkpoint, by name; `from_arrays` reads them."""
-        named = {"gravity": self.gravity, "ground": np.array([self.touch, self.width])}
-        named |= {"gains": self.gains, "centers": self.centers, "weights": self.weights}
+        named = {"gravity": self.gravity, "ground": np.array([self.touch, self.width]), "gains": self.gains}
+        for name in PARTS:
+            part: Regression = getattr(self, name)
+            named |= {f"{name}.centers": part.centers, f"{name}.weights": part.weights}
         return {PREFIX + name: value.astype(np.float32) for name, value in named.items()}
 
     @classmethod
     def from_arrays(cls, arrays: Arrays, coordinates: int, parameters: int) -> "Dynamics | None":
         """None for a checkpoint without continuation. ValueError unless arrays are finite and of 6 + K coordinates."""
-        if PREFIX + "weights" not in arrays:
+        if not has_continuation(arrays):
             return None
-        gravity, ground, gains, centers, weights = (
-            arrays[PREFIX + name].astype(float) for name in ("gravity", "ground", "gains", "centers", "weights")
-        )
-        features = 2 + POSE + 2 * (coordinates - POSE) + parameters
-        count = len(weights)
-        shapes = ((3,), (2,), (features,), (count, features), (count, coordinates))
-        for array, shape in zip((gravity, ground, gains, centers, weights), shapes, strict=True):
+        features = 2 + POSE + parameters + len(UPRIGHT)
+
+        def read(name: str, *shape: int) -> Floats:
+            array = arrays[PREFIX + name].astype(float)
             if array.shape != shape or not np.isfinite(array).all():
-                raise ValueError(f"{PREFIX}: expected finite arrays, one of shape {shape}, got {array.shape}")
-        return cls(gravity, float(ground[0]), float(ground[1]), gains, centers, weights)
+                raise ValueError(f"{PREFIX}{name}: expected a finite array of shape {shape}, got {array.shape}")
+            return array
+
+        def regression(name: str, inputs: int, outputs: int) -> Regression:
+            count = len(arrays[f"{PREFIX}{name}.weights"])
+            return Regression(read(f"{name}.centers", count, inputs), read(f"{name}.weights", count, outputs))
+
+        touch, width = read("ground", 2).tolist()
+        return cls(
+            read("gravity", 3),
+            touch,
+            width,
+            read("gains", features),
+            regression("pose", features - len(UPRIGHT), POSE),
+            regression("deformation", features, coordinates - POSE),
+        )
+
+
+def without_side(features: Float[np.ndarray, "*batch features"]) -> Float[np.ndarray, "*batch fewer"]:
+    """The features that the pose follows from."""
+    return features[..., : -len(UPRIGHT)]
+
+
+def has_continuation(arrays: Arrays) -> bool:
+    """Whether a checkpoint of these arrays has a continuation that is understood: earlier versions had another one."""
+    return f"{PREFIX}pose.weights" in arrays
 
 
 def without_continuation(checkpoint: Checkpoint) -> Checkpoint:

@@ -31,7 +31,7 @@ class ErrorBand:
     around each time make the band; the scale of a sequence is estimated from the others alone. Beyond the trained
     ranges nothing was validated: there the band doubles with each `width` outside. Beyond the window it grows in
     proportion to the time, or as the errors of the continuation did when it predicted the last third of the window, if
-    that is more.
+    that is more; after as long as that, with the square of the time that they were predicted for.
     """
 
     def __init__(self, arrays: Arrays) -> None:
@@ -69,5 +69,8 @@ class ErrorBand:
         grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)
         frames = (times - stop) / (self._times[1] - self._times[0])
         leads = np.arange(len(self._later) + 1.0)
-        later = [np.interp(frames, leads, np.concatenate([[0.0], column])) for column in self._later.T]
-        return np.where(times[:, None] > 0.0, np.maximum(grown, np.stack(later, axis=1)), 0.0)
+        later = np.stack(
+            [np.interp(frames, leads, np.concatenate([[0.0], column])) for column in self._later.T], axis=1
+        )
+        later *= (np.maximum(frames / leads[-1], 1.0) ** 2)[:, None]
+        return np.where(times[:, None] > 0.0, np.maximum(grown, later), 0.0)

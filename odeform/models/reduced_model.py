@@ -5,7 +5,7 @@ from functools import cached_property
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
-from odeform.models.continuation import ContinuedTrajectory, Dynamics
+from odeform.models.continuation import ContinuedTrajectory, Dynamics, has_continuation, without_continuation
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.recent import InUse
@@ -20,6 +20,10 @@ __all__ = ["ReducedModel"]
 
 class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        """Motions of a checkpoint whose continuation is of an earlier version stop where the trained window ends."""
+        super().__init__(checkpoint if has_continuation(checkpoint.arrays) else without_continuation(checkpoint))
 
     def _read(self, checkpoint: Checkpoint) -> None:
         _ = self.space, self.dynamics  # damaged ones are found now, not when they are used

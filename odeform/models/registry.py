@@ -19,6 +19,7 @@ __all__ = [
     "TRAINABLE",
     "load",
     "load_continuous",
+    "load_model",
     "load_reduced",
     "model_class",
     "models_of",
@@ -71,9 +72,15 @@ def load(name: str | Path) -> Predictor:
     """
     checkpoint = open_checkpoint(name)
     try:
-        model = model_class(checkpoint.model)
+        model_class(checkpoint.model)
     except InputError as error:
         raise InputError(f"checkpoint {name}: {error}") from None
+    return load_model(checkpoint)
+
+
+def load_model(checkpoint: Checkpoint) -> Predictor:
+    """The predictor of a checkpoint that is read already."""
+    model = model_class(checkpoint.model)
     return PerObject(checkpoint, model) if is_per_object(checkpoint) else model(checkpoint)
 
 

@@ -18,7 +18,6 @@ from odeform.models.baselines.arithmetic import Net
 from odeform.models.baselines.point_model import point_checkpoint
 from odeform.models.baselines.point_network import PointNet, Trial, sum_of
 from odeform.models.layers import layer_shapes
-from odeform.schema import REACH
 from odeform.training.descent import cosine_decay, small_batches
 from odeform.training.point_data import PointData
 from odeform.training.samplers import SAMPLERS
@@ -32,6 +31,7 @@ WARM = 0.03  # share of the length in which the learning rate rises
 CLIP = 1.0  # norm of the gradient
 VALIDATIONS = 25  # over the length
 APART = 20  # steps between two validations, at least
+AHEAD = 1.0  # windows beyond the trained one, each of which takes as long as that
 WATCHED = 256  # validation motions of a point
 
 
@@ -158,5 +158,5 @@ def fit_points(
     schema = data.schema
     if network.sampling != "between":
         # networks of the time, or of the last frame, continue beyond the window
-        schema = replace(schema, window=replace(schema.window, reach=REACH))
+        schema = replace(schema, window=replace(schema.window, reach=AHEAD))
     return point_checkpoint(model, schema, data.frame, data.mean, weights, config)

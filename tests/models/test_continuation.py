@@ -124,6 +124,28 @@ def test_it_is_bounded_at_any_time(pair: tuple[ODeform, ODeform], reach: float) 
         assert np.array_equal(y[1], y[2])  # the clock has stopped
 
 
+def test_contacts_alone_change_a_flight(pair: tuple[ODeform, ODeform]) -> None:
+    dynamics = pair[1].dynamics
+    assert dynamics is not None
+    motion, window, theta = pair[1].solve(None, {"mass": 0.6}), pair[1].schema.window, np.zeros((1, 4))
+    before, now = motion.trajectory.reduced(window.stop - np.array([1.0, 0.0]) / window.rate)[:, None]
+    low, high = (dynamics.touch + height - now[:, 2] for height in (-dynamics.width, 1.0))
+    for lifted, changed in ((high, False), (low, True)):
+        states = [state + np.eye(1, state.shape[1], 2) * lifted for state in (before, now)]
+        added = dynamics.next(*states, theta) - dynamics.flight(*states)
+        assert bool(added[:, :6].any()) == bool(added[:, 6:].any()) == changed
+
+
+def test_a_continuation_of_an_earlier_version_is_left_out(kick: Predictor) -> None:
+    known, later = kick.checkpoint, kick.schema.window.stop * np.array([1.0, 1.4, 1e9])
+    arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
+    older = ODeform(replace(known, arrays={**arrays, f"{PREFIX}centers": np.zeros((3, 2), np.float32)}))
+    assert older.dynamics is None
+    assert older.schema.window.reach == 0.0
+    assert older.schema.window.soft_clamped(later[2:])[0] == pytest.approx(1.05)
+    assert np.array_equal(older.solve().vertices(later[:1]), kick.solve().vertices(later[:1]))
+
+
 def test_older_checkpoints_have_none(kick: Predictor) -> None:
     known, window = kick.checkpoint, kick.schema.window
     arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
@@ -137,7 +159,8 @@ def test_wrong_arrays_are_refused(flying: Dynamics) -> None:
     arrays = flying.arrays()
     read = Dynamics.from_arrays(arrays, 8, 1)
     assert read is not None
-    assert np.allclose(read.centers, flying.centers, rtol=1e-6)
+    assert np.allclose(read.gains, flying.gains, rtol=1e-6)
+    assert read.pose.centers.shape == flying.pose.centers.shape
     with pytest.raises(ValueError, match="shape"):
         Dynamics.from_arrays(arrays, 9, 1)
     with pytest.raises(ValueError, match="finite"):

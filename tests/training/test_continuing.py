@@ -1,5 +1,6 @@
 """The dynamics that continue motions, on a bouncing ball, and whether they are kept."""
 
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -7,12 +8,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
 from odeform.dataset.training_data import TrainingData, prepare
+from odeform.errors import InputError
 from odeform.models.base import Predictor
-from odeform.models.continuation import Dynamics
+from odeform.models.continuation import Dynamics, Regression, without_continuation
 from odeform.models.odeform.model import ODeform
+from odeform.models.reduced_model import ReducedModel
+from odeform.models.registry import load, load_model
+from odeform.simulation.scenes.kick import PULSE
 from odeform.training import continuation
-from odeform.training.continuation import fit_dynamics, predicted_errors, with_continuation
+from odeform.training.continuation import fit_dynamics, predicted_errors, refitted, with_continuation
 from odeform.types import Floats
 
 RATE, GRAVITY, HEIGHT = 60.0, -10.0, 0.2
@@ -68,13 +74,16 @@ def test_what_does_not_foretell_is_not_kept(
 
     def falling(theta: Floats, reduced: Floats, gyration_radius: float) -> Dynamics:
         counts.append(reduced.shape[1])
-        width = 2 + 6 + 2 * (reduced.shape[2] - 6) + theta.shape[1]
-        empty = np.zeros((0, width)), np.zeros((0, reduced.shape[2]))
-        return Dynamics(np.array([0.0, 0.0, -1.0]), 0.0, 1.0, np.ones(width), *empty)
+        width = 2 + 6 + theta.shape[1] + 3
+        pose = Regression(np.zeros((0, width - 3)), np.zeros((0, 6)))
+        deformation = Regression(np.zeros((0, width)), np.zeros((0, reduced.shape[2] - 6)))
+        return Dynamics(np.array([0.0, 0.0, -1.0]), 0.0, 1.0, np.ones(width), pose, deformation)
 
     monkeypatch.setattr(continuation, "fit_dynamics", falling)
     assert predicted_errors(model, data) is None
-    assert counts == [round(len(data.times) / 1.5)]  # fitted without the held-out part
+    free = data.first_free
+    assert data.times[free] >= PULSE > data.times[free - 1]  # nothing explains the push
+    assert counts == [round(len(data.times) / 1.5) - free]  # fitted without the held-out part
     assert with_continuation(model, data) is model.checkpoint
     # a criterion that passes whatever is kept
     errors = np.full((len(data.theta["val"]), 40), 3.0)
@@ -82,4 +91,20 @@ def test_what_does_not_foretell_is_not_kept(
     kept = with_continuation(model, data)
     assert kept.schema.window.reach > 0.0
     assert np.array_equal(kept.arrays["val.later_mm"], errors.astype(np.float32))
-    assert counts[-1] == len(data.times)
+    assert counts[-1] == len(data.times) - free
+
+
+def test_a_model_keeps_its_window_with_another_continuation() -> None:
+    dataset, model = open_dataset("mass-elastic"), load("mass-elastic/nearest")
+    few = replace(dataset, entries=dataset.entries[::10])
+    again = load_model(refitted(without_continuation(model.checkpoint), few))
+    assert isinstance(again, ReducedModel)
+    assert again.dynamics is not None
+    inside = again.schema.window.times
+    motions = [one.solve(None, {"mass": 0.4}) for one in (model, again)]
+    assert np.array_equal(*(motion.vertices(inside) for motion in motions))
+
+
+def test_networks_are_not_continued() -> None:
+    with pytest.raises(InputError, match="direct: expected a model of reduced coordinates"):
+        refitted(load("mass-elastic/direct").checkpoint, open_dataset("mass-elastic"))
