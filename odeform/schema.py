@@ -31,7 +31,7 @@ REACH = 3.0
 """Windows beyond the trained one over which models with a continuation keep their clock running."""
 
 
-def soft_clip(values: Floats, limit: float, margin: float) -> Floats:
+def soft_clip(values: Floats, limit: float | Floats, margin: float | Floats) -> Floats:
     """Clip magnitudes smoothly: bit-exact up to `limit`, and never above `limit + margin`; any shape (...).
 
     Inputs of models pass through this function. Models are therefore continuous functions of a bounded set, and their
@@ -167,6 +167,10 @@ class Window:
         """(T,) frame times in seconds, both ends included."""
         count = round((self.stop - self.start) * self.rate)
         return self.start + np.arange(count + 1) / self.rate
+
+    def passed(self, times: Floats) -> Floats:
+        """(T,) seconds -> how many trained windows have passed, at least 1."""
+        return np.maximum((times - self.start) / (self.stop - self.start), 1.0)
 
     def soft_clamped(self, times: Floats) -> Floats:
         """(T,) times in seconds as models use them: past the trained span and its reach, the clock slows and stops."""

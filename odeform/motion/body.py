@@ -24,12 +24,13 @@ class WatchedBody:
     all: EvaluatedBasis
     limit: float
 
-    def sample(self, predicted: Float[np.ndarray, "times y"]) -> Sample:
-        """At predictions (T, 6 + K), not yet bounded, in metres and radians."""
+    def sample(self, predicted: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Sample:
+        """At predictions (T, 6 + K), not yet bounded, in metres and radians, after `windows` (T,) as in
+        `ReducedSpace.bounded`."""
         space = self.all.space
         with np.errstate(all="ignore"):
             deformation = np.linalg.norm(predicted[:, POSE:], axis=1) / space.largest[1]
-            y = space.bounded(predicted)
+            y = space.bounded(predicted, windows)
             lowest = _lowest(self.few, y)
             near = np.flatnonzero((lowest >= self.limit) & (lowest < self.limit + NEAR))
             if len(near):

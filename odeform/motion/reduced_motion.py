@@ -14,7 +14,7 @@ from odeform.motion.local_frames import Axes, gradients, moved_covariances
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
 from odeform.motion.threads import thread_map
 from odeform.motion.trust import UNKNOWN, Trust
-from odeform.motion.watch import Watch
+from odeform.motion.watch import Sample, Watch
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
@@ -64,7 +64,12 @@ class ReducedMotion(Motion):
         body = self.body
         if body is None:
             return None
-        return Watch(self.trust.limits, self.schema.window, lambda times: body.sample(self.trajectory.reduced(times)))
+        window = self.schema.window
+
+        def sample(times: Times) -> Sample:
+            return body.sample(self.trajectory.reduced(times), window.passed(times))
+
+        return Watch(self.trust.limits, window, sample)
 
     @property
     def stats(self) -> SolveStats:
@@ -75,7 +80,8 @@ class ReducedMotion(Motion):
         return self.trajectory.last_good
 
     def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
-        return self.space.bounded(self.trajectory.reduced(self._clock(t)))
+        times = self._clock(t)
+        return self.space.bounded(self.trajectory.reduced(times), self.schema.window.passed(times))
 
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)

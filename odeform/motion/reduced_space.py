@@ -16,7 +16,7 @@ from jaxtyping import Float
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.motion.basis import DisplacementBasis, fit_basis
 from odeform.schema import soft_clip
-from odeform.types import Arrays, Basis, Frames, Mesh, MotionSequence, Perpoint, Rotations, Vector, Vectors
+from odeform.types import Arrays, Basis, Floats, Frames, Mesh, MotionSequence, Perpoint, Rotations, Vector, Vectors
 
 __all__ = [
     "POSE",
@@ -50,13 +50,14 @@ class ReducedSpace:
     surface: Mesh | None
     largest: tuple[float, float] = (float("inf"), float("inf"))
 
-    def bounded(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times y"]:
+    def bounded(self, y: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Floats:
         """(T, 6 + K), bit-exact up to shifts and deformations 15 % larger than any trained.
 
-        Larger ones, from parameters or times far outside the trained range or from a coarse solver, are soft-clipped
-        below 30 %, so that a body keeps its shape and stays nearby for any input.
+        Larger ones, from parameters far outside the trained range or from a coarse solver, are soft-clipped below 30 %,
+        so that a body keeps its shape and stays nearby for any input. After `windows` (T,) of the trained window, at
+        least 1, a body may have moved that many times as far.
         """
-        for part, largest in zip((slice(0, 3), slice(POSE, None)), self.largest, strict=True):
+        for part, largest in ((slice(0, 3), self.largest[0] * windows), (slice(POSE, None), self.largest[1])):
             limit = MARGIN * largest
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 size = np.linalg.norm(y[:, part], axis=1)

@@ -139,7 +139,10 @@ def _overall(predictor: Predictor, cases: list[Case], outcomes: list[Outcome]) -
         (case, outcome) for case, outcome in zip(cases, outcomes, strict=True) if outcome.moved and case.shape == "body"
     ]
     # (cases, 2, times)
-    growth = np.array([np.divide((outcome.moved, outcome.deformed), largest[:, None]) for _, outcome in of_body])
+    window = predictor.schema.window
+    passed = window.passed(window.soft_clamped(window.stop * np.array(MOMENTS)))
+    allowed = np.stack([largest[0] * passed, largest[1] * np.ones(len(passed))])
+    growth = np.array([np.divide((outcome.moved, outcome.deformed), allowed) for _, outcome in of_body])
     coarse = np.array([_coarse(case, predictor.schema.window) for case, _ in of_body])
     sound = growth[~coarse]
     diverged = (sound > 2.0).any(axis=(0, 1))

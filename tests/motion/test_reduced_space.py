@@ -117,7 +117,7 @@ def test_nothing_grows_by_more_than_three_tenths_of_what_was_trained() -> None:
     y[:, :3] = 0.4 * sizes[:, None] * [0.0, 0.6, -0.8]
     y[:, 3:6] = 100.0
     y[:, 6:] = 2e-3 * sizes[::-1, None] * [0.6, -0.8]
-    bounded = space.bounded(y)
+    bounded = space.bounded(y, np.ones(4))
     assert np.array_equal(bounded[:2, :6], y[:2, :6])
     assert np.array_equal(bounded[2:, 6:], y[2:, 6:])
     assert np.array_equal(bounded[:, 3:6], y[:, 3:6])
@@ -126,5 +126,9 @@ def test_nothing_grows_by_more_than_three_tenths_of_what_was_trained() -> None:
         assert 1.15 < size[0] < 1.2
         assert size[1] == pytest.approx(1.3)
         assert np.allclose(part[:, -2:] / (largest * size[:, None]), [0.6, -0.8])
-    assert np.isfinite(space.bounded(np.full((1, 8), 1e300))).all()
+    assert np.isfinite(space.bounded(np.full((1, 8), 1e300), np.ones(1))).all()
+    later = space.bounded(y, np.full(4, 3.0))  # by then it may have moved three times as far
+    assert np.array_equal(later[:3, :3], y[:3, :3])
+    assert np.linalg.norm(later[3, :3]) == pytest.approx(3.0 * 1.3 * 0.4)
+    assert np.array_equal(later[:, 6:], bounded[:, 6:])
     assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == (0.4, 2e-3)

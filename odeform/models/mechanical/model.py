@@ -97,4 +97,4 @@ class MechanicalODeform(ReducedModel):
             solved = CorrectedTrajectory(solved, shares, rest, self.correction.stop)
         body, window = self.watched_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-        return LiftedTrajectory(solved, lambda y: body.sample(y).lowest, body.limit + SPARE, grid)
+        return LiftedTrajectory(solved, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)

@@ -68,14 +68,14 @@ def simulate(
     step: float = STEP,
     resolution: int = SEGMENTS,
     report: Callable[[float], None] = lambda _: None,
+    until: float = SCHEMA.window.stop,
 ) -> MotionSequence:
-    """One motion over the scene's window, with frames at `rate` Hz (default: the window's).
+    """One motion up to `until` seconds, with frames at `rate` Hz (default: the window's).
 
     `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the share done. The mesh is
     oriented with the pulse: the heading is a symmetry of the scene, and a mesh that turns with it keeps this symmetry
     exact. Raises `SimulationError`.
     """
-    window = SCHEMA.window
     body, rest, mesh = stress_free(parameters, step, resolution)
     elevation = parameters["elevation"]
     load = pulse_weights(rest, elevation)[:, None] * pulse_direction(elevation) * parameters["force"]
@@ -83,7 +83,7 @@ def simulate(
     def force(time: float) -> Floats | None:
         return load * math.sin(math.pi * time / PULSE) ** 2 if time < PULSE else None
 
-    times, vertices = run(body, window.stop, rate or window.rate, force, report=lambda now: report(now / window.stop))
+    times, vertices = run(body, until, rate or SCHEMA.window.rate, force, report=lambda now: report(now / until))
     turned = vertices @ rotation_z(parameters["azimuth"]).T
     return MotionSequence(times, turned.astype(np.float32), mesh.faces, body.weights, dict(parameters))
 
