@@ -5,12 +5,14 @@ import shlex
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from odeform.checkpoint import Checkpoint
 from odeform.cli import train as training
 from odeform.cli.options import add_json, positive, write_json
 from odeform.errors import InputError
+
+if TYPE_CHECKING:
+    from odeform.checkpoint import Checkpoint
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -81,7 +83,7 @@ def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None
     return tokens
 
 
-def _refit(name: str, recorded: Checkpoint, out: Path, command: str) -> None:
+def _refit(name: str, recorded: "Checkpoint", out: Path, command: str) -> None:
     """Write the bundled checkpoint of this name with another continuation."""
     from odeform.checkpoint import write_checkpoint
     from odeform.dataset.store import open_dataset

@@ -243,8 +243,8 @@ def test_a_shape_that_was_not_trained_is_recorded_and_replayed_as_such(
     kick: Predictor, path: Path, record: Record, capsys: pytest.CaptureFixture[str]
 ) -> None:
     box = Mesh(kick.rest.points * np.float32([1.0, 1.0, 0.6]), kick.rest.faces)
-    sinking = {"mass": 0.92, "bending": 0.39, "force": 141.4, "azimuth": 0.0, "elevation": 0.76}
-    record(path, [_column(kick, geometry=box), _column(kick, label="ball")], [0.0, 1.3], sinking)
+    sinking = {"mass": 0.99, "bending": 0.3, "force": 115.0, "azimuth": 0.0, "elevation": 0.5}
+    record(path, [_column(kick, geometry=box), _column(kick, label="ball")], [0.0, 3.5], sinking)
     recording = read_recording(path)
     flat, ball = (facts for _, facts in sorted(recording.columns.items()))
     assert flat["likeness"]["trained"] is False
