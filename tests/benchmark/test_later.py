@@ -29,7 +29,7 @@ def test_a_ball_at_rest_stays_so_for_as_long_as_is_asked() -> None:
     moved = replace(later, vertices=[vertices + jump for vertices in later.vertices])
     off = compare_later(load("mass-elastic"), moved)["windows"]["1:2"]
     assert off["pooled_mm"] > 8.0
-    assert off["coverage_90"] == 0.0
+    assert off["coverage_90"] < 0.5 < spans["1:2"]["coverage_90"]
 
 
 def test_the_command_writes_the_comparison(tmp_path: Path) -> None:
