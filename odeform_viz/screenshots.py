@@ -55,7 +55,7 @@ SHOWN = 4  # test sequence of each pushed object
 STAGE = (0, 20, 1080, 560)  # px: where two bodies stand side by side
 MOMENT = 0.012  # s; the kicked ball is deformed then
 # inside the trained range, but it would sink into the floor after the trained window
-SINKING = {"mass (kg)": 0.92, "bending (N m)": 0.39, "force (N)": 141.4, "elevation (rad)": 0.76}
+SINKING = {"mass (kg)": 0.4, "bending (N m)": 0.2, "force (N)": 160.0, "elevation (rad)": 0.84}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
 SOFTEST = {"mass (kg)": 0.5, "bending (N m)": 0.3, "force (N)": 150.0}  # of the trained kicks
 
@@ -157,7 +157,7 @@ def _pushed(view: View) -> None:
 def _stopped(view: View) -> None:
     for label, value in SINKING.items():
         view.set(label, value)
-    view.show(1.35)
+    view.show(0.47)
     view.wait(lambda: view.app.presenter.settled)
 
 

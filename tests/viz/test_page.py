@@ -45,7 +45,7 @@ def test_mass_bending_force_and_time_change_the_image(kicked: Tab) -> None:
         assert kicked.changes(before), f"{label} changed nothing"
         before = kicked.settled()
     assert kicked.app.panel(ParameterPanel).parameters()["mass"] > 1.0
-    assert kicked.app.clock.time() == pytest.approx(1.5, abs=0.01)
+    assert kicked.app.clock.time() == pytest.approx(2.0, abs=0.01)
     assert kicked.says("extrapolated")
     assert kicked.says("outside the trained range")
     assert kicked.errors == []

@@ -26,7 +26,7 @@ def test_a_click_on_a_curve_goes_to_that_time(tab: Tab) -> None:
     assert where is not None
     # the middle of the area that is drawn on: 34 to 202 of 208; a click of the locator waits until the plot stays still
     plot.click(position={"x": where["width"] * 118 / 208, "y": 0.5 * where["height"]})
-    assert until(lambda: tab.app.clock.time() == pytest.approx(0.75, abs=0.02))
+    assert until(lambda: tab.app.clock.time() == pytest.approx(1.0, abs=0.02))
 
 
 def test_a_selected_number_stays_selected_while_the_time_plays(tab: Tab) -> None:
@@ -56,4 +56,4 @@ def test_a_click_on_a_curve_replaces_a_time_that_was_typed(tab: Tab, confirm: bo
     where = plot.bounding_box()
     assert where is not None
     plot.click(position={"x": where["width"] * 118 / 208, "y": 0.5 * where["height"]})
-    assert until(lambda: clock.time() == pytest.approx(0.75, abs=0.02))
+    assert until(lambda: clock.time() == pytest.approx(1.0, abs=0.02))
