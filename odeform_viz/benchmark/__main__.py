@@ -128,6 +128,8 @@ def _soak(models: list[Predictor], truth: Column | None, requests: int, minutes:
     print(f"resident MB after each part: {resident}")
     warm, last = result.memory
     print(f"memory after warm-up {warm:.0f} MB, at the end {last:.0f} MB: {result.growth:+.1%}")
+    if result.allocated is not None:
+        print("of that allocated {:.0f} MB, at the end {:.0f} MB".format(*result.allocated))
     for error in dict.fromkeys(result.errors):
         print(error)
     print("passed" if result.passed else "missed: expected no error, the newest frame last, and less growth than 5 %")

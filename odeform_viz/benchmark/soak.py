@@ -18,6 +18,7 @@ from odeform_viz.benchmark.random_input import send_random_input
 from odeform_viz.benchmark.resetting import reset
 from odeform_viz.benchmark.use import SCRIPTS
 from odeform_viz.benchmark.visitors import Missed, Visitors
+from odeform_viz.runtime.memory import allocated_mb
 
 __all__ = ["GROWTH", "Soak", "soak"]
 
@@ -42,6 +43,8 @@ class Soak:
     infinite if one of them gets another frame last."""
     resident_mb: tuple[float, ...]
     """Resident memory of the process, the browsers' clients included."""
+    allocated_mb: tuple[float, ...]
+    """Of that, what is allocated; empty where it is not known."""
     wall_s: float
 
     @property
@@ -50,9 +53,12 @@ class Soak:
 
         Each is the median of a quarter of the parts: single ones differ with what was shown last.
         """
-        warm = self.resident_mb[math.ceil(WARM_UP * len(self.resident_mb)) - 1 :]
-        quarter = max(len(warm) // 4, 1)
-        return float(np.median(warm[:quarter])), float(np.median(warm[-quarter:]))
+        return _first_and_last(self.resident_mb)
+
+    @property
+    def allocated(self) -> tuple[float, float] | None:
+        """The same of the memory that is allocated: it grows with what is kept, and not with gaps between pieces."""
+        return _first_and_last(self.allocated_mb) if self.allocated_mb else None
 
     @property
     def growth(self) -> float:
@@ -82,7 +88,7 @@ def soak(
     `report` is called with a line about each part.
     """
     rng, begin = np.random.default_rng(seed), time.monotonic()
-    port, newest, resident = app.server.get_port(), [], []
+    port, newest, resident, allocated = app.server.get_port(), [], [], []
     with _tracebacks() as errors, LoopbackClient(port) as first, LoopbackClient(port) as second:
         visitors = Visitors(app, (first, second), folder, rng)
         while len(resident) < parts if minutes is None else time.monotonic() < begin + 60.0 * minutes:
@@ -99,11 +105,19 @@ def soak(
                 client.downloads.clear()  # memory of the client, not of the viewer
             visitors.collect(REST)  # in which the viewer returns what it has freed
             resident.append(_resident_mb())
+            allocated.append(allocated_mb())
             line = f"{time.monotonic() - begin:.0f} s: {resident[-1]:.0f} MB, newest frame after {newest[-1]:.2f} s"
             report("; ".join([line, *missed]))
         refused = len(first.notifications)
         sent = visitors.sent + first.sent + second.sent
-    return Soak(sent, refused, tuple(errors), tuple(newest), tuple(resident), time.monotonic() - begin)
+    known = tuple(mb for mb in allocated if mb is not None)
+    return Soak(sent, refused, tuple(errors), tuple(newest), tuple(resident), known, time.monotonic() - begin)
+
+
+def _first_and_last(parts: tuple[float, ...]) -> tuple[float, float]:
+    warm = parts[math.ceil(WARM_UP * len(parts)) - 1 :]
+    quarter = max(len(warm) // 4, 1)
+    return float(np.median(warm[:quarter])), float(np.median(warm[-quarter:]))
 
 
 def _run_scripts(visitors: Visitors) -> list[str]:

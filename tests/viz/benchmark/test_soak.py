@@ -14,6 +14,7 @@ from odeform_viz.benchmark.soak import Soak, soak
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels import truth
 from odeform_viz.runtime import jobs
+from odeform_viz.runtime.memory import allocated_mb
 
 FRAMES = 600  # of a stub of a simulation, over its whole window
 
@@ -62,4 +63,25 @@ def at_rest(report: jobs.Report, scene: str, parameters: dict[str, float], rate:
 def test_a_soak_passes_within_its_bars(
     errors: tuple[str, ...], newest: tuple[float, ...], resident: tuple[float, ...], passed: bool
 ) -> None:
-    assert Soak(100, 0, errors, newest, resident, 1.0).passed is passed
+    assert Soak(100, 0, errors, newest, resident, (), 1.0).passed is passed
+
+
+def test_what_is_allocated_is_compared_as_the_resident_memory_is() -> None:
+    few = Soak(100, 0, (), (0.1,), (500.0, 700.0, 700.0, 700.0), (90.0, 100.0, 100.0, 101.0), 1.0)
+    assert few.memory == (500.0, 700.0)
+    assert few.allocated == (90.0, 101.0)
+    assert Soak(100, 0, (), (0.1,), (500.0,), (), 1.0).allocated is None
+
+
+@pytest.mark.skipif(allocated_mb() is None, reason="needs glibc")
+def test_what_is_kept_is_counted_as_allocated() -> None:
+    before = allocated_mb()
+    kept = np.ones(5_000_000)
+    between = allocated_mb()
+    del kept
+    after = allocated_mb()
+    assert before is not None
+    assert between is not None
+    assert after is not None
+    assert between - before > 35.0
+    assert between - after > 35.0
