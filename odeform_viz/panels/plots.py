@@ -1,5 +1,7 @@
 """Curves of all columns over time, with a cursor and a legend."""
 
+import threading
+
 from odeform_viz.colors import color_of
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
@@ -23,9 +25,14 @@ class PlotPanel(Panel):
         self._lines: list[Line] = []
         self._described: Description | None = None
         self._rotates = self._large = False
+        self._drawing = threading.Lock()  # a key may be pressed while other columns are described
         page.add_hotkey(ENLARGE, "larger or smaller plots", self._resize)
 
     def describe(self, description: Description) -> None:
+        with self._drawing:
+            self._describe(description)
+
+    def _describe(self, description: Description) -> None:
         frame = description.frame
         lines = [
             (shown.column.label, color_of(shown.column), curves)
@@ -39,10 +46,11 @@ class PlotPanel(Panel):
         self._follow(description)
 
     def _resize(self) -> None:
-        self._large = not self._large
-        self._draw()
-        if self._described is not None:
-            self._follow(self._described)
+        with self._drawing:
+            self._large = not self._large
+            self._draw()
+            if self._described is not None:
+                self._follow(self._described)
 
     def _draw(self) -> None:
         plots = max(len(quantities_of(self._lines, self._rotates)), 3)

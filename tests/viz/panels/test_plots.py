@@ -1,6 +1,7 @@
 """Curves over time."""
 
 import re
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 import numpy as np
@@ -152,3 +153,26 @@ def test_after_many_moments_the_numbers_are_of_the_last(dropped: tuple[App, Loop
     last = cursor_css(app.session.schema.window, 0.45)
     assert client.until(lambda: plots._cursor.content == last)
     assert client.until(lambda: app.panel(PlaybackPanel)._time.value == 0.45)
+
+
+def test_a_key_while_other_columns_are_described(
+    dropped: tuple[App, LoopbackClient], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, client = dropped
+    panel = app.panel(PlotPanel)
+    panel._resize()
+    draw = panel._draw
+    pressed: list[Future[None]] = []
+
+    def draw_slowly() -> None:
+        if not pressed:
+            pressed.extend([ThreadPoolExecutor(1).submit(panel._resize), ThreadPoolExecutor(1).submit(panel._resize)])
+            wait(pressed, 0.5)
+        draw()
+
+    monkeypatch.setattr(panel, "_draw", draw_slowly)
+    (first,) = app.columns.all
+    app.columns.add(Column("other", first.predictor, first.geometry))
+    app.page.columns_changed()
+    assert client.until(lambda: bool(pressed) and all(press.done() for press in pressed))
+    assert [press.exception() for press in pressed] == [None, None]
