@@ -11,7 +11,15 @@ from typing import IO, Any
 
 from odeform.errors import InputError
 
-__all__ = ["atomic_open", "atomic_write", "bundled", "parse_json", "require_writable", "safetensors_metadata"]
+__all__ = [
+    "atomic_open",
+    "atomic_write",
+    "bundled",
+    "parse_json",
+    "require_writable",
+    "safetensors_metadata",
+    "write_or_print",
+]
 
 LONGEST = 100  # characters of a name in that of its temporary file
 DIGITS = 300  # of an integer in JSON
@@ -55,6 +63,15 @@ def atomic_write(path: Path, data: bytes) -> None:
     """Write `data` with `atomic_open`."""
     with atomic_open(path) as file:
         file.write(data)
+
+
+def write_or_print(result: Any, path: str | Path | None) -> None:
+    """A result of a study as JSON: in the file `path`, or on the terminal without one."""
+    text = json.dumps(result, indent=1)
+    if path:
+        atomic_write(Path(path), text.encode())
+    else:
+        print(text)
 
 
 def parse_json(data: str | bytes, where: str) -> Any:

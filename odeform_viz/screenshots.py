@@ -54,7 +54,7 @@ MOST_BYTES = 120_000  # of a picture
 SHOWN = 4  # test sequence of each pushed object
 STAGE = (0, 20, 1080, 560)  # px: where two bodies stand side by side
 MOMENT = 0.012  # s; the kicked ball is deformed then
-# inside the trained range, but it would sink into the floor after the trained window
+# outside the trained range; it would sink into the floor at its first landing
 SINKING = {"mass (kg)": 0.4, "bending (N m)": 0.2, "force (N)": 160.0, "elevation (rad)": 0.84}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
 SOFTEST = {"mass (kg)": 0.5, "bending (N m)": 0.3, "force (N)": 150.0}  # of the trained kicks

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from odeform.checkpoint import bundled_checkpoints
@@ -36,6 +37,33 @@ def test_a_short_training_of_the_default_model_gives_the_recorded_scores(
     # processors round differently, and training amplifies that
     assert again["again"] == pytest.approx(recorded, rel=0.1)
     assert "kick/odeform: " in capsys.readouterr().out
+
+
+def test_a_continuation_alone_is_fitted_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name, out = "mass-elastic/pod-rbf", tmp_path / "mass-elastic_pod-rbf.safetensors"
+    assert main(["retrain", name, "--only", "continuation", "--keep", str(tmp_path)]) == 0
+    assert "(+0.00 %)" in capsys.readouterr().out
+    again, recorded = load(out).checkpoint, load(name).checkpoint
+    assert again.scores == recorded.scores
+    assert again.provenance["command"] == recorded.provenance["command"]
+    assert again.provenance["continuation"]["command"] == f"odeform retrain {name} --only continuation"
+    assert np.array_equal(load(out).solve().vertices(0.7), load(name).solve().vertices(0.7))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["mass-elastic/direct"], "direct: expected a model of reduced coordinates"),
+        (["contact-force"], "of one body, which is continued"),
+        (["kick", "--steps", "5"], "--steps: a continuation is fitted without steps"),
+    ],
+)
+def test_what_is_not_continued_is_refused(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["retrain", *arguments, "--only", "continuation", "--keep", str(tmp_path)]) == 2
+    assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_others_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

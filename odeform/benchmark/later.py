@@ -4,7 +4,7 @@ Run `python -m odeform.benchmark.later CKPT ...`; the checkpoints are of one sce
 """
 
 import argparse
-import json
+import io
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,10 +16,11 @@ from jaxtyping import Float
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.io import atomic_write
+from odeform.io import atomic_write, write_or_print
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.parallel import parallel_map
+from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Faces, Floats, Frames, Mesh
 
@@ -31,6 +32,9 @@ WINDOWS = SPANS[-1][1]
 RESTS = "rest_speed_m_s"  # of the fixed values of scenes whose motions are simulated until the body lies still
 SPEED = 0.05  # s at the end, over which the speed is measured
 COUNT = 16
+SUMMARY = ("highest_mm", "speed_at_the_end_mm_s", "energy_at_the_end_mJ_kg")
+"""What is left of a motion: how high it still gets, and at the end the speed along the floor and the energy of its
+centre, without those of spin and deformation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +72,14 @@ def _simulated(scene: str, until: float, keep: Path | None, entry: Entry) -> Fra
     vertices = get_scene(scene).simulate(entry.parameters, until=until).vertices
     if file is not None:
         file.parent.mkdir(parents=True, exist_ok=True)
-        np.save(file, vertices)
+        np.save(buffer := io.BytesIO(), vertices)
+        atomic_write(file, buffer.getvalue())
     return vertices
 
 
 def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
-    """Errors in mm by span, how many of its frames the 90 % band covers, and how the motions are at the end: their
-    heights, speeds and energies, predicted and simulated."""
+    """By span: errors in mm, and which share of the frames the 90 % band covers, if the model has one. And the median
+    difference of each figure of `SUMMARY`, predicted and simulated."""
     window, errors, bands, ends = model.schema.window, [], [], []
     for entry, truth in zip(later.entries, later.vertices, strict=True):
         motion = model.solve(Mesh(truth[0], later.faces), entry.parameters)
@@ -84,32 +89,28 @@ def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
         bands.append(np.full(len(later.times), np.nan) if band is None else band[:, 1])
         after = later.times > window.stop
         ends.append([_summary(one[after].mean(axis=1), window.rate) for one in (predicted, truth)])
-    squares, known = np.square(errors), np.isfinite(bands).all()
+    rmse, band_90, known = np.array(errors), np.array(bands), np.isfinite(bands).all()
     windows = (later.times - window.start) / (window.stop - window.start)
     spans = {}
     for begin, end in SPANS:
         inside = (windows > begin + 1e-9) & (windows <= end + 1e-9)
-        of_motions = np.sqrt(squares[:, inside].mean(axis=1))
+        of_motions = np.sqrt(np.square(rmse[:, inside]).mean(axis=1))
         spans[f"{begin:g}:{end:g}"] = {
             "pooled_mm": float(np.sqrt(np.square(of_motions).mean())),
             "median_mm": float(np.median(of_motions)),
             "largest_mm": float(of_motions.max()),
-            "coverage_90": float((np.array(errors)[:, inside] <= np.array(bands)[:, inside]).mean()) if known else None,
+            "coverage_90": float((rmse[:, inside] <= band_90[:, inside]).mean()) if known else None,
         }
     off = np.abs(np.diff(np.array(ends), axis=1)[:, 0])
     differences = {name: float(np.median(column)) for name, column in zip(SUMMARY, off.T, strict=True)}
     return {"motions": len(errors), "windows": spans, "median_difference": differences}
 
 
-SUMMARY = ("highest_mm", "speed_at_the_end_mm_s", "energy_at_the_end_mJ_kg")
-
-
 def _summary(centre: Float[np.ndarray, "times 3"], rate: float) -> list[float]:
-    """What is left of a motion: how high it still gets, and speed and energy of its centre at the end (a mean over some
-    frames, without those of spin and deformation)."""
+    """The figures of `SUMMARY`, speed and energy as means over `SPEED` seconds."""
     frames = max(round(SPEED * rate), 1)
     velocity = (centre[-1] - centre[-1 - frames]) * rate / frames
-    energy = 0.5 * velocity @ velocity + 9.81 * centre[-1 - frames :, 2].mean()
+    energy = 0.5 * velocity @ velocity + GRAVITY * centre[-1 - frames :, 2].mean()
     return [1e3 * float(centre[:, 2].max()), 1e3 * float(np.linalg.norm(velocity[:2])), 1e3 * float(energy)]
 
 
@@ -121,18 +122,19 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--keep", type=Path, metavar="DIR", help="folder of the simulations; those in it are used")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result to this file")
     args = parser.parse_args(argv)
-    models = {name: load(name) for name in args.checkpoints}
+    if args.count < 1:
+        parser.error(f"--count: expected at least 1, got {args.count}")
+    try:
+        models = {name: load(name) for name in args.checkpoints}
+    except InputError as error:
+        parser.error(str(error))
     scenes = {model.schema.scene for model in models.values()}
     if len(scenes) > 1 or next(iter(models.values())).schema.objects:
-        raise InputError(f"expected checkpoints of one scene of one body, got those of {', '.join(sorted(scenes))}")
+        parser.error(f"expected checkpoints of one scene of one body, got those of {', '.join(sorted(scenes))}")
     later = simulate_later(open_dataset(scenes.pop()), args.count, args.keep)
     command = f"python -m odeform.benchmark.later {' '.join(args.checkpoints)} --count {args.count}"
     found = {"command": command, "models": {name: compare_later(model, later) for name, model in models.items()}}
-    text = json.dumps(found, indent=1)
-    if args.json:
-        atomic_write(args.json, text.encode())
-    else:
-        print(text)
+    write_or_print(found, args.json)
 
 
 if __name__ == "__main__":

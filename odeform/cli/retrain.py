@@ -39,9 +39,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     from odeform.checkpoint import bundled_checkpoints
     from odeform.models.registry import load
+    from odeform.training.continuation import is_continued
 
     if args.steps is not None:
         positive("--steps", args.steps)
+        if args.only:
+            raise InputError(f"--steps: a {args.only} is fitted without steps")
     bundled = list(bundled_checkpoints())
     names = [name if "/" in name else f"{name}/odeform" for name in args.checkpoints] or bundled
     if unknown := [name for name in names if name not in bundled]:
@@ -49,6 +52,8 @@ def run(args: argparse.Namespace) -> None:
     folder = Path(args.keep)
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[str, Any] = {}
+    if args.only and not args.checkpoints:
+        names = [name for name in bundled if is_continued(load(name))]
     for name in names:
         out = folder / f"{name.replace('/', '_')}.safetensors"
         recorded = load(name).checkpoint

@@ -6,16 +6,14 @@ force that is 2 % stronger do, how deep dents are, and how far bodies sink into 
 """
 
 import argparse
-import json
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.rigid import best_rigid
-from odeform.io import atomic_write
+from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.errors import SimulationError
@@ -131,11 +129,7 @@ def main() -> None:
     for option in ("count", "workers"):
         if (value := getattr(args, option)) < 1:
             parser.error(f"--{option}: expected at least 1, got {value}")
-    text = json.dumps(study(args.count, args.seed, args.workers), indent=1)
-    if args.json:
-        atomic_write(Path(args.json), text.encode())
-    else:
-        print(text)
+    write_or_print(study(args.count, args.seed, args.workers), args.json)
 
 
 if __name__ == "__main__":

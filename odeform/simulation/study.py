@@ -6,17 +6,15 @@ are in `assets/studies`.
 """
 
 import argparse
-import json
 import os
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.io import atomic_write
+from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters
 from odeform.simulation.scene import Scene
@@ -105,13 +103,10 @@ def main() -> None:
         if (value := getattr(args, option)) < 1:
             parser.error(f"--{option}: expected at least 1, got {value}")
     try:
-        text = json.dumps(study(args.scene, args.count, args.seed, args.workers), indent=1)
+        result = study(args.scene, args.count, args.seed, args.workers)
     except InputError as error:
         parser.error(str(error))
-    if args.json:
-        atomic_write(Path(args.json), text.encode())
-    else:
-        print(text)
+    write_or_print(result, args.json)
 
 
 if __name__ == "__main__":

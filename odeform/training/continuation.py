@@ -1,6 +1,7 @@
 """The dynamics that continue motions beyond the window: fitted to training motions, kept where they predict well."""
 
 from dataclasses import replace
+from typing import TypeGuard
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
+from odeform.models.base import Predictor
 from odeform.models.continuation import (
     LATER_ERRORS,
     ContinuedTrajectory,
@@ -145,13 +147,18 @@ def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
     return replace(checkpoint, schema=schema, arrays=arrays)
 
 
+def is_continued(model: Predictor) -> TypeGuard[ReducedModel]:
+    """Whether motions of this model go on beyond its window by these dynamics, where they predict well enough."""
+    return isinstance(model, ReducedModel) and not model.schema.objects
+
+
 def refitted(checkpoint: Checkpoint, dataset: Dataset) -> Checkpoint:
     """The checkpoint of a model that was trained on all frames of `dataset`, with a continuation of today's version.
 
     Within the trained window, its motions stay bit-identical. `InputError` for a model that is never continued.
     """
     model = load_model(checkpoint)
-    if not isinstance(model, ReducedModel) or dataset.objects:
+    if not is_continued(model):
         raise InputError(f"{checkpoint.model}: expected a model of reduced coordinates of one body, which is continued")
     data = prepare(dataset, model.space.basis)
     return with_continuation(model, replace(data, space=model.space))

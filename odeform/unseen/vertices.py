@@ -5,7 +5,6 @@ all points of a body, and its error there is compared with that at the others.
 """
 
 import argparse
-import json
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.store import open_dataset
-from odeform.io import atomic_write
+from odeform.io import write_or_print
 from odeform.models.base import Predictor
 from odeform.training.train import train
 from odeform.types import Bools, MotionSequence
@@ -81,11 +80,7 @@ def main(argv: list[str] | None = None) -> None:
         "--json", type=Path, metavar="FILE", help="write the result to this file instead of printing it"
     )
     args = parser.parse_args(argv)
-    text = json.dumps(_study(open_dataset(args.data), args.seed), indent=1)
-    if args.json:
-        atomic_write(args.json, text.encode())
-    else:
-        print(text)
+    write_or_print(_study(open_dataset(args.data), args.seed), args.json)
 
 
 if __name__ == "__main__":

@@ -7,29 +7,47 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from odeform.benchmark import later
 from odeform.benchmark.later import SPANS, compare_later, main, simulate_later
 from odeform.dataset.store import open_dataset
-from odeform.errors import InputError
 from odeform.models.registry import load
+from odeform.schema import Parameters
 from odeform.simulation.scenes.kick import SCHEMA, simulate
+from odeform.simulation.scenes.registry import get_scene
+from odeform.types import MotionSequence
 
 
 def test_a_ball_at_rest_stays_so_for_as_long_as_is_asked() -> None:
     dataset = open_dataset("mass-elastic")
-    later = simulate_later(dataset, 2)
+    motions = simulate_later(dataset, 2)
     window = dataset.schema.window
-    assert later.times[-1] == pytest.approx(window.start + SPANS[-1][1] * (window.stop - window.start))
-    assert all(len(vertices) == len(later.times) for vertices in later.vertices)
-    found = compare_later(load("mass-elastic"), later)
+    assert motions.times[-1] == pytest.approx(window.start + SPANS[-1][1] * (window.stop - window.start))
+    assert all(len(vertices) == len(motions.times) for vertices in motions.vertices)
+    found = compare_later(load("mass-elastic"), motions)
     assert found["motions"] == 2
     spans = found["windows"]
     assert all(0.0 < spans[f"{a:g}:{b:g}"]["median_mm"] < 1.0 for a, b in SPANS)
     # a model that is somewhere else is as wrong as that
-    jump = np.where(later.times > 0.0, 0.01, 0.0).astype(np.float32)[:, None, None]
-    moved = replace(later, vertices=[vertices + jump for vertices in later.vertices])
+    jump = np.where(motions.times > 0.0, 0.01, 0.0).astype(np.float32)[:, None, None]
+    moved = replace(motions, vertices=[vertices + jump for vertices in motions.vertices])
     off = compare_later(load("mass-elastic"), moved)["windows"]["1:2"]
     assert off["pooled_mm"] > 8.0
     assert off["coverage_90"] < 0.5 < spans["1:2"]["coverage_90"]
+
+
+def test_simulations_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dataset, calls = open_dataset("kick"), []
+    entry = dataset.select("test")[0]
+
+    def simulated(parameters: Parameters, until: float) -> MotionSequence:
+        calls.append(until)
+        return dataset.read(entry)
+
+    scene = replace(get_scene("kick"), simulate=simulated)
+    monkeypatch.setattr(later, "get_scene", lambda _: scene)
+    motions = [later._simulated("kick", 4.0, tmp_path / "kept", entry) for _ in range(2)]
+    assert calls == [4.0]
+    assert np.array_equal(*motions)
 
 
 def test_the_command_writes_the_comparison(tmp_path: Path) -> None:
@@ -40,9 +58,21 @@ def test_the_command_writes_the_comparison(tmp_path: Path) -> None:
     assert set(found["models"]) == {"mass-elastic/nearest"}
 
 
-def test_checkpoints_are_of_one_scene() -> None:
-    with pytest.raises(InputError, match="kick, mass-elastic"):
-        main(["kick", "mass-elastic"])
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["kick", "mass-elastic"], "one scene of one body, got those of kick, mass-elastic"),
+        (["contact-force"], "one scene of one body, got those of contact-force"),
+        (["trick"], "trick"),
+        (["kick", "--count", "0"], "--count: expected at least 1, got 0"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert said in capsys.readouterr().err
 
 
 @pytest.mark.slow
