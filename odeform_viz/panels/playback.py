@@ -15,6 +15,7 @@ PREVIOUS, NEXT = "prev", "next"  # frame
 SPEEDS = {"real time": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/20": 0.05, "1/50": 0.02}
 USUAL = 0.2  # of real time, or slower:
 LEAST = 3.0  # s that the trained window takes
+QUIET = 0.3  # s after a drag; times that the clock had set have arrived by then
 
 
 class PlaybackPanel(Panel):
@@ -23,6 +24,7 @@ class PlaybackPanel(Panel):
     def __init__(self, page: Page) -> None:
         self._page, self._clock, self._window = page, page.clock, page.schema.window
         self._seeks = 0  # by the user; finding a peak takes a while, and a later seek cancels it
+        self._confirming: asyncio.TimerHandle | None = None
         start, stop = self._window.start, self._window.stop
         gui = page.server.gui
         with gui.add_folder("Time"):
@@ -86,6 +88,16 @@ class PlaybackPanel(Panel):
             return
         self._seeks += 1
         self.jump(time)
+        if self._confirming is not None:
+            self._confirming.cancel()
+        self._confirming = asyncio.get_running_loop().call_later(QUIET, self._confirm)
+
+    def _confirm(self) -> None:
+        """Send the time of the slider once more: one that the clock had set may have arrived after the user's own."""
+        time = self._time.value
+        # a value is sent if it is another one, and of two at once only the last
+        self._time.value = self._time.min if time > self._time.min else self._time.max
+        self._time.value = time
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
         target, self._seeks = event.target.value, self._seeks + 1

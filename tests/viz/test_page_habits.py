@@ -77,6 +77,8 @@ def test_what_is_typed_stays_while_the_page_plays(dark: Tab) -> None:
     assert box.input_value() == "0.25"
     box.press("Enter")
     assert until(lambda: clock.time() == 0.25 and not clock.playing)
+    assert until(lambda: box.input_value() == "0.25")
+    assert until(lambda: dark.slider("time (s)").get_attribute("aria-valuenow") == "0.25")
 
 
 def test_a_number_without_a_slider_is_refused_in_words_too(dark: Tab) -> None:

@@ -81,3 +81,16 @@ def test_moments_off_the_slider_are_refused(kicked: Kicked, moment: float) -> No
     client.set("loop", False)  # the messages of a client are handled in order
     assert client.until(lambda: not app.clock.loop)
     assert app.clock.time() == 0.03
+
+
+def test_a_time_set_while_it_plays_is_confirmed(kicked: Kicked) -> None:
+    """A time that the clock has set may be on its way, and would stay in the browser."""
+    app, client = kicked
+    app.clock.play()
+    app.page.wake()
+    assert client.until(lambda: app.clock.time() > 0.05)
+    client.set("time (s)", 0.25)
+    assert client.until(lambda: not app.clock.playing and app.presenter.settled)
+    client.controls["time (s)"].value = 0.24  # as the late one would
+    assert client.until(lambda: client.controls["time (s)"].value == 0.25)
+    assert app.clock.time() == 0.25
