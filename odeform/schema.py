@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -255,6 +255,22 @@ class Schema:
         if name not in self.objects:
             raise InputError(f"unknown object {name!r}: scene {self.scene} has {', '.join(self.objects) or 'none'}")
         return name
+
+    def with_ranges(self, ranges: Mapping[str, tuple[float, float]]) -> "Schema":
+        """The same scene with other ranges of some parameters, low and high in their units. Defaults stay inside.
+
+        Raises:
+            InputError: An unknown name, a range that is none, or a scene with objects: contacts lie on surfaces.
+        """
+        if ranges and self.objects:
+            raise InputError(f"scene {self.scene}: contacts lie on surfaces, so its parameters have no ranges to set")
+        parameters = {p.name: p for p in self.parameters}
+        for name, (low, high) in ranges.items():
+            if name not in parameters:
+                raise InputError(f"unknown parameter {name!r}: scene {self.scene} has {', '.join(parameters)}")
+            default = min(max(parameters[name].default, low), high)
+            parameters[name] = replace(parameters[name], low=low, high=high, default=default)
+        return replace(self, parameters=tuple(parameters.values()))
 
     def known(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
         """The entries of `parameters` that belong to this scene."""

@@ -219,6 +219,20 @@ def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert made.provenance["rate_hz"] == made.schema.window.rate == 30.0
 
 
+@pytest.mark.usefixtures("coarse")
+def test_simulate_other_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("simulate", "kick", "--out", tmp_path, "--count", 1, "--workers", 1, "--rate", 30)
+    assert run(*arguments, "--range", "force=160:200", "elevation=0:0.1") == 0
+    made = open_dataset(tmp_path)
+    ranges = {p.name: (p.low, p.high, p.default) for p in made.schema.parameters}
+    assert (ranges["force"], ranges["elevation"]) == ((160.0, 200.0, 160.0), (0.0, 0.1, 0.1))
+    assert made.schema.outside(made.entries[0].parameters) == ()
+    assert made.provenance["ranges"] == {"force": [160.0, 200.0], "elevation": [0.0, 0.1]}
+    capsys.readouterr()
+    assert run(*arguments) == 2
+    assert "holds another data set" in capsys.readouterr().err
+
+
 def test_pack(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "kick.odp"
     assert run("pack", dataset.root, "--out", out, "--tolerance", 0.1) == 0
@@ -284,6 +298,11 @@ BAD = {
     "simulate: count": "simulate kick --out {empty} --count 0",
     "simulate: workers": "simulate kick --out {empty} --workers 0",
     "simulate: rate": "simulate kick --out {empty} --rate nan",
+    "simulate: no range": "simulate kick --out {empty} --range force",
+    "simulate: half a range": "simulate kick --out {empty} --range force=10",
+    "simulate: empty range": "simulate kick --out {empty} --range force=10:10",
+    "simulate: range of an unknown parameter": "simulate kick --out {empty} --range speed=1:2",
+    "simulate: range of a contact": "simulate contact-force --out {empty} --range force_x=1:2",
 }
 
 

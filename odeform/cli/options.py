@@ -83,13 +83,13 @@ def add_json(parser: argparse.ArgumentParser, text: str = "also write the result
     parser.add_argument("--json", metavar="FILE", help=text)
 
 
-def parse_settings(pairs: Sequence[str]) -> dict[str, str]:
-    """NAME=VALUE ... as names and values; the schema of a model converts the values to numbers."""
+def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, str]:
+    """NAME=VALUE ... as names and values, which are not converted."""
     settings = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not equals or not name:
-            raise InputError(f"--set: expected NAME=VALUE, got {pair!r}")
+            raise InputError(f"{option}: expected NAME=VALUE, got {pair!r}")
         settings[name] = value
     return settings
 

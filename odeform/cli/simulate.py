@@ -3,8 +3,8 @@
 import argparse
 import os
 
-from odeform.cli.options import add_cluster, add_seed
-from odeform.errors import FailedCheck
+from odeform.cli.options import add_cluster, add_seed, parse_settings
+from odeform.errors import FailedCheck, InputError
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -37,19 +37,35 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--corners", action="store_true", help="also simulate the corners of the parameter box, for training"
     )
+    parser.add_argument(
+        "--range",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME=LOW:HIGH",
+        help="ranges of parameters, in their units, in place of the scene's",
+    )
 
 
 def run(args: argparse.Namespace) -> None:
     from odeform.cluster import on_cluster
     from odeform.simulation.runner import UNEXPECTED, simulate
 
+    ranges = {name: _range(name, text) for name, text in parse_settings(args.range, "--range").items()}
+    physics = (args.rate, None, args.corners, args.object, ranges)
     with on_cluster(args.cluster):
-        dataset = simulate(
-            args.scene, args.out, args.count, args.seed, args.workers, args.rate, None, args.corners, args.object
-        )
+        dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, *physics)
     failed = [entry for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {len(failed) or 'none'}")
     for entry in failed:
         print(f"{entry.name} failed: {entry.status}")
     if unexpected := sum(entry.status.startswith(UNEXPECTED) for entry in failed):
         raise FailedCheck(f"{unexpected} sequences ended with an unexpected error; the same command tries them again")
+
+
+def _range(name: str, text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in text.split(":"))
+    except ValueError:
+        raise InputError(f"--range {name}: expected LOW:HIGH, two numbers, got {text!r}") from None
+    return low, high

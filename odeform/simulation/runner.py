@@ -3,7 +3,7 @@
 import math
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -110,6 +110,7 @@ def simulate(
     step: float | None = None,
     corners: bool = False,
     objects: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
 ) -> Dataset:
     """Simulate `count` sequences of a scene into the folder `out`; an interrupted run is continued.
 
@@ -127,13 +128,14 @@ def simulate(
         corners: Also simulate the corners of the parameter box, for the training split.
         objects: Names of the objects to simulate in a scene with several; default: all. The data of one object do not
             depend on which others are simulated.
+        ranges: Low and high of parameters by name, in their units, in place of the scene's.
 
     Returns:
         The data set. Failed sequences stay in its index, with the reason as their status. Those that failed with
         another exception than `SimulationError` are tried again by the next run.
 
     Raises:
-        InputError: An unknown scene or object, a number out of range, or a folder with another data set.
+        InputError: An unknown scene, object or parameter, a number out of range, or a folder with another data set.
 
     Examples:
         >>> import odeform
@@ -141,7 +143,8 @@ def simulate(
         >>> next(dataset.sequences("all")).vertices.shape
         (31, 402, 3)
     """
-    known = get_scene(scene)
+    known, ranges = get_scene(scene), dict(ranges or {})
+    known = replace(known, schema=known.schema.with_ranges(ranges))
     count = known.count if count is None else count
     if count < 1 or workers < 1 or seed < 0 or not (rate is None or 0.0 < rate < math.inf):
         raise InputError("simulate: expected count and workers of at least 1, seed of at least 0, and a positive rate")
@@ -151,6 +154,7 @@ def simulate(
     asked = counts(known, count, objects)
     provenance = {"scene": scene, "count": asked, "seed": seed, "rate_hz": rate, "step_s": step}
     provenance |= {"corners": True} if corners else {}
+    provenance |= {"ranges": {name: list(ends) for name, ends in ranges.items()}} if ranges else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
     index = _Index(empty, entries, finished(root, entries, empty))
     left = [entry for entry in entries if entry.name not in index.done]

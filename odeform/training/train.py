@@ -159,4 +159,6 @@ def _data_command(made: dict[str, Any]) -> str:
     command = f"odeform simulate {made.get('scene')} --out DIR --count {each.pop() if len(each) == 1 else count}"
     command += f" --seed {made.get('seed')}"
     command += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
-    return command + (" --corners" if made.get("corners") else "")
+    command += " --corners" if made.get("corners") else ""
+    ranges = " ".join(f"{name}={low:g}:{high:g}" for name, (low, high) in made.get("ranges", {}).items())
+    return command + (f" --range {ranges}" if ranges else "")
