@@ -257,17 +257,17 @@ class Schema:
         return name
 
     def with_ranges(self, ranges: Mapping[str, tuple[float, float]]) -> "Schema":
-        """The same scene with other ranges of some parameters, low and high in their units. Defaults stay inside.
+        """The same scene with other ranges, low and high in units of the parameters. Defaults are moved into them.
 
         Raises:
-            InputError: An unknown name, a range that is none, or a scene with objects: contacts lie on surfaces.
+            InputError: An unknown name, a low that is not below its high, or a scene with objects.
         """
         if ranges and self.objects:
-            raise InputError(f"scene {self.scene}: contacts lie on surfaces, so its parameters have no ranges to set")
+            raise InputError(
+                f"scene {self.scene}: contacts lie on surfaces, so its parameters have no ranges to choose"
+            )
         parameters = {p.name: p for p in self.parameters}
-        for name, (low, high) in ranges.items():
-            if name not in parameters:
-                raise InputError(f"unknown parameter {name!r}: scene {self.scene} has {', '.join(parameters)}")
+        for name, (low, high) in self.expanded(ranges).items():
             default = min(max(parameters[name].default, low), high)
             parameters[name] = replace(parameters[name], low=low, high=high, default=default)
         return replace(self, parameters=tuple(parameters.values()))

@@ -19,6 +19,7 @@ from odeform.formats.splat_inria import inria_bytes
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform.training.train import _data_command
 from odeform.types import GaussianSplats
 
 
@@ -228,6 +229,7 @@ def test_simulate_other_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert (ranges["force"], ranges["elevation"]) == ((160.0, 200.0, 160.0), (0.0, 0.1, 0.1))
     assert made.schema.outside(made.entries[0].parameters) == ()
     assert made.provenance["ranges"] == {"force": [160.0, 200.0], "elevation": [0.0, 0.1]}
+    assert _data_command(made.provenance).endswith("--range force=160.0:200.0 elevation=0.0:0.1")
     capsys.readouterr()
     assert run(*arguments) == 2
     assert "holds another data set" in capsys.readouterr().err

@@ -43,7 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NAME=LOW:HIGH",
-        help="ranges of parameters, in their units, in place of the scene's",
+        help="ranges of parameters in place of the scene's, in kg, N m, N, rad; not for scenes with objects",
     )
 
 
@@ -52,9 +52,9 @@ def run(args: argparse.Namespace) -> None:
     from odeform.simulation.runner import UNEXPECTED, simulate
 
     ranges = {name: _range(name, text) for name, text in parse_settings(args.range, "--range").items()}
-    physics = (args.rate, None, args.corners, args.object, ranges)
+    asked = {name: getattr(args, name) for name in ("count", "seed", "workers", "rate", "corners")}
     with on_cluster(args.cluster):
-        dataset = simulate(args.scene, args.out, args.count, args.seed, args.workers, *physics)
+        dataset = simulate(args.scene, args.out, **asked, objects=args.object, ranges=ranges)
     failed = [entry for entry in dataset.entries if entry.status != "ok"]
     print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {len(failed) or 'none'}")
     for entry in failed:
@@ -67,5 +67,5 @@ def _range(name: str, text: str) -> tuple[float, float]:
     try:
         low, high = (float(end) for end in text.split(":"))
     except ValueError:
-        raise InputError(f"--range {name}: expected LOW:HIGH, two numbers, got {text!r}") from None
+        raise InputError(f"--range {name}: expected two numbers LOW:HIGH, got {text!r}") from None
     return low, high

@@ -11,7 +11,7 @@ __all__ = ["bundled_datasets", "open_dataset"]
 
 
 def bundled_datasets() -> dict[str, Path]:
-    """The bundled data sets by scene. They come with a clone, not with a wheel."""
+    """The bundled data sets by name; most have that of their scene. They come with a clone, not with a wheel."""
     return {path.stem: path for path in sorted(bundled("datasets").glob(f"*{SUFFIX}"))}
 
 
@@ -20,7 +20,7 @@ def open_dataset(name: str | Path) -> Dataset:
 
     Args:
         name: A folder that `odeform simulate` or `odeform import` wrote, an `.odp` file of `odeform pack`, or the name
-            of a scene with a bundled data set (a clone has one of each scene, and `kick-wide`; a wheel has none).
+            of a bundled data set (a clone has one for each scene, and `kick-wide`; a wheel has none).
 
     Raises:
         InputError: No data set is there, or it is damaged.

@@ -156,16 +156,20 @@ def simulate(
     provenance |= {"corners": True} if corners else {}
     provenance |= {"ranges": {name: list(ends) for name, ends in ranges.items()}} if ranges else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
-    index = _Index(empty, entries, finished(root, entries, empty))
+    return _complete(empty, entries, workers, partial(_one, simulate=known.simulate, rate=rate, step=step))
+
+
+def _complete(empty: Dataset, entries: Sequence[Entry], workers: int, work: Callable[[Entry], bytes | str]) -> Dataset:
+    """Do the `work` for those of the plan `entries` that the folder of `empty` lacks; returns what it then holds."""
+    index = _Index(empty, entries, finished(empty.root, entries, empty))
     left = [entry for entry in entries if entry.name not in index.done]
-    progress = Progress(f"simulate {scene}", len(entries), done=len(entries) - len(left))
-    work = partial(_one, simulate=known.simulate, rate=rate, step=step)
+    progress = Progress(f"simulate {empty.schema.scene}", len(entries), done=len(entries) - len(left))
     try:
         for place, found in as_completed(work, left, workers):
             if isinstance(found, str):
                 entry = replace(left[place], status=found)
             else:
-                entry = replace(left[place], sha256=save_encoded(root, left[place].name, found))
+                entry = replace(left[place], sha256=save_encoded(empty.root, left[place].name, found))
             index.add(entry)
             progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
     finally:

@@ -160,5 +160,5 @@ def _data_command(made: dict[str, Any]) -> str:
     command += f" --seed {made.get('seed')}"
     command += f" --rate {made['rate_hz']:g}" if "rate_hz" in made else ""
     command += " --corners" if made.get("corners") else ""
-    ranges = " ".join(f"{name}={low:g}:{high:g}" for name, (low, high) in made.get("ranges", {}).items())
+    ranges = " ".join(f"{name}={low}:{high}" for name, (low, high) in made.get("ranges", {}).items())
     return command + (f" --range {ranges}" if ranges else "")
