@@ -20,7 +20,7 @@ from odeform_viz.recording.control import RecordingControl
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.runtime.access import Access, reachable_address
 from odeform_viz.runtime.clock import Clock
-from odeform_viz.runtime.memory import Tidier, share_arenas
+from odeform_viz.runtime.memory import Tidier, share_memory
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.runtime.worker import Worker
@@ -57,7 +57,7 @@ class App:
         """
         self.columns = Columns.of(columns)
         self.session = Session(columns[0].source.schema)
-        share_arenas()
+        share_memory()
         # threads of a matrix product wait for each other: with one core busy, two take ten times as long as one
         self._threads = threadpool_limits(1, "blas")
         self._tidy = Tidier()

@@ -5,7 +5,9 @@ import gc
 import sys
 import threading
 
-__all__ = ["Tidier", "allocated_mb", "share_arenas"]
+import pyarrow as pa
+
+__all__ = ["Tidier", "allocated_mb", "share_memory"]
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # options of mallopt
 HUGE = 4 << 20  # bytes; numpy asks for huge pages for arrays from here on
@@ -13,13 +15,15 @@ KEPT = 64 << 20  # bytes that are free at the end of an arena, as much as glibc 
 DELAY = 2.0  # s
 
 
-def share_arenas(count: int = 2) -> None:
-    """Let threads started later share `count` malloc arenas (glibc): each of viser's many would keep its own.
+def share_memory(count: int = 2) -> None:
+    """Let threads started later share `count` malloc arenas (glibc): each of viser's many would keep its own. Arrow,
+    with which recordings are read and written, takes its memory there as well, in place of a pool that grows for hours.
 
     Arrays that numpy wants huge pages for stay out of the arenas, where pieces between them would then take whole huge
     pages. By default the limit grows to 32 MB as such arrays are freed. A lower one, or keeping less, costs time: with
     1 MB and 128 kB, scrubbing 100,000 splats takes twice as long, for the pages that the system has to clear.
     """
+    pa.set_memory_pool(pa.system_memory_pool())
     if (libc := _glibc()) is not None:
         libc.mallopt(M_ARENA_MAX, count)
         libc.mallopt(M_MMAP_THRESHOLD, HUGE)

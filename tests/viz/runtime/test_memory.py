@@ -5,9 +5,10 @@ import threading
 import weakref
 from collections.abc import Iterator
 
+import pyarrow as pa
 import pytest
 
-from odeform_viz.runtime.memory import Tidier
+from odeform_viz.runtime.memory import Tidier, share_memory
 
 
 class _Cycle:
@@ -35,3 +36,12 @@ def test_garbage_is_collected_each_time_it_is_asked_to(tidier: Tidier) -> None:
         tidier()
         tidier()
         assert gone.wait(60.0)
+
+
+def test_arrow_shares_the_memory_of_everything_else() -> None:
+    before = pa.default_memory_pool()
+    try:
+        share_memory()
+        assert pa.default_memory_pool().backend_name == "system"
+    finally:
+        pa.set_memory_pool(before)
