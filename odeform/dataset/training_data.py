@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.patterns import fit_rolling
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.motion.basis import DisplacementBasis
@@ -40,7 +41,7 @@ class TrainingData:
     theta: dict[str, Floats]
     """(S, P) parameters in [-1, 1] by split."""
     reduced: dict[str, Floats]
-    """(S, T, 6 + K) metres and radians by split."""
+    """(S, T, y) metres and radians by split: the coordinates of `space`."""
     observed: dict[str, Bools]
     """(S, T) by split: True where the frame is of the data, False where a spline fills it in."""
     truncation_mm: dict[str, float]
@@ -85,11 +86,13 @@ def prepare(
     dataset: Dataset,
     modes: int | DisplacementBasis | None = None,
     subsampling: FrameSubsampling | None = None,
+    patterns: bool = False,
 ) -> TrainingData:
     """Decompose all training and validation sequences; fit the deformation basis to the training sequences alone.
 
     `modes` is their number, or the basis of a model that is trained already. Without it, the fewest that leave out at
-    most `TRUNCATION` of the RMS deformation of the validation sequences.
+    most `TRUNCATION` of the RMS deformation of the validation sequences. With `patterns`, deformations of a body that
+    rolls are in axes that do not turn with it (`odeform.motion.rolling`), where that takes fewer.
     `InputError` for a split without sequences, and for sequences of different meshes.
     """
     subsampling = subsampling or FrameSubsampling()
@@ -113,6 +116,10 @@ def prepare(
         pairs = zip(motions[split].poses, coefficients[split], strict=True)
         trajectories = [np.concatenate([pose, c[:, :kept]], axis=1) for pose, c in pairs]
         reduced[split] = np.stack([subsampling.interpolated(y, count, index) for index, y in enumerate(trajectories)])
+    if patterns:
+        train, val = (reduced[split].reshape(-1, reduced[split].shape[2]) for split in SPLITS)
+        space = replace(space, rolling=fit_rolling(space, body.rest.points, body.weights, train, val, TRUNCATION))
+        reduced = {split: np.stack([space.with_patterns(y) for y in reduced[split]]) for split in SPLITS}
     left_out = {split: max(total[split] - by_mode[split][:kept].sum(), 0.0) for split in SPLITS}
     return TrainingData(
         schema=_trained_schema(dataset.schema, body.times, subsampling),

@@ -5,6 +5,7 @@ __all__ = ["MODELS", "TRAINABLE"]
 MODELS: dict[str, str] = {
     "odeform": "odeform.models.odeform.model:ODeform",
     "odeform-mechanical": "odeform.models.mechanical.model:MechanicalODeform",
+    "odeform-rolling": "odeform.models.rolling.model:RollingODeform",
     "odeform-per-point": "odeform.models.baselines.odeform_per_point:OdeformPerPoint",
     "node": "odeform.models.baselines.node:Node",
     "rnn": "odeform.models.baselines.rnn:Rnn",

@@ -10,7 +10,8 @@ from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.recent import InUse
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
-from odeform.motion.reduced_space import POSE, ReducedSpace
+from odeform.motion.reduced_space import ReducedSpace
+from odeform.motion.rolled_trajectory import RolledTrajectory
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
@@ -21,9 +22,13 @@ __all__ = ["ReducedModel"]
 class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
 
+    continues_itself: bool = False
+    """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
+
     def __init__(self, checkpoint: Checkpoint) -> None:
         """Motions of a checkpoint whose continuation is of an earlier version stop where the trained window ends."""
-        super().__init__(checkpoint if has_continuation(checkpoint.arrays) else without_continuation(checkpoint))
+        continued = self.continues_itself or has_continuation(checkpoint.arrays)
+        super().__init__(checkpoint if continued else without_continuation(checkpoint))
 
     def _read(self, checkpoint: Checkpoint) -> None:
         _ = self.space, self.dynamics  # damaged ones are found now, not when they are used
@@ -36,8 +41,7 @@ class ReducedModel(Predictor):
     @cached_property
     def dynamics(self) -> Dynamics | None:
         """What continues motions beyond the trained window; None where they do so by themselves, or stop."""
-        coordinates = POSE + self.space.basis.modes
-        return Dynamics.from_arrays(self.checkpoint.arrays, coordinates, len(self.schema.learned))
+        return Dynamics.from_arrays(self.checkpoint.arrays, self.space.coordinates, len(self.schema.learned))
 
     @cached_property
     def _evaluated(self) -> InUse[EvaluatedBasis]:
@@ -78,6 +82,8 @@ class ReducedModel(Predictor):
     ) -> ReducedMotion:
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
         trajectory = self._continued(self.schema.inputs(parameters), evaluated, settings, until)
+        if self.space.rolling is not None:
+            trajectory = RolledTrajectory(trajectory, self.space)
         return ReducedMotion(
             self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
         )

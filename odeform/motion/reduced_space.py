@@ -5,7 +5,8 @@ In the scene's canonical frame (turned by minus the azimuth about the vertical a
     P(t) = anchor + Rz(a) [ R(w(t)) (x + sum_k c_k(t) phi_k(x)) + p(t) ],   x = Rz(-a) (P0 - anchor),
 
 with shift p (3) metres, rotation vector w (3) radians (unwrapped over several turns), and coefficients c (K). All
-models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P0 exact (paper eq. 4).
+models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P0 exact (paper eq. 4). Of bodies that
+roll, they predict amplitudes of patterns in place of c (`odeform.motion.rolling`).
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.motion.basis import DisplacementBasis, fit_basis
+from odeform.motion.rolling import Rolling
 from odeform.schema import soft_clip
 from odeform.types import Arrays, Basis, Floats, Frames, Mesh, MotionSequence, Perpoint, Rotations, Vector, Vectors
 
@@ -49,6 +51,25 @@ class ReducedSpace:
     basis: DisplacementBasis
     surface: Mesh | None
     largest: tuple[float, float] = (float("inf"), float("inf"))
+    rolling: Rolling | None = None
+    """Patterns of deformation that do not turn with the body, which models predict in place of c; None without."""
+
+    @property
+    def coordinates(self) -> int:
+        """How many coordinates models predict."""
+        return POSE + (self.basis.modes if self.rolling is None else self.rolling.patterns)
+
+    def with_modes(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times body_y"]:
+        """(T, 6 + K) from what models predict (T, 6 + S)."""
+        if self.rolling is None:
+            return y
+        return np.concatenate([y[:, :POSE], self.rolling.coefficients(y[:, 3:POSE], y[:, POSE:])], axis=1)
+
+    def with_patterns(self, y: Float[np.ndarray, "times body_y"]) -> Float[np.ndarray, "times y"]:
+        """(T, 6 + S) from (T, 6 + K): the nearest that patterns can represent."""
+        if self.rolling is None:
+            return y
+        return np.concatenate([y[:, :POSE], self.rolling.amplitudes(y[:, 3:POSE], y[:, POSE:])], axis=1)
 
     def bounded(self, y: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Floats:
         """(T, 6 + K), bit-exact up to shifts and deformations 15 % larger than any trained.
@@ -78,7 +99,8 @@ class ReducedSpace:
 
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, by name; `from_parts` reads them."""
-        return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights}
+        patterns = {} if self.rolling is None else self.rolling.arrays()
+        return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights, **patterns}
 
     @classmethod
     def from_parts(cls, data: dict[str, object], arrays: Arrays, rest: Mesh) -> "ReducedSpace":
@@ -90,7 +112,8 @@ class ReducedSpace:
         # older checkpoints do not say: all of them are of surfaces
         surface = Mesh(to_canonical(rest.points, anchor, 0.0), rest.faces) if data.get("surface", True) else None
         shift, deformation = data.get("largest", ("inf", "inf"))  # pyright: ignore
-        return cls(anchor, float(data["arm"]), basis, surface, (float(shift), float(deformation)))  # pyright: ignore
+        largest = float(shift), float(deformation)  # pyright: ignore
+        return cls(anchor, float(data["arm"]), basis, surface, largest, Rolling.from_arrays(arrays, basis.modes))  # pyright: ignore
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:

@@ -1,4 +1,4 @@
-"""The regression of what a trained latent ODE leaves unexplained, kept where it explains validation motions."""
+"""The regression of what a trained ODE leaves unexplained, kept where it explains validation motions."""
 
 from dataclasses import replace
 
@@ -9,7 +9,8 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.kernel_search import search_ridge
 from odeform.models.odeform.correction import PARTS, CorrectedPart, Correction
-from odeform.models.odeform.model import ODeform
+from odeform.models.reduced_model import ReducedModel
+from odeform.models.registry import load_model
 from odeform.training.pruning import FINE
 from odeform.types import Floats
 
@@ -21,19 +22,17 @@ EXPLAINED = 0.05  # share of a part's mean square residual on validation, from w
 
 
 def with_correction(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained ODeform with a correction of those parts of y that it improves on validation.
+    """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
     Unchanged where that holds for all parts, and where a spline filled in frames.
     """
-    model = ODeform(checkpoint)
     if not all(data.observed[split].all() for split in data.observed):
         return checkpoint
-    evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
-    parts = {}
+    model, times, parts = load_model(checkpoint), data.times, {}
+    assert isinstance(model, ReducedModel)
+    evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(times[-1])
     own = {
-        split: np.stack(
-            [model.integrate(one, evaluated, FINE, float(times[-1])).reduced(times) for one in data.theta[split]]
-        )
+        split: np.stack([model.trajectory(one, evaluated, FINE, stop).reduced(times) for one in data.theta[split]])
         for split in data.theta
     }
     for name, columns in PARTS.items():
@@ -45,7 +44,7 @@ def with_correction(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
             parts[name] = part
     if not parts:
         return checkpoint
-    correction = Correction(times, data.reduced["train"].shape[2], parts)
+    correction = Correction(times, data.space.coordinates, parts)
     shares = {name: round(part.share, 3) for name, part in parts.items()}
     config = {**checkpoint.config, "correction": {"share_of_ode": shares}}
     return replace(checkpoint, config=config, arrays={**checkpoint.arrays, **correction.arrays()})

@@ -18,6 +18,8 @@ from odeform.models.baselines.point_model import PointModel
 from odeform.models.odeform.model import ODeform
 from odeform.models.per_object import joined
 from odeform.models.registry import TRAINABLE, model_class
+from odeform.models.rolling.model import RollingODeform
+from odeform.schema import REACH
 from odeform.training.body import body_arrays
 from odeform.training.continuation import with_continuation
 from odeform.training.correction import with_correction
@@ -29,6 +31,7 @@ from odeform.training.points import Budget, fit_points
 from odeform.training.pruning import without_modes
 from odeform.training.qualities import with_qualities
 from odeform.training.request import TrainRequest
+from odeform.training.rolling import fit_rolling_body
 from odeform.training.saved_laws import SavedLaws
 from odeform.types import Arrays
 
@@ -48,14 +51,15 @@ class Run:
     """The file of an interrupted training."""
     report: Callable[[str], None]
 
-    def reduced_data(self) -> TrainingData:
+    def reduced_data(self, patterns: bool = False) -> TrainingData:
         """The data set in reduced coordinates, with the frames that the request asks for; reports its size."""
         request = self.request
-        data = prepare(self.dataset, None, FrameSubsampling(request.window, request.every, request.stagger))
-        modes = data.space.basis.modes
+        data = prepare(self.dataset, None, FrameSubsampling(request.window, request.every, request.stagger), patterns)
+        modes, rolling = data.space.basis.modes, data.space.rolling
         self.report(
             f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
-            f"{modes} POD mode{'s' if modes > 1 else ''}; "
+            f"{modes} POD mode{'s' if modes > 1 else ''}"
+            f"{f', {rolling.patterns} patterns that do not turn with it' if rolling else ''}; "
             f"the rest of the deformation is {data.truncation_mm['val']:.3f} mm RMS on validation"
         )
         return data
@@ -141,6 +145,15 @@ def _train_odeform(run: Run) -> Checkpoint:
     return with_continuation(ODeform(checkpoint), data)
 
 
+def _train_rolling(run: Run) -> Checkpoint:
+    data = run.reduced_data(patterns=True)
+    arrays, settings = fit_rolling_body(data, run.request, run.report)
+    checkpoint = _reduced_checkpoint(run, data, arrays, settings)
+    schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
+    checkpoint = replace(checkpoint, schema=schema)
+    return with_qualities(with_correction(checkpoint, data), data)
+
+
 def _fit(run: Run) -> Checkpoint:
     model, data = model_class(run.request.model), run.reduced_data()
     assert issubclass(model, FittedModel)
@@ -186,6 +199,7 @@ def _reduced_checkpoint(run: Run, data: TrainingData, arrays: Arrays, settings: 
 
 METHODS: dict[type, Callable[[Run], Checkpoint]] = {
     ODeform: _train_odeform,
+    RollingODeform: _train_rolling,
     FittedModel: _fit,
     PeGnn: _train_graphs,
     PointModel: _train_points,

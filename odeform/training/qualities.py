@@ -9,7 +9,8 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
-from odeform.models.odeform.model import ODeform
+from odeform.models.reduced_model import ReducedModel
+from odeform.models.registry import load_model
 from odeform.motion.reduced_space import POSE, motion_rmse
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats
@@ -29,7 +30,7 @@ def _candidates(step: float) -> list[SolverSettings]:
     return [*adaptive, *fixed]
 
 
-def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
+def measure_frontier(model: ReducedModel, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
     """The non-dominated settings, and the model's own errors in mm, over the validation sequences.
 
     The solver's error is measured against tolerance 1e-10 in double precision, the model's is that of this reference
@@ -41,7 +42,7 @@ def measure_frontier(model: ODeform, data: TrainingData) -> tuple[tuple[Frontier
     def motions(quality: SolverSettings) -> tuple[Floats, float]:
         """(S, T, y), NaN where the integration failed, and the mean number of evaluations."""
         stop = float(data.times[-1])
-        solved = [model.integrate(theta, evaluated, quality, stop) for theta in data.theta["val"]]
+        solved = [model.trajectory(theta, evaluated, quality, stop) for theta in data.theta["val"]]
         reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
@@ -76,6 +77,8 @@ def choose_qualities(
 
 def with_qualities(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
     """The checkpoint of a trained model with its frontier, and the qualities that are chosen on it."""
-    frontier, errors_mm = measure_frontier(ODeform(checkpoint), data)
+    model = load_model(checkpoint)
+    assert isinstance(model, ReducedModel)
+    frontier, errors_mm = measure_frontier(model, data)
     settings = {"qualities": choose_qualities(frontier, errors_mm), "frontier": [p.to_json() for p in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})

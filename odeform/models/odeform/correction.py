@@ -61,6 +61,11 @@ class Correction:
         for name, part in parts.items():
             self.shares[PARTS[name]] = part.share
 
+    @property
+    def stop(self) -> float:
+        """s: the end of the trained window."""
+        return float(self._times[-1])
+
     def first(self, modes: int) -> "Correction":
         """The correction of a model that keeps the first `modes` of its deformation."""
         parts, kept = dict(self.parts), POSE + modes

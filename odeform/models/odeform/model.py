@@ -16,7 +16,6 @@ from odeform.models.odeform.weights import check_weights
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
-from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
 
@@ -42,8 +41,7 @@ class ODeform(ReducedModel):
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
-        coordinates = self.space.basis.modes + POSE
-        self.correction = Correction.from_arrays(checkpoint.arrays, coordinates, self.config.parameters)
+        self.correction = Correction.from_arrays(checkpoint.arrays, self.space.coordinates, self.config.parameters)
         self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
     def _pool(self, evaluated: EvaluatedBasis) -> list[Floats]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from odeform.models.mechanical.corrected_trajectory import CorrectedTrajectory
+from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.models.mechanical.correction import coordinate_shares
 from odeform.models.mechanical.lifted_trajectory import MOST, LiftedTrajectory
 from odeform.motion.base import SolveStats

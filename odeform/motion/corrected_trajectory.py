@@ -1,4 +1,4 @@
-"""A motion of the mechanics with its correction."""
+"""A motion that is solved for, with its correction."""
 
 from collections.abc import Callable
 
@@ -13,8 +13,8 @@ __all__ = ["CorrectedTrajectory"]
 
 
 class CorrectedTrajectory(ChangedTrajectory):
-    """Within the trained window y = share * mechanics + rest. Beyond it, what that adds to the mechanics stays as it is
-    at the end: the motion there is the mechanics'."""
+    """Within the trained window y = share * own + rest. Beyond it, what that adds to the own motion stays as it is
+    at the end: the motion there is its own."""
 
     def __init__(
         self,
@@ -23,7 +23,7 @@ class CorrectedTrajectory(ChangedTrajectory):
         rest: Callable[[Floats], Float[np.ndarray, "times y"]],
         stop: float,
     ) -> None:
-        """`own` is the motion of the mechanics, `shares` and `rest` are those of its correction, which ends at `stop`
+        """`own` is what is solved for, `shares` and `rest` are those of its correction, which ends at `stop`
         seconds."""
         super().__init__(own)
         self._taken, self._rest, self._stop = 1.0 - shares, rest, stop

@@ -1,0 +1,114 @@
+"""What is learned of a rolling body: how the floor pushes it, as functions of its material and its motion.
+
+Each coefficient is the exponential of a quadratic function of the material. A small network of the depth and the
+velocities of the contact adds to some of the exponents. It changes how strong forces are, never which way they point:
+the floor only pushes, damping and friction only brake.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.types import Arrays, Floats
+
+__all__ = [
+    "ADJUSTED",
+    "COEFFICIENTS",
+    "HIDDEN",
+    "INPUTS",
+    "PLACES",
+    "REACHING",
+    "RollingLaw",
+    "first_law",
+    "material_terms",
+]
+
+COEFFICIENTS = {
+    "stiffness": 4.2,  # of the floor's push, m/s^2 at a depth of 1 cm
+    "power": 0.16,  # of the depth that it grows with
+    "damping": -0.1,  # s/m at a depth of 1 cm
+    "damping_power": -2.0,  # of the depth that damping grows with: the logarithm of its odds
+    "friction": -0.8,  # Coulomb coefficient
+    "grip": -1.7,  # m/s of sliding at which friction sets in
+    "rolling": -6.5,  # lever in m by which the push brakes rolling
+    "inertia": -0.4,  # about the axis, relative to mass and squared radius
+    "corners": -0.5,  # share of the mesh's corners that is felt
+}
+"""Logarithms to start from, by name. Besides, `touch` and `radius` are quadratic functions themselves."""
+PLAIN = {"touch": 1.0, "radius": 0.0}
+"""mm above the height at rest from which on the floor is touched, and the lever of friction, in tenths of a radius more
+than one."""
+ADJUSTED = ("stiffness", "damping", "friction", "rolling", "grip", "corners")
+"""Coefficients whose logarithm the network adds to."""
+PLACES, REACHING = np.linspace(-0.6, 0.6, 13), 0.1
+"""Angles in rad about the place that the body rested on, where its weight has settled it, and how far each reaches."""
+HIDDEN = 16
+INPUTS = 4
+"""The network's inputs besides the material: depth, velocity up, of sliding and ahead."""
+
+
+@dataclass(frozen=True, eq=False)
+class RollingLaw:
+    """The numbers of one law, or of several, in leading axes (...)."""
+
+    terms: Float[np.ndarray, "*laws coefficients terms"]
+    """Of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
+    settled: Float[np.ndarray, "*laws places terms"]
+    """Of linear functions of the material: mm by which the body stands higher at each of `PLACES`."""
+    first: Float[np.ndarray, "*laws inputs hidden"]
+    bias: Float[np.ndarray, "*laws hidden"]
+    last: Float[np.ndarray, "*laws hidden adjusted"]
+
+    def flat(self) -> Float[np.ndarray, "*laws numbers"]:
+        """All numbers in one axis."""
+        parts = [getattr(self, field.name) for field in fields(self)]
+        batch = self.bias.shape[:-1]
+        return np.concatenate([part.reshape(*batch, -1) for part in parts], axis=-1)
+
+    def like(self, flat: Float[np.ndarray, "*laws numbers"]) -> "RollingLaw":
+        """Laws of the same sizes with the numbers (..., n) of `flat`."""
+        shapes = [getattr(self, field.name).shape[self.bias.ndim - 1 :] for field in fields(self)]
+        cuts = np.cumsum([np.prod(shape) for shape in shapes])[:-1]
+        parts = np.split(flat, cuts, axis=-1)
+        return RollingLaw(*(p.reshape(*flat.shape[:-1], *shape) for p, shape in zip(parts, shapes, strict=True)))
+
+    def coefficients(self, material: Float[np.ndarray, "motions materials"]) -> dict[str, Floats]:
+        """By name (..., M), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
+        found = np.einsum("...ct,mt->c...m", self.terms, material_terms(material))
+        return dict(zip([*COEFFICIENTS, *PLAIN], found, strict=True))
+
+    def arrays(self) -> Arrays:
+        """The arrays of a checkpoint, by name; `from_arrays` reads them."""
+        return {f"law.{field.name}": getattr(self, field.name) for field in fields(self)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Arrays, materials: int) -> "RollingLaw":
+        """KeyError for a missing array, ValueError unless they are finite and of their shapes."""
+        like = first_law(materials, 0)
+        for field in fields(cls):
+            array, shape = arrays[f"law.{field.name}"], getattr(like, field.name).shape
+            if array.shape != shape or not np.isfinite(array).all():
+                raise ValueError(f"law.{field.name}: expected a finite array of shape {shape}, got {array.shape}")
+        return cls(**{field.name: arrays[f"law.{field.name}"].astype(float) for field in fields(cls)})
+
+
+def material_terms(material: Float[np.ndarray, "motions materials"]) -> Float[np.ndarray, "motions terms"]:
+    """(M, Q) -> (M, 1 + Q + Q (Q + 1) / 2): one, the values, and their products."""
+    left, right = np.triu_indices(material.shape[1])
+    return np.concatenate([np.ones((len(material), 1)), material, material[:, left] * material[:, right]], axis=1)
+
+
+def first_law(materials: int, seed: int) -> RollingLaw:
+    """The law that a training starts from: independent of the material, with a network that adds nothing yet."""
+    rng, inputs = np.random.default_rng(seed), INPUTS + materials
+    starts = [*COEFFICIENTS.values(), *PLAIN.values()]
+    terms = np.zeros((len(starts), material_terms(np.zeros((1, materials))).shape[1]))
+    terms[:, 0] = starts
+    return RollingLaw(
+        terms,
+        np.zeros((len(PLACES), 1 + materials)),
+        0.7 * rng.normal(size=(inputs, HIDDEN)),
+        0.5 * rng.normal(size=HIDDEN),
+        0.01 * rng.normal(size=(HIDDEN, len(ADJUSTED))),
+    )

@@ -1,0 +1,47 @@
+"""How high a body with corners stands: a mesh of a ball rolls from facet to facet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.types import Floats, Points, Vector
+
+__all__ = ["Support", "support_of"]
+
+ANGLES = 4096
+ROUNDED = 2e-3  # of the radius: the elastic wall rounds the corners
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """By how much a body that has turned about an axis stands higher than at rest, and the derivative by the angle."""
+
+    heights: Float[np.ndarray, " angles"]
+    """m at even angles from 0 to 2 pi, both included."""
+    slopes: Float[np.ndarray, " angles"]
+    """m per rad."""
+
+    def at(self, angles: Floats) -> tuple[Floats, Floats]:
+        """Heights and slopes (...) at angles (...) in rad, of any size."""
+        place = np.mod(angles / (2.0 * np.pi), 1.0) * (len(self.heights) - 1)
+        index = np.minimum(place.astype(int), len(self.heights) - 2)
+        share = place - index
+        return tuple(  # pyright: ignore
+            table[index] + share * (table[index + 1] - table[index]) for table in (self.heights, self.slopes)
+        )
+
+
+def support_of(points: Points, axis: Vector) -> Support:
+    """Of a body's points (N, 3) in m about its anchor, which turns about the level unit vector `axis`."""
+    angles = np.linspace(0.0, 2.0 * np.pi, ANGLES + 1)
+    ahead = points @ np.cross(axis, UP)
+    # a positive angle turns the direction ahead downwards
+    depths = np.outer(np.sin(angles), ahead) - np.outer(np.cos(angles), points @ UP)
+    deepest, rounded = depths.max(axis=1), ROUNDED * np.linalg.norm(points, axis=1).mean()
+    shares = np.exp((depths - deepest[:, None]) / rounded)
+    heights = deepest + rounded * np.log(shares.sum(axis=1))
+    turned = np.outer(np.cos(angles), ahead) + np.outer(np.sin(angles), points @ UP)
+    slopes = (shares * turned).sum(axis=1) / shares.sum(axis=1)
+    return Support(heights - heights[0], slopes)

@@ -1,0 +1,166 @@
+"""The training of ODeform for a round body: where the push leaves it, the law of contact, how it is deformed, and what
+is left."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.dataset.training_data import TrainingData
+from odeform.errors import InputError
+from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.dynamics import MOVING, STATE
+from odeform.mechanics.rolling.law import RollingLaw, first_law
+from odeform.mechanics.rolling.support import Support, support_of
+from odeform.models.kernel_search import search_ridge
+from odeform.models.rolling.readout import Readout, inputs_of
+from odeform.models.rolling.start import Start
+from odeform.motion.reduced_space import POSE
+from odeform.training.request import TrainRequest
+from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
+from odeform.types import Arrays, Floats, Ints
+
+__all__ = ["fit_rolling_body"]
+
+PUSHES = ("force", "elevation")  # parameters that act through the push alone
+MOTIONS = 200  # to which the law is fitted, at most
+STEPS = 30  # of the fit
+LINEAR = 8  # of them with a law that is linear in the material and has no network
+SHARE = 0.7  # of the budget for the law
+FEATURES, SHARPNESS = 1500, (0.15, 1.2)  # of the readout; slopes per standard deviation of the inputs
+RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # candidates, relative; validation chooses
+ROUND = 0.02  # by which points may be nearer to the axis than others, relative
+RATES = 0.3  # s: errors of rates count as they are after this time
+
+
+def fit_rolling_body(
+    data: TrainingData, request: TrainRequest, report: Callable[[str], None]
+) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and settings of the checkpoint, without the correction.
+
+    `InputError` for data of a body that is not round, does not roll about one level axis, is not pushed first, or of
+    which frames are left out.
+    """
+    begin = time.process_time()
+    axis, radius = _checked(data, request)
+    support = support_of(data.rest, axis)
+    materials = [i for i, p in enumerate(data.schema.learned) if p.name not in PUSHES]
+    if not materials:
+        raise InputError(f"odeform-rolling: expected a parameter besides {' and '.join(PUSHES)}")
+    motions = {split: _motions(data, split, axis, materials) for split in ("train", "val")}
+    start = _start(data, motions)
+    chosen = np.random.default_rng(request.seed).permutation(len(data.theta["train"]))[:MOTIONS]
+
+    def go_on() -> bool:
+        return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
+
+    law, steps = first_law(len(materials), request.seed), request.steps or STEPS
+    some = motions["train"].some(chosen)
+    law = fit_law(law, _linear(law), support, radius, some, min(LINEAR, steps), report, go_on)
+    law = fit_law(law, np.arange(law.flat().size), support, radius, some, max(steps - LINEAR, 0), report, go_on)
+    error = law_error_mm(law, support, radius, motions["val"])
+    report(f"the law alone, from the end of the push on: {error:.2f} mm (val)")
+    readout = _readout(data, law, support, radius, motions, request.seed)
+    names = [data.schema.learned[i].name for i in materials]
+    val = {"law_rmse_mm": error, "steps": steps, "seconds": time.process_time() - begin}
+    settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "val": val, "qualities": {}}
+    return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
+
+
+def _checked(data: TrainingData, request: TrainRequest) -> tuple[Floats, float]:
+    """The axis and the radius of the body."""
+    rolling = data.space.rolling
+    if rolling is None or abs(rolling.axis[2]) > 1e-6:
+        raise InputError("odeform-rolling: expected motions of a body that rolls about one level axis")
+    distances = np.linalg.norm(data.rest, axis=1)
+    if distances.min() < (1.0 - ROUND) * distances.max():
+        raise InputError("odeform-rolling: expected a round body, about its mass centre")
+    if not all(observed.all() for observed in data.observed.values()) or request.without:
+        raise InputError("odeform-rolling: expected no --every, --stagger or --without")
+    if not 0 < data.first_free < len(data.times) - 3:
+        raise InputError("odeform-rolling: expected motions that begin with a push, and go on after it")
+    return rolling.axis, float(distances.mean())
+
+
+def _begin(data: TrainingData) -> float:
+    """s: half a frame after the first free frame, where differences of frames give the velocity."""
+    return float(data.times[data.first_free] + data.times[data.first_free + 1]) / 2.0
+
+
+def _motions(data: TrainingData, split: str, axis: Floats, materials: list[int]) -> Motions:
+    y, first = data.reduced[split], data.first_free
+    frame = float(data.times[1] - data.times[0])
+    along = np.cross(axis, [0.0, 0.0, 1.0])
+    moved = np.stack([y[..., :3] @ along, y[..., 2], y[..., 3:POSE] @ axis], axis=-1)
+    before, after = moved[:, first], moved[:, first + 1]
+    start = np.zeros((STATE, len(y)))
+    start[:MOVING], start[MOVING : 2 * MOVING] = 0.5 * (before + after).T, (after - before).T / frame
+    start[1] += GRAVITY * frame**2 / 8.0  # between the two, a body that flies is higher than their mean
+    return Motions(data.theta[split][:, materials], start, moved[:, first + 1 :].transpose(1, 0, 2), frame)
+
+
+def _start(data: TrainingData, motions: dict[str, Motions]) -> Start:
+    known, asked = data.theta["train"], data.theta["val"]
+    scale = np.repeat([1.0, RATES], MOVING) * np.tile([1.0, 1.0, data.space.gyration_radius], 2)
+    states = {split: of.start[: 2 * MOVING].T for split, of in motions.items()}
+    mean = states["train"].mean(axis=0)
+    scaled = {split: (of - mean) * scale for split, of in states.items()}
+    ridge = search_ridge(known, scaled["train"], (asked, scaled["val"]))[0]
+    weights = ridge.weights(known, scaled["train"]) / scale
+    return Start(known / ridge.scales, ridge.scales, weights, mean)
+
+
+def _linear(law: RollingLaw) -> Ints:
+    """Indices of the numbers that are constant or linear in the material, without the network and the place of rest."""
+    materials = law.settled.shape[-1] - 1
+    mark = np.zeros_like(law.terms)
+    mark[:, : 1 + materials] = 1.0
+    flags = RollingLaw(mark, *(np.zeros_like(part) for part in (law.settled, law.first, law.bias, law.last)))
+    return np.flatnonzero(flags.flat())
+
+
+@dataclass(frozen=True, eq=False)
+class _Frames:
+    """Inputs (R, I) and outputs (R, S) of the readout, one row for each frame of each motion."""
+
+    inputs: Float[np.ndarray, "rows inputs"]
+    patterns: Float[np.ndarray, "rows patterns"]
+
+
+def _readout(
+    data: TrainingData, law: RollingLaw, support: Support, radius: float, motions: dict[str, Motions], seed: int
+) -> Readout:
+    """Fitted to motions under the law, so that it knows what the law is wrong about."""
+    frames = {split: _frames(data, split, law, support, radius, of) for split, of in motions.items()}
+    train = frames["train"].inputs
+    mean, scale = train.mean(axis=0), np.maximum(train.std(axis=0), 1e-9)
+    rng, (low, high) = np.random.default_rng(seed), SHARPNESS
+    sharpness = low * (high / low) ** rng.random(FEATURES)
+    directions = sharpness * rng.normal(size=(train.shape[1], FEATURES))
+    phases = rng.uniform(0.0, 2.0 * np.pi, FEATURES)
+    empty = Readout(mean, scale, directions, phases, np.zeros((0, 0)))
+    gram, cross = 0.0, 0.0
+    for begin in range(0, len(train), 1 << 12):
+        features = empty.features(train[begin : begin + (1 << 12)])
+        gram = gram + features.T @ features
+        cross = cross + features.T @ frames["train"].patterns[begin : begin + (1 << 12)]
+    assert isinstance(gram, np.ndarray)
+    ridges = [ridge * np.trace(gram) / len(gram) * np.eye(len(gram)) for ridge in RIDGES]
+    found = [Readout(mean, scale, directions, phases, np.linalg.solve(gram + ridge, cross)) for ridge in ridges]
+    val = frames["val"]
+    return min(found, key=lambda one: float(np.square(one(val.inputs) - val.patterns).sum()))
+
+
+def _frames(
+    data: TrainingData, split: str, law: RollingLaw, support: Support, radius: float, motions: Motions
+) -> _Frames:
+    states = roll_out(law.like(law.flat()[None]), support, radius, motions)[:, :, 0]
+    count = len(states)
+    rows = states.transpose(1, 2, 0).reshape(STATE, -1)
+    material = np.repeat(motions.material, count, axis=0)
+    touch = np.repeat(1e-3 * law.coefficients(motions.material)["touch"], count)
+    patterns = data.reduced[split][:, -count:, POSE:]
+    return _Frames(inputs_of(rows, touch, material), patterns.reshape(len(rows[0]), -1))
