@@ -102,8 +102,8 @@ class Rolling:
 
 
 def fourier_series(values: Float[np.ndarray, "angles modes patterns"], tolerance: float) -> Floats:
-    """(2 H + 1, K, S): the terms of a function of the period 2 pi, from an even number of its values at even angles from
-    0 on, with the fewest harmonics H that leave out at most `tolerance` of its root mean square."""
+    """(2 H + 1, K, S): the terms of a function of the period 2 pi, from its values at an even number of even angles
+    from 0 on, with the fewest harmonics H that leave out at most `tolerance` of its root mean square."""
     terms = np.fft.rfft(values, axis=0) / len(values)
     terms[1:] *= 2.0
     power = np.square(np.abs(terms)).reshape(len(terms), -1).sum(axis=1)

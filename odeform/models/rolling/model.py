@@ -20,7 +20,7 @@ from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.reduced_motion import Trajectory
-from odeform.motion.reduced_space import POSE, to_canonical
+from odeform.motion.reduced_space import POSE
 from odeform.motion.rolling import Rolling
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
@@ -58,7 +58,8 @@ class RollingODeform(ReducedModel):
         self._start = Start.from_arrays(arrays, len(learned))
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.rolling.patterns)
         self.correction = Correction.from_arrays(arrays, self.space.coordinates, len(learned))
-        self._support = support_of(to_canonical(self.rest.points, self.space.anchor, 0.0), self.rolling.axis)
+        # the body that viewers show is smoother than the one whose corners it rolls over
+        self._support = support_of(self.space.basis.scale * self.space.basis.centers, self.rolling.axis)
 
     @property
     def rolling(self) -> Rolling:
