@@ -25,7 +25,7 @@ def fit_rolling(
     rest: Points,
     weights: Perpoint,
     train: Float[np.ndarray, "frames y"],
-    val: Float[np.ndarray, "frames y"],
+    val: Float[np.ndarray, "others y"],
     tolerance: float,
 ) -> Rolling | None:
     """Patterns of the training frames (F, 6 + K), as many as leave out `tolerance` of the RMS deformation of the

@@ -23,7 +23,7 @@ from odeform.training.request import TrainRequest
 from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
 from odeform.types import Arrays, Floats, Ints
 
-__all__ = ["fit_rolling_body"]
+__all__ = ["fit_rolling_body", "motions_of"]
 
 PUSHES = ("force", "elevation")  # parameters that act through the push alone
 MOTIONS = 200  # to which the law is fitted, at most
@@ -50,7 +50,7 @@ def fit_rolling_body(
     materials = [i for i, p in enumerate(data.schema.learned) if p.name not in PUSHES]
     if not materials:
         raise InputError(f"odeform-rolling: expected a parameter besides {' and '.join(PUSHES)}")
-    motions = {split: _motions(data, split, axis, materials) for split in ("train", "val")}
+    motions = {split: motions_of(data, split, axis, materials) for split in ("train", "val")}
     start = _start(data, motions)
     chosen = np.random.default_rng(request.seed).permutation(len(data.theta["train"]))[:MOTIONS]
 
@@ -90,7 +90,8 @@ def _begin(data: TrainingData) -> float:
     return float(data.times[data.first_free] + data.times[data.first_free + 1]) / 2.0
 
 
-def _motions(data: TrainingData, split: str, axis: Floats, materials: list[int]) -> Motions:
+def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int]) -> Motions:
+    """Those of a split, of a body that turns about `axis`; `materials` are the indices of its parameters."""
     y, first = data.reduced[split], data.first_free
     frame = float(data.times[1] - data.times[0])
     along = np.cross(axis, [0.0, 0.0, 1.0])

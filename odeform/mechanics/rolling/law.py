@@ -54,7 +54,7 @@ class RollingLaw:
 
     terms: Float[np.ndarray, "*laws coefficients terms"]
     """Of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
-    settled: Float[np.ndarray, "*laws places terms"]
+    settled: Float[np.ndarray, "*laws places linear"]
     """Of linear functions of the material: mm by which the body stands higher at each of `PLACES`."""
     first: Float[np.ndarray, "*laws inputs hidden"]
     bias: Float[np.ndarray, "*laws hidden"]

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.models.mechanical.correction import coordinate_shares
 from odeform.models.mechanical.lifted_trajectory import MOST, LiftedTrajectory
 from odeform.motion.base import SolveStats
+from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.types import Floats
 
 STOP = 0.2  # s

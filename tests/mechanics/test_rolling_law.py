@@ -1,0 +1,115 @@
+"""The motion of a round body: what the floor may do to it, and that one body and many are computed alike."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.geometry.primitives import octasphere
+from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
+from odeform.mechanics.rolling.field import make_field
+from odeform.mechanics.rolling.law import RollingLaw, first_law
+from odeform.mechanics.rolling.support import Support, support_of
+from odeform.solver.integrate import SolverSettings, integrate
+from odeform.types import Floats
+
+AXIS, RADIUS = np.array([0.0, 1.0, 0.0]), 0.1
+FINE = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
+
+
+@pytest.fixture(scope="module")
+def support() -> Support:
+    return support_of(octasphere(RADIUS, 5).points, AXIS)
+
+
+def any_law(seed: int = 0) -> RollingLaw:
+    law = first_law(2, seed)
+    flat = law.flat()
+    return law.like(flat + 0.2 * np.random.default_rng(seed).normal(size=flat.shape))
+
+
+def state(**given: float) -> Floats:
+    names = ("ahead", "height", "angle", "speed", "rising", "spin", "one", "two")
+    return np.array([given.get(name, 0.0) for name in names])
+
+
+def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
+    law, rng = any_law(), np.random.default_rng(1)
+    material, states = rng.uniform(-1.0, 1.0, (40, 2)), rng.normal(size=(STATE, 40))
+    states[1] = rng.uniform(-0.02, 0.005, 40)
+    together = RollingDynamics(law.like(law.flat()[None]), support, RADIUS, material).slopes(states[:, None])[:, 0]
+    alone = [make_field(law, support, RADIUS, material[i])(0.0, states[:, i]) for i in range(40)]
+    assert np.allclose(together.T, alone, rtol=1e-12, atol=1e-12)
+    assert (together[4] > 0.0).any()
+    assert (together[4] == -GRAVITY).any()
+
+
+def test_laws_side_by_side_are_those_alone(support: Support) -> None:
+    laws, material = [any_law(seed) for seed in range(3)], np.array([[0.3, -0.4], [-0.9, 0.1]])
+    states = np.stack([state(height=-0.004, speed=1.0, spin=4.0), state(height=-0.001, rising=-1.0)], axis=1)
+    several = laws[0].like(np.stack([law.flat() for law in laws]))
+    together = RollingDynamics(several, support, RADIUS, material).roll_out(states, 4, 20, 1e-3)
+    for index, law in enumerate(laws):
+        alone = RollingDynamics(law.like(law.flat()[None]), support, RADIUS, material).roll_out(states, 4, 20, 1e-3)
+        assert np.allclose(together[:, :, index], alone[:, :, 0], rtol=1e-12, atol=1e-14)
+
+
+def test_flight_is_free_fall(support: Support) -> None:
+    field = make_field(any_law(), support, RADIUS, np.array([0.5, -0.5]))
+    begin = state(height=1.0, speed=2.0, rising=1.0, spin=3.0)
+    found = integrate(field, begin, FINE, 0.4).sample(np.array([0.4]))[0]
+    expected = [0.8, 1.0 + 0.4 - 0.5 * GRAVITY * 0.16, 1.2, 2.0, 1.0 - 0.4 * GRAVITY, 3.0]
+    assert np.allclose(found[:6], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_floor_gives_no_energy_to_a_round_body(seed: int) -> None:
+    flat = Support(np.zeros(3), np.zeros(3))
+    law = any_law(seed)
+    law = replace(law, settled=np.zeros_like(law.settled), last=0.0 * law.last)
+    material = np.array([0.2, 0.7])
+    logs = law.coefficients(material[None])
+    inertia = float(np.exp(logs["inertia"][0])) * RADIUS**2
+    lever = RADIUS * (1.0 + 0.1 * float(logs["radius"][0]))
+    begin = state(height=0.1, speed=1.0, spin=-5.0)
+    times = np.linspace(0.0, 1.5, 600)
+    y = integrate(make_field(law, flat, RADIUS, material), begin, FINE, 1.5).sample(times)
+    energy = GRAVITY * y[:, 1] + 0.5 * (y[:, 3] ** 2 + y[:, 4] ** 2 + inertia * y[:, 5] ** 2)
+    away = y[:, 1] > 1e-3 * float(logs["touch"][0])  # elsewhere, some is in the spring of the contact
+    assert away.sum() > 100
+    assert (np.diff(energy[away]) <= 1e-5).all()
+    assert abs(y[-1, 3] - lever * y[-1, 5]) < 0.05  # in the end it rolls
+
+
+def test_a_polygon_stands_highest_on_its_corners() -> None:
+    angles = 2.0 * np.pi * np.arange(12) / 12
+    points = np.stack([np.sin(angles), np.zeros(12), np.cos(angles)], axis=1)
+    support = support_of(points, AXIS)
+    heights, slopes = support.at(np.array([0.0, np.pi / 12, np.pi / 6, 5.0 * np.pi / 6]))
+    assert heights[[0, 2, 3]] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert heights[1] == pytest.approx(np.cos(np.pi / 12) - 1.0, abs=2e-3)
+    assert slopes[[0, 2]] == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_slopes_of_the_support_are_those_of_its_heights(support: Support) -> None:
+    angles = np.random.default_rng(0).uniform(-20.0, 20.0, 200)
+    ahead, behind = (support.at(angles + sign * 1e-3)[0] for sign in (1.0, -1.0))
+    assert np.allclose((ahead - behind) / 2e-3, support.at(angles)[1], atol=2e-4)
+
+
+def test_numbers_of_a_law_go_forth_and_back() -> None:
+    law = any_law(3)
+    again = law.like(law.flat())
+    assert all(np.array_equal(law.arrays()[name], array) for name, array in again.arrays().items())
+
+
+def test_damaged_laws_are_refused() -> None:
+    arrays = any_law().arrays()
+    assert np.array_equal(RollingLaw.from_arrays(arrays, 2).flat(), any_law().flat())
+    with pytest.raises(ValueError, match=r"law.bias: expected a finite array of shape \(16,\)"):
+        RollingLaw.from_arrays({**arrays, "law.bias": np.full(16, np.nan)}, 2)
+    with pytest.raises(ValueError, match=r"law\.terms"):
+        RollingLaw.from_arrays(arrays, 3)
+    with pytest.raises(KeyError):
+        RollingLaw.from_arrays({}, 2)

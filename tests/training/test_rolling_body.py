@@ -1,0 +1,116 @@
+"""Training on a ball whose law of contact is known."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rolls import AXIS, BALL, RADIUS, rolls, true_law
+
+from odeform.dataset.index import Dataset
+from odeform.dataset.training_data import TrainingData, prepare
+from odeform.errors import InputError
+from odeform.mechanics.rolling.law import first_law
+from odeform.mechanics.rolling.support import support_of
+from odeform.models.base import Predictor
+from odeform.models.rolling.model import RollingODeform
+from odeform.motion.reduced_space import POSE, motion_rmse
+from odeform.training.request import TrainRequest
+from odeform.training.rolling import fit_rolling_body, motions_of
+from odeform.training.rolling_law import fit_law, law_error_mm
+from odeform.training.train import train
+
+
+def silent(_: str) -> None: ...
+
+
+@pytest.fixture(scope="module")
+def dataset() -> Dataset:
+    return rolls()
+
+
+@pytest.fixture(scope="module")
+def data(dataset: Dataset) -> TrainingData:
+    return prepare(dataset, patterns=True)
+
+
+@pytest.fixture(scope="module")
+def predictor(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Predictor:
+    return train(
+        dataset, tmp_path_factory.mktemp("rolls") / "rolls.safetensors", "odeform-rolling", steps=6, report=silent
+    )
+
+
+def test_a_dent_that_stays_below_needs_few_patterns(data: TrainingData, dataset: Dataset) -> None:
+    rolling = data.space.rolling
+    assert rolling is not None
+    assert np.allclose(rolling.axis, AXIS, atol=1e-6)
+    assert rolling.patterns <= 0.25 * prepare(dataset).space.basis.modes
+    whole = prepare(dataset, data.space.basis)
+    for y, body in zip(data.reduced["val"], whole.reduced["val"], strict=True):
+        assert motion_rmse(data.space.with_modes(y), body, data.space.gyration_radius) < 2e-5
+    assert data.reduced["val"].shape[2] == data.space.coordinates == POSE + rolling.patterns
+
+
+def test_the_true_law_explains_the_motions_and_a_fit_approaches_it(data: TrainingData) -> None:
+    support, motions = support_of(BALL.points, AXIS), motions_of(data, "train", AXIS, [0])
+    start, true = first_law(1, 0), true_law()
+    some = motions.some(np.arange(12))
+    before, known = (law_error_mm(law, support, RADIUS, some) for law in (start, true))
+    free = np.arange(start.terms.size)
+    fitted = fit_law(start, free, support, RADIUS, some, 6, silent)
+    assert known < 0.7  # what differences of frames make of the velocity
+    assert before > 5.0 * known
+    assert law_error_mm(fitted, support, RADIUS, some) < 0.4 * before
+
+
+@pytest.mark.slow
+def test_a_trained_model_predicts_motions_that_it_has_not_seen(predictor: Predictor, dataset: Dataset) -> None:
+    assert isinstance(predictor, RollingODeform)
+    scores = predictor.checkpoint.scores
+    assert scores["rmse_pooled_mm"] < 2.0
+    assert scores["deformation_relative"] < 0.3
+    assert predictor.schema.window.reach > 0.0
+
+
+@pytest.mark.slow
+def test_a_motion_is_continuous_starts_at_rest_and_goes_on(predictor: Predictor) -> None:
+    motion = predictor.solve(parameters={"force": 80.0}, quality="reference")
+    assert np.array_equal(motion.vertices(0.0), predictor.rest.points)
+    times = np.linspace(0.0, 1.9, 1901)
+    centres = motion.vertices(times).mean(axis=1)
+    assert np.abs(np.diff(centres, axis=0)).max() < 5e-3
+    assert motion.stop_at(1.9) is None
+    assert centres[-1, 0] > centres[600, 0] > centres[300, 0]
+
+
+@pytest.mark.slow
+def test_what_is_shown_does_not_depend_on_what_was_asked_before(predictor: Predictor) -> None:
+    times = np.array([0.3, 0.02, 0.7, 0.11])
+    together = predictor.solve().vertices(times)
+    motion = predictor.solve()
+    assert all(np.array_equal(motion.vertices(float(t)), v) for t, v in zip(times[::-1], together[::-1], strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damaged", ["law.terms", "start.weights", "readout.weights", "rolling.harmonics"])
+def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> None:
+    arrays = {**predictor.checkpoint.arrays, damaged: np.zeros(2)}
+    with pytest.raises(InputError, match=damaged):
+        RollingODeform(replace(predictor.checkpoint, arrays=arrays))
+    missing = replace(predictor.checkpoint, arrays={name: a for name, a in arrays.items() if name != damaged})
+    with pytest.raises(InputError, match="missing or wrong"):
+        RollingODeform(missing)
+
+
+def test_data_of_other_motions_are_refused(data: TrainingData, tmp_path: Path) -> None:
+    request = TrainRequest("odeform-rolling", steps=1)
+    with pytest.raises(InputError, match="rolls about one level axis"):
+        fit_rolling_body(replace(data, space=replace(data.space, rolling=None)), request, silent)
+    with pytest.raises(InputError, match="expected a round body"):
+        fit_rolling_body(replace(data, rest=data.rest * [1.0, 1.0, 0.9]), request, silent)
+    with pytest.raises(InputError, match="begin with a push"):
+        fit_rolling_body(replace(data, first_free=0), request, silent)
+    unseen = replace(data, observed={split: ~of for split, of in data.observed.items()})
+    with pytest.raises(InputError, match="no --every"):
+        fit_rolling_body(unseen, request, silent)
