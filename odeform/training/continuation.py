@@ -24,7 +24,7 @@ from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
 
-__all__ = ["fit_dynamics", "predicted_errors", "with_continuation"]
+__all__ = ["HELD_OUT", "fit_dynamics", "predicted_errors", "with_continuation"]
 
 # chosen on validation sequences: of `mass-elastic`, after 40 to 90 frames; of `kick`, up to twice its window
 CENTERS = 300
@@ -34,7 +34,8 @@ SIDE = 2.0  # gain of the side that is down, a unit vector
 WIDTH = 0.05  # of the largest depth
 FREE = 0.01  # share of the largest acceleration besides gravity, below which there is no contact
 CANDIDATES = 12_000  # states among which centres are chosen
-HELD_OUT = 1.0 / 3.0  # of the window, over which a continuation is validated
+HELD_OUT = 1.0 / 3.0
+"""Of the window, over which a continuation is validated."""
 FEWEST = 3  # frames that it can be fitted to
 TINY = 1e-9  # metres; against division by zero
 
@@ -149,7 +150,7 @@ def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
 
 def is_continued(model: Predictor) -> TypeGuard[ReducedModel]:
     """Whether motions of this model go on beyond its window by these dynamics, where they predict well enough."""
-    return isinstance(model, ReducedModel) and not model.schema.objects
+    return isinstance(model, ReducedModel) and not model.schema.objects and not model.continues_itself
 
 
 def refitted(checkpoint: Checkpoint, dataset: Dataset) -> Checkpoint:

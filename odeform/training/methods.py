@@ -15,6 +15,7 @@ from odeform.errors import InputError
 from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.baselines.pe_gnn import PeGnn
 from odeform.models.baselines.point_model import PointModel
+from odeform.models.continuation import LATER_ERRORS
 from odeform.models.odeform.model import ODeform
 from odeform.models.per_object import joined
 from odeform.models.registry import TRAINABLE, model_class
@@ -31,7 +32,7 @@ from odeform.training.points import Budget, fit_points
 from odeform.training.pruning import without_modes
 from odeform.training.qualities import with_qualities
 from odeform.training.request import TrainRequest
-from odeform.training.rolling import fit_rolling_body
+from odeform.training.rolling import fit_rolling_body, later_errors
 from odeform.training.saved_laws import SavedLaws
 from odeform.types import Arrays
 
@@ -151,7 +152,9 @@ def _train_rolling(run: Run) -> Checkpoint:
     checkpoint = _reduced_checkpoint(run, data, arrays, settings)
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
-    return with_qualities(with_correction(checkpoint, data), data)
+    checkpoint = with_qualities(with_correction(checkpoint, data), data)
+    later = later_errors(RollingODeform(checkpoint), data).astype(np.float32)
+    return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later})
 
 
 def _fit(run: Run) -> Checkpoint:

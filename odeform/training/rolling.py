@@ -1,5 +1,5 @@
-"""The training of ODeform for a round body: where the push leaves it, the law of contact, how it is deformed, and what
-is left."""
+"""The training of ODeform for a round body: where the push leaves it, the law of contact, how it is deformed, and how
+wrong it is beyond the window."""
 
 import time
 from collections.abc import Callable
@@ -16,14 +16,16 @@ from odeform.mechanics.rolling.dynamics import MOVING, STATE
 from odeform.mechanics.rolling.law import RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.kernel_search import search_ridge
+from odeform.models.rolling.model import RollingODeform
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start
-from odeform.motion.reduced_space import POSE
+from odeform.motion.reduced_space import POSE, small_motion
+from odeform.training.continuation import HELD_OUT
 from odeform.training.request import TrainRequest
 from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
 from odeform.types import Arrays, Floats, Ints
 
-__all__ = ["fit_rolling_body", "motions_of"]
+__all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 
 PUSHES = ("force", "elevation")  # parameters that act through the push alone
 MOTIONS = 200  # to which the law is fitted, at most
@@ -165,3 +167,16 @@ def _frames(
     touch = np.repeat(1e-3 * law.coefficients(motions.material)["touch"], count)
     patterns = data.reduced[split][:, -count:, POSE:]
     return _Frames(inputs_of(rows, touch, material), patterns.reshape(len(rows[0]), -1))
+
+
+def later_errors(model: RollingODeform, data: TrainingData) -> Floats:
+    """(S, L) RMSE in mm of validation motions over the last third of the window, where the motion of the ODE goes on
+    from the corrected one, as it does beyond the window."""
+    evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
+    kept, stop = round((1.0 - HELD_OUT) * len(times)), float(times[-1])
+    quality, missed = model.qualities["reference"], []
+    for theta, truth in zip(data.theta["val"], data.reduced["val"], strict=True):
+        corrected = model.trajectory(theta, evaluated, quality, stop).reduced(times[kept - 1 : kept])
+        own = model.integrate(theta, quality, stop).reduced(times[kept - 1 :])
+        missed.append(corrected + own[1:] - own[:1] - truth[kept:])
+    return 1e3 * small_motion(np.stack(missed), data.space.gyration_radius) / np.sqrt(3.0)

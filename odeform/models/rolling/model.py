@@ -82,9 +82,7 @@ class RollingODeform(ReducedModel):
         deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), material))
         return np.concatenate([placed(states, self.rolling.axis), deformation], axis=1)
 
-    def integrate(
-        self, theta: Floats, evaluated: EvaluatedBasis | None, quality: SolverSettings, until: float
-    ) -> Trajectory:
+    def integrate(self, theta: Floats, quality: SolverSettings, until: float) -> Trajectory:
         """The motion for theta (P,) in [-1, 1], without its correction, solved to `until` seconds."""
         field, start = self.problem(theta)
 
@@ -109,7 +107,7 @@ class RollingODeform(ReducedModel):
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
-        solved = self.integrate(theta, evaluated, settings, until)
+        solved = self.integrate(theta, settings, until)
         if self.correction is None:
             return solved
         return CorrectedTrajectory(
