@@ -17,7 +17,7 @@ from odeform.types import Floats
 __all__ = ["make_field"]
 
 FULL = 2.0 * math.pi
-REACH = float(PLACES[-1]) + 4.0 * REACHING
+AROUND = float(PLACES[-1]) + 4.0 * REACHING
 
 
 def make_field(law: RollingLaw, support: Support, radius: float, material: Floats) -> Field:
@@ -48,7 +48,7 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
             corner_slope = float(slopes[index]) * (1.0 - part) + float(slopes[index + 1]) * part
             gap, tilt = touch - height + share * corner, 0.0
             turned = (angle + math.pi) % FULL - math.pi
-            if abs(turned) < REACH:
+            if abs(turned) < AROUND:
                 apart = (turned - PLACES) / REACHING
                 each = settled * np.exp(-0.5 * apart * apart)
                 gap += float(each.sum())
