@@ -33,7 +33,7 @@ SCHEMA = Schema(
 
 
 def true_law() -> RollingLaw:
-    """Heavier balls sink deeper and bounce less; all bounce less and slide more than by the law that fits start from."""
+    """Heavier balls sink deeper and bounce less; all bounce less and slide more than by the first law of a fit."""
     law = first_law(1, seed=0)
     terms = law.terms.copy()
     terms[:3, 1] = -0.8, 0.2, 0.6

@@ -118,6 +118,7 @@ def main(argv: list[str] | None = None) -> None:
     """Compare checkpoints over several windows, and print the result or write it to a file."""
     parser = argparse.ArgumentParser("python -m odeform.benchmark.later", description=__doc__)
     parser.add_argument("checkpoints", nargs="+", metavar="CKPT", help="paths or bundled names, all of one scene")
+    parser.add_argument("--data", metavar="DATA", help="data set with the test sequences (default: the scene's)")
     parser.add_argument("--count", type=int, default=COUNT, metavar="N", help=f"test sequences (default: {COUNT})")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="folder of the simulations; those in it are used")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result to this file")
@@ -131,8 +132,16 @@ def main(argv: list[str] | None = None) -> None:
     scenes = {model.schema.scene for model in models.values()}
     if len(scenes) > 1 or next(iter(models.values())).schema.objects:
         parser.error(f"expected checkpoints of one scene of one body, got those of {', '.join(sorted(scenes))}")
-    later = simulate_later(open_dataset(scenes.pop()), args.count, args.keep)
-    command = f"python -m odeform.benchmark.later {' '.join(args.checkpoints)} --count {args.count}"
+    scene = scenes.pop()
+    try:
+        dataset = open_dataset(args.data or scene)
+    except InputError as error:
+        parser.error(str(error))
+    if dataset.schema.scene != scene:
+        parser.error(f"--data: expected a data set of scene {scene}, got one of {dataset.schema.scene}")
+    later = simulate_later(dataset, args.count, args.keep)
+    data = f" --data {args.data}" if args.data else ""
+    command = f"python -m odeform.benchmark.later {' '.join(args.checkpoints)}{data} --count {args.count}"
     found = {"command": command, "models": {name: compare_later(model, later) for name, model in models.items()}}
     write_or_print(found, args.json)
 
