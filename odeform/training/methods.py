@@ -21,6 +21,7 @@ from odeform.models.per_object import joined
 from odeform.models.registry import TRAINABLE, model_class
 from odeform.models.rolling.model import RollingODeform
 from odeform.schema import REACH
+from odeform.solver.integrate import SolverSettings
 from odeform.training.body import body_arrays
 from odeform.training.continuation import with_continuation
 from odeform.training.correction import with_correction
@@ -38,6 +39,7 @@ from odeform.types import Arrays
 
 __all__ = ["Run", "is_resumable", "train_model"]
 
+WITH_KINKS = SolverSettings("dopri5", tolerance=1e-8, dtype="float64")  # finer ones take thousands of steps at contacts
 NARROW = 1e-3  # of a scene's range, by which that of an object is wider than its data
 
 
@@ -152,7 +154,7 @@ def _train_rolling(run: Run) -> Checkpoint:
     checkpoint = _reduced_checkpoint(run, data, arrays, settings)
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
-    checkpoint = with_qualities(with_correction(checkpoint, data), data)
+    checkpoint = with_qualities(with_correction(checkpoint, data), data, WITH_KINKS)
     later = later_errors(RollingODeform(checkpoint), data).astype(np.float32)
     return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later})
 

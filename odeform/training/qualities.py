@@ -30,12 +30,13 @@ def _candidates(step: float) -> list[SolverSettings]:
     return [*adaptive, *fixed]
 
 
-def measure_frontier(model: ReducedModel, data: TrainingData) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
+def measure_frontier(
+    model: ReducedModel, data: TrainingData, reference: SolverSettings = EXACT
+) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
     """The non-dominated settings, and the model's own errors in mm, over the validation sequences.
 
-    The solver's error is measured against tolerance 1e-10 in double precision, the model's is that of this reference
-    against the data; both in total and of the deformation alone, as root mean squares over points, coordinates and
-    time.
+    The solver's error is measured against the `reference`, the model's is that of the reference against the data; both
+    in total and of the deformation alone, as root mean squares over points, coordinates and time.
     """
     evaluated = model.evaluate_basis(model.rest, 0.0)
 
@@ -55,7 +56,7 @@ def measure_frontier(model: ReducedModel, data: TrainingData) -> tuple[tuple[Fro
         of_all, of_deformation = (motion_rmse(one, truth, data.space.gyration_radius) for one in (motion, stiff))
         return 1e3 * of_all, 1e3 * of_deformation
 
-    truth, _ = motions(EXACT)
+    truth, _ = motions(reference)
     points = []
     for quality in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(quality)
@@ -75,10 +76,11 @@ def choose_qualities(
     return {name: point.quality.to_json() for name, point in {**chosen, "reference": frontier[-1]}.items()}
 
 
-def with_qualities(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained model with its frontier, and the qualities that are chosen on it."""
+def with_qualities(checkpoint: Checkpoint, data: TrainingData, reference: SolverSettings = EXACT) -> Checkpoint:
+    """The checkpoint of a trained model with its frontier, measured against `reference`, and the qualities that are
+    chosen on it."""
     model = load_model(checkpoint)
     assert isinstance(model, ReducedModel)
-    frontier, errors_mm = measure_frontier(model, data)
+    frontier, errors_mm = measure_frontier(model, data, reference)
     settings = {"qualities": choose_qualities(frontier, errors_mm), "frontier": [p.to_json() for p in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})
