@@ -34,6 +34,7 @@ LINEAR = 8  # of them with a law that is linear in the material and has no netwo
 SHARE = 0.7  # of the budget for the law
 FEATURES, SHARPNESS = 1500, (0.15, 1.2)  # of the readout; slopes per standard deviation of the inputs
 RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # candidates, relative; validation chooses
+LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
 RATES = 0.3  # s: errors of rates count as they are after this time
 
@@ -75,7 +76,7 @@ def fit_rolling_body(
 def _checked(data: TrainingData, request: TrainRequest) -> tuple[Floats, float]:
     """The axis and the radius of the body."""
     rolling = data.space.rolling
-    if rolling is None or abs(rolling.axis[2]) > 1e-6:
+    if rolling is None or abs(rolling.axis[2]) > LEVEL:
         raise InputError("odeform-rolling: expected motions of a body that rolls about one level axis")
     distances = np.linalg.norm(data.rest, axis=1)
     if distances.min() < (1.0 - ROUND) * distances.max():
