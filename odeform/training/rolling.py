@@ -94,7 +94,7 @@ def _begin(data: TrainingData) -> float:
 
 
 def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int]) -> Motions:
-    """Those of a split, of a body that turns about `axis`; `materials` are the indices of its parameters."""
+    """Those of a split, of a body that turns about `axis` (3,); `materials` are the indices of its Q parameters."""
     y, first = data.reduced[split], data.first_free
     frame = float(data.times[1] - data.times[0])
     along = np.cross(axis, [0.0, 0.0, 1.0])

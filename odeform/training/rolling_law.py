@@ -41,7 +41,7 @@ class Motions:
     """s."""
 
     def some(self, rows: Ints) -> "Motions":
-        """Of these motions only."""
+        """Of the motions with the indices `rows` (R,) only."""
         return replace(self, material=self.material[rows], start=self.start[:, rows], moved=self.moved[:, rows])
 
 
@@ -62,7 +62,7 @@ def _missed(states: Floats, motions: Motions, radius: float) -> Float[np.ndarray
 
 
 def law_error_mm(law: RollingLaw, support: Support, radius: float, motions: Motions) -> float:
-    """Pooled RMSE of the pose, in mm."""
+    """Pooled RMSE of the pose in mm, over the frames (T,) and the motions (M,)."""
     states = roll_out(law.like(law.flat()[None]), support, radius, motions)[:, :MOVING, 0]
     apart = (states.transpose(0, 2, 1) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
     return float(1e3 * np.sqrt(np.square(apart).sum(axis=2).mean() / 3.0))
@@ -78,7 +78,8 @@ def fit_law(
     report: Callable[[str], None],
     go_on: Callable[[], bool] = lambda: True,
 ) -> RollingLaw:
-    """The law after at most `steps` steps of Levenberg and Marquardt, in which the numbers `free` (indices) change.
+    """The law after at most `steps` steps of Levenberg and Marquardt, in which the numbers with the indices
+    `free` (F,) change; `radius` is in m.
 
     It ends earlier where a step gains hardly anything, and when `go_on` says so.
     """
