@@ -1,5 +1,7 @@
 """Patterns of deformation that stay where they are while the body rolls: fitted to motions, kept where they are few."""
 
+from bisect import bisect_left
+
 import numpy as np
 from jaxtyping import Float
 
@@ -39,9 +41,10 @@ def fit_rolling(
     turns = rotation_from_vector(np.linspace(0.0, 2.0 * np.pi, ANGLES, endpoint=False)[:, None] * axis)
     patterns = _patterns(space, axis, train)
     rolling = Rolling(axis, fourier_series(_products(space.basis, patterns, rest, weights, turns), SERIES))
-    most = int(FEWER * space.basis.modes)
-    count = next((n for n in range(1, most + 1) if _left_out(rolling.first(n), val) <= tolerance), None)
-    return None if count is None else rolling.first(count)
+    most = min(int(FEWER * space.basis.modes), rolling.patterns)
+    # what is left out shrinks with each pattern
+    count = 1 + bisect_left(range(1, most + 1), -tolerance, key=lambda n: -_left_out(rolling.first(n), val))
+    return None if count > most else rolling.first(count)
 
 
 def _axis(vectors: Float[np.ndarray, "frames 3"]) -> Vector | None:

@@ -48,18 +48,9 @@ class Rolling:
     def matrices(self, angles: Float[np.ndarray, " times"]) -> Float[np.ndarray, "times modes patterns"]:
         """M at angles (T,)."""
         phases = np.outer(angles, np.arange(1, len(self.harmonics) // 2 + 1))
-        return self._sum(np.concatenate([np.ones((len(angles), 1)), np.cos(phases), np.sin(phases)], axis=1))
-
-    def slopes(self, angles: Float[np.ndarray, " times"]) -> Float[np.ndarray, "times modes patterns"]:
-        """dM/da at angles (T,)."""
-        orders = np.arange(1, len(self.harmonics) // 2 + 1)
-        phases = np.outer(angles, orders)
-        terms = [np.zeros((len(angles), 1)), -orders * np.sin(phases), orders * np.cos(phases)]
-        return self._sum(np.concatenate(terms, axis=1))
-
-    def _sum(self, terms: Float[np.ndarray, "times terms"]) -> Float[np.ndarray, "times modes patterns"]:
+        terms = np.concatenate([np.ones((len(angles), 1)), np.cos(phases), np.sin(phases)], axis=1)
         flat = self.harmonics.reshape(len(self.harmonics), -1)
-        return (terms @ flat).reshape(len(terms), *self.harmonics.shape[1:])
+        return (terms @ flat).reshape(len(angles), *self.harmonics.shape[1:])
 
     def coefficients(
         self, vectors: Float[np.ndarray, "times 3"], patterns: Float[np.ndarray, "times patterns"]

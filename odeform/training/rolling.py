@@ -44,8 +44,8 @@ def fit_rolling_body(
 ) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and settings of the checkpoint, without the correction.
 
-    `InputError` for data of a body that is not round, does not roll about one level axis, is not pushed first, or of
-    which frames are left out.
+    `InputError` for data of a body that is not round, does not roll about one horizontal axis, or is not pushed first,
+    and where frames are left out.
     """
     begin = time.process_time()
     axis, radius = _checked(data, request)
@@ -65,10 +65,10 @@ def fit_rolling_body(
     law = fit_law(law, _linear(law), support, radius, some, min(LINEAR, steps), report, go_on)
     law = fit_law(law, np.arange(law.flat().size), support, radius, some, max(steps - LINEAR, 0), report, go_on)
     error = law_error_mm(law, support, radius, motions["val"])
-    report(f"the law alone, from the end of the push on: {error:.2f} mm (val)")
+    report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
     readout = _readout(data, law, support, radius, motions, request.seed)
     names = [data.schema.learned[i].name for i in materials]
-    val = {"law_rmse_mm": error, "steps": steps, "seconds": time.process_time() - begin}
+    val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "val": val, "qualities": {}}
     return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
 
@@ -77,7 +77,7 @@ def _checked(data: TrainingData, request: TrainRequest) -> tuple[Floats, float]:
     """The axis and the radius of the body."""
     rolling = data.space.rolling
     if rolling is None or abs(rolling.axis[2]) > LEVEL:
-        raise InputError("odeform-rolling: expected motions of a body that rolls about one level axis")
+        raise InputError("odeform-rolling: expected motions of a body that rolls about one horizontal axis")
     distances = np.linalg.norm(data.rest, axis=1)
     if distances.min() < (1.0 - ROUND) * distances.max():
         raise InputError("odeform-rolling: expected a round body, about its mass centre")

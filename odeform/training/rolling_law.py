@@ -115,7 +115,7 @@ def fit_law(
             break
         gained, damping = cost - trial_cost, max(damping / 4.0, 1e-6)
         now, errors, cost = trial, trial_errors, trial_cost
-        report(f"law, step {step + 1}: {ROBUST * np.sqrt(cost):.2f} mm")
+        report(f"contact law, step {step + 1}: robust pose error {ROBUST * np.sqrt(cost):.2f} mm (train)")
         if gained < ENOUGH * cost:
             break
     return law.like(now)

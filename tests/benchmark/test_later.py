@@ -81,3 +81,12 @@ def test_a_longer_simulation_begins_as_the_shorter_one() -> None:
     short, long = (simulate(parameters, step=2e-3, resolution=5, until=until) for until in (0.1, 0.3))
     assert long.times[-1] == pytest.approx(0.3)
     assert np.array_equal(long.vertices[: len(short.times)], short.vertices)
+
+
+def test_data_of_another_scene_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["mass-elastic/nearest", "--data", "kick"])
+    assert "--data: expected a data set of scene mass-elastic, got one of kick" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["mass-elastic/nearest", "--data", "nowhere"])
+    assert "nowhere" in capsys.readouterr().err

@@ -12,6 +12,7 @@ from odeform.mechanics.rolling.field import make_field
 from odeform.mechanics.rolling.law import RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.solution import Status
 from odeform.types import Floats
 
 AXIS, RADIUS = np.array([0.0, 1.0, 0.0]), 0.1
@@ -113,3 +114,11 @@ def test_damaged_laws_are_refused() -> None:
         RollingLaw.from_arrays(arrays, 3)
     with pytest.raises(KeyError):
         RollingLaw.from_arrays({}, 2)
+
+
+@pytest.mark.parametrize("height", [-1e300, float("-inf"), float("nan")])
+def test_a_state_that_is_lost_ends_the_integration_with_a_status(support: Support, height: float) -> None:
+    field = make_field(any_law(), support, RADIUS, np.array([0.5, -0.5]))
+    with np.errstate(all="ignore"):
+        found = integrate(field, state(height=height, rising=-1e200, spin=1e300), FINE, 0.1)
+    assert found.status is not Status.OK

@@ -23,12 +23,6 @@ def test_a_fourier_series_has_the_values_it_was_made_of() -> None:
     assert fourier_series(values, 0.5).shape == (3, 2, 1)
 
 
-def test_slopes_are_those_of_the_matrices(rolling: Rolling) -> None:
-    angles, step = np.array([-7.0, 0.3, 12.0]), 1e-6
-    differences = (rolling.matrices(angles + step) - rolling.matrices(angles - step)) / (2.0 * step)
-    assert np.allclose(rolling.slopes(angles), differences, atol=1e-7)
-
-
 def test_amplitudes_come_back(rolling: Rolling) -> None:
     rng = np.random.default_rng(1)
     vectors, amplitudes = rng.normal(size=(300, 1)) * AXIS, rng.normal(size=(300, 3))

@@ -105,7 +105,7 @@ def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> 
 
 def test_data_of_other_motions_are_refused(data: TrainingData, tmp_path: Path) -> None:
     request = TrainRequest("odeform-rolling", steps=1)
-    with pytest.raises(InputError, match="rolls about one level axis"):
+    with pytest.raises(InputError, match="rolls about one horizontal axis"):
         fit_rolling_body(replace(data, space=replace(data.space, rolling=None)), request, silent)
     with pytest.raises(InputError, match="expected a round body"):
         fit_rolling_body(replace(data, rest=data.rest * [1.0, 1.0, 0.9]), request, silent)

@@ -30,6 +30,7 @@ CLEAR = 2e-3  # m above the touch from which on nothing touches, corners include
 FASTEST = 60.0  # m/s and rad/s: rates beyond are no motion, and are kept from overflowing
 DEEP, UPWARD, AHEAD = 2.0, 2.0, 2.0  # units of the network's inputs: cm, m/s, m/s
 EXPONENTS = (-12.0, 8.0)
+DEPTHS = (1e-9, 1e3)  # cm: what is shallower does not touch, what is deeper is lost
 SPIN = 1.0  # rad/s, from which on rolling is braked fully
 
 
@@ -83,7 +84,7 @@ class RollingDynamics:
         settled, settled_slopes = self._settled(angle, laws, motions)
         high = shared.touch[near] + settled - states[1][near]
         share = np.exp(np.clip(shared.logs["corners"][near], -6.0, 1.0))
-        depth = np.maximum(100.0 * (high + share * corners), 1e-9)
+        depth = np.clip(100.0 * (high + share * corners), *DEPTHS)
         sliding = fast - lever * turning
         strong = self._adjusted(depth, up, sliding, fast, laws, motions)
         push = strong["stiffness"] * depth ** shared.power[near]

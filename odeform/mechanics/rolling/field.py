@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.dynamics import AHEAD, CLEAR, DEEP, EXPONENTS, FADING, SPIN, UPWARD
+from odeform.mechanics.rolling.dynamics import AHEAD, CLEAR, DEEP, DEPTHS, EXPONENTS, FADING, SPIN, UPWARD
 from odeform.mechanics.rolling.law import ADJUSTED, PLACES, REACHING, RollingLaw
 from odeform.mechanics.rolling.support import Support
 from odeform.solver.method import Field
@@ -34,10 +34,13 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
     heights, slopes, places = support.heights, support.slopes, len(support.heights) - 1
     quick, slow = FADING
     low, high = EXPONENTS
+    shallowest, deepest = DEPTHS
     inputs = np.empty(4)
 
     def field(_: float, state: Floats) -> Floats:
         _, height, angle, ahead, rising, spin, one, two = state.tolist()
+        if not math.isfinite(height + angle + ahead + rising + spin):  # the integration ends here, with a status
+            return np.full_like(state, np.nan)
         fast = rise = turn = 0.0
         one, two = -one / quick, -two / slow
         if touch + CLEAR > height:
@@ -53,7 +56,7 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
                 each = settled * np.exp(-0.5 * apart * apart)
                 gap += float(each.sum())
                 tilt -= float(apart @ each) / REACHING
-            depth, sliding = max(100.0 * gap, 1e-9), ahead - lever * spin
+            depth, sliding = min(max(100.0 * gap, shallowest), deepest), ahead - lever * spin
             inputs[:] = depth / DEEP, rising / UPWARD, abs(sliding), abs(ahead) / AHEAD
             added = (last @ np.tanh(first @ inputs + bias)).tolist()
             stiffness, damping, friction, rolling, grip, felt = (

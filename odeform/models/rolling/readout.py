@@ -5,13 +5,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float
 
+from odeform.arrays import finite_arrays
 from odeform.mechanics.rolling.dynamics import STATE
 from odeform.types import Arrays
 
 __all__ = ["Readout", "inputs_of"]
 
 NEAR = 0.02  # m above the touch over which a contact that comes is felt
-SHALLOW = 0.05  # m: what is higher is as good as far away
 INPUTS = 10  # besides the material
 
 
@@ -61,12 +61,9 @@ class Readout:
     @classmethod
     def from_arrays(cls, arrays: Arrays, materials: int, patterns: int) -> "Readout":
         """KeyError for a missing array, ValueError unless they are finite and fit each other."""
-        found = {field.name: arrays[f"readout.{field.name}"].astype(float) for field in fields(cls)}
-        inputs, count = INPUTS + materials, len(found["phases"])
+        inputs, count = INPUTS + materials, len(arrays["readout.phases"])
         shapes = {"mean": (inputs,), "scale": (inputs,), "directions": (inputs, count), "phases": (count,)}
-        for name, shape in {**shapes, "weights": (count + inputs + 1, patterns)}.items():
-            if found[name].shape != shape or not np.isfinite(found[name]).all():
-                raise ValueError(f"readout.{name}: expected a finite array of shape {shape}, got {found[name].shape}")
+        found = finite_arrays(arrays, "readout.", {**shapes, "weights": (count + inputs + 1, patterns)})
         if not (found["scale"] > 0.0).all():
             raise ValueError("readout.scale: expected positive numbers")
         return cls(**found)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float
 
+from odeform.arrays import finite_arrays
 from odeform.mechanics.rolling.dynamics import MOVING
 from odeform.models.contact.kernel import matern
 from odeform.types import Arrays
@@ -33,12 +34,9 @@ class Start:
     @classmethod
     def from_arrays(cls, arrays: Arrays, parameters: int) -> "Start":
         """KeyError for a missing array, ValueError unless they are finite and fit each other."""
-        found = {field.name: arrays[f"start.{field.name}"].astype(float) for field in fields(cls)}
-        count, size = len(found["theta"]), 2 * MOVING
+        count, size = len(arrays["start.theta"]), 2 * MOVING
         shapes = {"theta": (count, parameters), "scales": (parameters,), "weights": (count, size), "mean": (size,)}
-        for name, shape in shapes.items():
-            if found[name].shape != shape or not np.isfinite(found[name]).all():
-                raise ValueError(f"start.{name}: expected a finite array of shape {shape}, got {found[name].shape}")
+        found = finite_arrays(arrays, "start.", shapes)
         if not (found["scales"] > 0.0).all():
             raise ValueError("start.scales: expected positive numbers")
         return cls(**found)
