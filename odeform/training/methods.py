@@ -62,7 +62,7 @@ class Run:
         self.report(
             f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
             f"{modes} POD mode{'s' if modes > 1 else ''}"
-            f"{f', or {rolling.patterns} patterns in axes that do not roll with the body' if rolling else ''}; "
+            f"{f', or {rolling.patterns} in axes that do not roll with the body' if rolling else ''}; "
             f"the rest of the deformation is {data.truncation_mm['val']:.3f} mm RMS on validation"
         )
         return data
