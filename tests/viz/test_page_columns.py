@@ -101,7 +101,7 @@ def test_every_body_is_whole_and_unobscured(tab: Tab, count: int, size: tuple[in
     camera = _camera(tab, size)
     areas = [project(points, camera, size) for points in _bodies(tab)]
     boxes = [(pixels.min(axis=0), pixels.max(axis=0)) for pixels in areas]
-    panels = [np.array(rectangle) for rectangle in tab.page.evaluate(PANELS)]
+    panels = _panels(tab, size)
     assert len(panels) >= 2
     for index, (low, high) in enumerate(boxes):
         assert (low >= 0.0).all()
@@ -112,6 +112,16 @@ def test_every_body_is_whole_and_unobscured(tab: Tab, count: int, size: tuple[in
     path = tmp_path / f"columns_{count}_{size[0]}.png"
     assert until(lambda: _drawn(tab, [0.5 * (low + high) for low, high in boxes], path))
     assert tab.errors == []
+
+
+def _panels(tab: Tab, size: tuple[int, int]) -> list[Floats]:
+    """(left, top, right, bottom) of each panel, in pixels, once the browser has moved them with the window's edge."""
+
+    def now() -> list[Floats]:
+        return [np.array(rectangle) for rectangle in tab.page.evaluate(PANELS)]
+
+    assert until(lambda: any(size[0] - 40 < right <= size[0] for _, _, right, _ in now()))
+    return now()
 
 
 def _drawn(tab: Tab, middles: list[Floats], path: Path) -> bool:
