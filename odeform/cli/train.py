@@ -37,7 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--sequences", type=int, metavar="N", help="train on the first N training sequences (default: all)"
     )
     parser.add_argument(
-        "--without", default="", metavar="PART,...", help=f"leave out parts of odeform, of {', '.join(ABLATIONS)}"
+        "--without", default="", metavar="PART,...", help=f"leave out parts of the model, of {', '.join(ABLATIONS)}"
     )
     parser.add_argument(
         "--object", nargs="+", default=[], metavar="NAME", help="train on these objects only, of a scene with several"

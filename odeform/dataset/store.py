@@ -20,7 +20,7 @@ def open_dataset(name: str | Path) -> Dataset:
 
     Args:
         name: A folder that `odeform simulate` or `odeform import` wrote, an `.odp` file of `odeform pack`, or the name
-            of a bundled data set (a clone has one for each scene, and `kick-wide`; a wheel has none).
+            of a bundled data set (a clone has one for each scene; a wheel has none).
 
     Raises:
         InputError: No data set is there, or it is damaged.

@@ -48,7 +48,7 @@ def _lowest(evaluated: EvaluatedBasis, y: Floats) -> Floats:
     return heights.min(axis=1).astype(float) + shift[:, 2] + evaluated.space.anchor[2]
 
 
-def watched_body(rest: Mesh, space: ReducedSpace, limit: float) -> WatchedBody:
+def watched_body(rest: Mesh | PointCloud, space: ReducedSpace, limit: float) -> WatchedBody:
     """Evaluate the basis on the trained body at rest."""
     points = np.asarray(rest.points, dtype=float)
     outermost = points[np.unique((_directions(OUTERMOST) @ (points - points.mean(axis=0)).T).argmax(axis=1))]

@@ -48,7 +48,7 @@ def page(found: Mapping[str, Any]) -> str:
                 "Within a table every model is trained on the same data and split, with a fixed budget of steps that",
                 "includes trials of its settings on the validation split.",
                 "Unlike minutes, steps do not depend on the load of the machine.",
-                f"On an idle core each budget took about {MINUTES} minutes when it was set.",
+                f"On an idle core each budget took about {MINUTES[DROP]} minutes when it was set, on the kick {MINUTES['kick']}.",
                 f"Here, with two runs at a time: {_taken(runs)}.",
             ),
             "",

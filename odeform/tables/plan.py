@@ -19,6 +19,7 @@ __all__ = [
     "IMPACT",
     "INTERVALS",
     "MINUTES",
+    "OURS",
     "PUSH",
     "UNTIL",
     "plan",
@@ -34,8 +35,10 @@ FINAL = (19, 20)
 """The last frame of pushed objects: what `pe-gnn` predicts, and what the other models have there."""
 IMPACT = (30, 89)
 """Frames of the drop from just before the first contact to after the second; every 3rd, 5th and 8th ends beyond."""
+OURS = {DROP: "odeform", "kick": "odeform-rolling"}
+"""The model of each scene of one ball whose seeds, ablations and learning curve are shown."""
 SEEDS = (0, 1, 2)
-"""Seeds of `odeform`. The best baseline, `pod-rbf`, is deterministic."""
+"""Seeds of `OURS`. The best baselines are deterministic."""
 UNTIL, AHEAD = (40, 70), 10
 """Extrapolation of the drop: trained frames, to the end of the first contact or into the second; frames predicted."""
 INTERVALS = (3, 5, 8)
@@ -45,20 +48,26 @@ SCORED_PUSHES = {"pe-gnn": (FINAL,), **dict.fromkeys(("odeform", *SOLVED), (FRAM
 """Windows of pushed objects on which models are scored, if not on all frames alone."""
 FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253), FORCE: (25, 50, 100)}
 """Training sequences of the learning curve, of each object: about an eighth, a quarter and a half of all."""
-ABLATED = (
-    (),
-    ("correction",),
-    *((*parts, "correction") for parts in (("ode",), ("clock",), ("parameters",), ("clock", "parameters"))),
-    ("random-features", "correction"),
-)
-"""Parts that ablations leave out. The regression of what is left would hide what the others give."""
-MINUTES = 4
+ABLATED = {
+    DROP: (
+        (),
+        ("correction",),
+        *((*parts, "correction") for parts in (("ode",), ("clock",), ("parameters",), ("clock", "parameters"))),
+        ("random-features", "correction"),
+    ),
+    "kick": ((), ("correction",), ("network", "correction"), ("corners", "correction")),
+}
+"""Parts that ablations of `OURS` leave out. The regression of what is left would hide what the others give."""
+MINUTES = {DROP: 4, "kick": 12}
+"""About what the budget of each scene took on an idle core when it was set."""
 PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 8400}
 """Steps of all seven pushed objects together. They took 5 to 8 minutes on one core, without the scores."""
 STEPS = {"direct": 2000, "node": 900, "rnn": 1400, "occupancy-flow": 590, "odeform-per-point": 460}
-ODEFORM_STEPS = {FRAMES[DROP][1]: 330, FRAMES["kick"][1]: 280, UNTIL[0]: 900, UNTIL[1]: 690}
-"""Steps of `odeform` by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials and random
-features included. The time of a step of the per-point baselines (`STEPS`) does not depend on the frames."""
+ODEFORM_STEPS = {FRAMES[DROP][1]: 330, UNTIL[0]: 900, UNTIL[1]: 690}
+"""Steps of `odeform` on the drop by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials
+and random features included. The time of a step of the per-point baselines (`STEPS`) does not depend on the frames."""
+KICK_STEPS = {"odeform-rolling": 30, "odeform": 3000, **{model: 3 * steps for model, steps in STEPS.items()}}
+"""Steps on the kick, with three times the time of the drop."""
 SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}
 """Steps of `odeform` on every 3rd, 5th or 8th frame of the drop: a step then takes more sequences."""
 
@@ -71,7 +80,7 @@ def plan(share: float = 1.0) -> dict[str, list[Run]]:
         + [_pushed(model) for model in ("odeform", *BASELINES, "pe-gnn")],
         "III": [*_extrapolation(), *(_pushed(model, PUSH[0]) for model in ("odeform", *BASELINES))],
         "IV": list(_interpolation()),
-        "ablations": [replace(run, without=parts) for run in _seeds() for parts in ABLATED],
+        "ablations": [replace(run, without=parts) for run in _seeds() for parts in ABLATED[run.scene]],
         "learning curve": list(_curve()),
     }
     return {
@@ -80,9 +89,11 @@ def plan(share: float = 1.0) -> dict[str, list[Run]]:
     }
 
 
-def _steps(model: str, frames: int, every: int = 1) -> int | None:
+def _steps(model: str, scene: str, frames: int, every: int = 1) -> int | None:
     if model in SOLVED:
         return None
+    if scene == "kick":
+        return KICK_STEPS[model]
     if model != "odeform":
         return STEPS[model]
     return ODEFORM_STEPS[frames] if every == 1 else SUBSAMPLED_STEPS[every]
@@ -91,7 +102,7 @@ def _steps(model: str, frames: int, every: int = 1) -> int | None:
 def _whole(model: str, scene: str, seed: int = 0) -> Run:
     """Trained on all frames of all sequences."""
     scored = (FRAMES[scene], IMPACT) if scene == DROP else (FRAMES[scene],)
-    return Run(model, scene, scored, _steps(model, FRAMES[scene][1]), seed)
+    return Run(model, scene, scored, _steps(model, scene, FRAMES[scene][1]), seed)
 
 
 def _pushed(model: str, until: int | None = None) -> Run:
@@ -107,13 +118,13 @@ def _each_object() -> Iterable[Run]:
 
 def _unseen(scene: str) -> Iterable[Run]:
     """Table II: unseen parameters."""
-    yield from (_whole("odeform", scene, seed) for seed in SEEDS)
-    yield from (_whole(model, scene) for model in (*BASELINES, "odeform-per-point"))
+    yield from (_whole(OURS[scene], scene, seed) for seed in SEEDS)
+    yield from (_whole(model, scene) for model in ("odeform", *BASELINES, "odeform-per-point"))
 
 
 def _seeds() -> list[Run]:
-    """`odeform` on all frames of the scenes of one ball, with all seeds."""
-    return [_whole("odeform", scene, seed) for scene in reversed(BALLS) for seed in SEEDS]
+    """`OURS` on all frames of the scenes of one ball, with all seeds."""
+    return [_whole(OURS[scene], scene, seed) for scene in reversed(BALLS) for seed in SEEDS]
 
 
 def _curve() -> Iterable[Run]:
@@ -128,7 +139,7 @@ def _extrapolation() -> Iterable[Run]:
     """Table III: frames after the trained ones."""
     for until in UNTIL:
         for model in ("odeform", *BASELINES):
-            yield Run(model, DROP, ((until, until + AHEAD),), _steps(model, until), until=until)
+            yield Run(model, DROP, ((until, until + AHEAD),), _steps(model, DROP, until), until=until)
 
 
 def _interpolation() -> Iterable[Run]:
@@ -140,7 +151,7 @@ def _interpolation() -> Iterable[Run]:
 
     def subsampled(model: str, stagger: bool) -> Iterable[Run]:
         for every in INTERVALS:
-            yield Run(model, DROP, (IMPACT,), _steps(model, FRAMES[DROP][1], every), every=every, stagger=stagger)
+            yield Run(model, DROP, (IMPACT,), _steps(model, DROP, FRAMES[DROP][1], every), every=every, stagger=stagger)
 
     for model in ("odeform", *BASELINES):
         yield _whole(model, DROP)

@@ -161,5 +161,6 @@ def refitted(checkpoint: Checkpoint, dataset: Dataset) -> Checkpoint:
     model = load_model(checkpoint)
     if not is_continued(model):
         raise InputError(f"{checkpoint.model}: expected a model of reduced coordinates of one body, which is continued")
-    data = prepare(dataset, model.space.basis)
-    return with_continuation(model, replace(data, space=model.space))
+    data, space = prepare(dataset, model.space.basis), model.space
+    reduced = {split: np.stack([space.with_patterns(y) for y in motions]) for split, motions in data.reduced.items()}
+    return with_continuation(model, replace(data, space=space, reduced=reduced))

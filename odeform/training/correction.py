@@ -16,15 +16,15 @@ from odeform.types import Floats
 
 __all__ = ["with_correction"]
 
-LEFT_OUT = 1e-3  # of the mean square error on validation: what the modes of the residuals may leave out
+LEFT_OUT = 1e-3
 CHANCE = 0.05  # most that the probability may be that a share of the ODE gains on validation by chance
 EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
 
 
-def with_correction(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
+def with_correction(checkpoint: Checkpoint, data: TrainingData, left_out: float = LEFT_OUT) -> Checkpoint:
     """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
-    Unchanged where that holds for all parts, and where a spline filled in frames.
+    `left_out` is the share of its mean square error on validation that modes of the residuals may leave out. Unchanged where that holds for all parts, and where a spline filled in frames.
     """
     if not all(data.observed[split].all() for split in data.observed):
         return checkpoint
@@ -39,7 +39,7 @@ def with_correction(checkpoint: Checkpoint, data: TrainingData) -> Checkpoint:
         truth, motion = ({split: _flat(of[split], columns) for split in of} for of in (data.reduced, own))
         if not truth["train"].any() and not motion["train"].any():
             continue
-        part, explained = _fitted(data.theta, truth, motion)
+        part, explained = _fitted(data.theta, truth, motion, left_out)
         if explained >= EXPLAINED:
             parts[name] = part
     if not parts:
@@ -55,7 +55,7 @@ def _flat(reduced: Floats, columns: slice) -> Floats:
 
 
 def _fitted(
-    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats]
+    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], left_out: float
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
@@ -86,7 +86,7 @@ def _fitted(
     rest = truth["train"] - share * motion["train"]
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
-    count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
+    count = int((dropped > left_out * np.square(missed).sum(axis=1).mean()).sum())
     coefficients = ridge.weights(known, (u * sizes)[:, :count])
     part = CorrectedPart(known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share)
     return part, float(explained)

@@ -14,9 +14,16 @@ ABLATIONS = {
     "clock": "decoders are not conditioned on time",
     "parameters": "decoders are not conditioned on parameters",
     "random-features": "decoders have trained features only",
+    "network": "coefficients of the contact law depend on the material alone",
+    "corners": "the body rolls over a smooth floor on a smooth rim",
     "correction": "what is left unexplained is not regressed",
 }
-"""Parts that a training of `odeform` may leave out, and what that means."""
+"""Parts that a training may leave out, and what that means."""
+PARTS = {
+    "odeform": ("ode", "clock", "parameters", "random-features", "correction"),
+    "odeform-rolling": ("network", "corners", "correction"),
+}
+"""Those of `ABLATIONS` that a model has."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +47,7 @@ class TrainRequest:
     sequences: int | None = None
     """Train on the first n training sequences, of each object if there are several; default: all."""
     without: tuple[str, ...] = ()
-    """Parts of `odeform` that are left out: names of `ABLATIONS`."""
+    """Parts of the model that are left out: names of `ABLATIONS`."""
     objects: tuple[str, ...] = ()
     """The objects to train on, of a scene with several; default: all."""
 
@@ -54,8 +61,9 @@ class TrainRequest:
         for name in self.without:
             if name not in ABLATIONS:
                 raise InputError(f"without {name!r}: expected some of {', '.join(ABLATIONS)}")
-        if self.without and self.model != "odeform":
-            raise InputError(f"without {', '.join(self.without)}: these are parts of odeform, got {self.model}")
+            if name not in PARTS.get(self.model, ()):
+                others = " or ".join(model for model, parts in PARTS.items() if name in parts)
+                raise InputError(f"without {name}: this is a part of {others}, got {self.model}")
 
     @property
     def command(self) -> str:

@@ -2,8 +2,8 @@
 wrong it is beyond the window."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,18 @@ from odeform.dataset.training_data import TrainingData
 from odeform.errors import InputError
 from odeform.mechanics.floor import GRAVITY
 from odeform.mechanics.rolling.dynamics import MOVING, STATE
-from odeform.mechanics.rolling.law import RollingLaw, first_law
+from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.kernel_search import search_ridge
 from odeform.models.rolling.model import RollingODeform
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start
+from odeform.motion.body import watched_body
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.training.continuation import HELD_OUT
 from odeform.training.request import TrainRequest
 from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
-from odeform.types import Arrays, Floats, Ints
+from odeform.types import Arrays, Floats, Ints, PointCloud
 
 __all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 
@@ -36,6 +37,7 @@ FEATURES, SHARPNESS = 1500, (0.15, 1.2)  # of the readout; slopes per standard d
 RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # candidates, relative; validation chooses
 LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
+CORNERS, UNFELT = list(COEFFICIENTS).index("corners"), -6.0  # the coefficient, and a value at which it does nothing
 RATES = 0.3  # s: errors of rates count as they are after this time
 
 
@@ -60,16 +62,18 @@ def fit_rolling_body(
     def go_on() -> bool:
         return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
 
-    law, steps = first_law(len(materials), request.seed), request.steps or STEPS
+    law, steps = _without(first_law(len(materials), request.seed), request.without), request.steps or STEPS
     some = motions["train"].some(chosen)
-    law = fit_law(law, _linear(law), support, radius, some, min(LINEAR, steps), report, go_on)
-    law = fit_law(law, np.arange(law.flat().size), support, radius, some, max(steps - LINEAR, 0), report, go_on)
+    law = fit_law(law, _linear(law, request.without), support, radius, some, min(LINEAR, steps), report, go_on)
+    free = _free(law, request.without)
+    law = fit_law(law, free, support, radius, some, max(steps - LINEAR, 0), report, go_on)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
     readout = _readout(data, law, support, radius, motions, request.seed)
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
-    settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "val": val, "qualities": {}}
+    settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "lowest_m": _lowest(data)}
+    settings |= {"val": val, "qualities": {}}
     return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
 
 
@@ -81,11 +85,19 @@ def _checked(data: TrainingData, request: TrainRequest) -> tuple[Floats, float]:
     distances = np.linalg.norm(data.rest, axis=1)
     if distances.min() < (1.0 - ROUND) * distances.max():
         raise InputError("odeform-rolling: expected a round body, about its mass centre")
-    if not all(observed.all() for observed in data.observed.values()) or request.without:
-        raise InputError("odeform-rolling: expected no --every, --stagger or --without")
+    if not all(observed.all() for observed in data.observed.values()):
+        raise InputError("odeform-rolling: expected no --every or --stagger")
     if not 0 < data.first_free < len(data.times) - 3:
         raise InputError("odeform-rolling: expected motions that begin with a push, and go on after it")
     return rolling.axis, float(distances.mean())
+
+
+def _lowest(data: TrainingData) -> float:
+    """m: the height of the lowest point in all frames of the training motions."""
+    space = data.space
+    body = watched_body(PointCloud(data.rest + space.anchor), space, float("-inf"))
+    known = (space.with_modes(motion) for motion in data.reduced["train"])
+    return min(float(body.sample(y, np.ones(len(y))).lowest.min()) for y in known)
 
 
 def _begin(data: TrainingData) -> float:
@@ -117,11 +129,37 @@ def _start(data: TrainingData, motions: dict[str, Motions]) -> Start:
     return Start(known / ridge.scales, ridge.scales, weights, mean)
 
 
-def _linear(law: RollingLaw) -> Ints:
+def _without(law: RollingLaw, parts: Sequence[str]) -> RollingLaw:
+    """The law from which a fit without some of its `parts` starts: without corners, they are hardly felt."""
+    terms, last = law.terms.copy(), law.last.copy()
+    if "corners" in parts:
+        terms[CORNERS, 0] = UNFELT
+        last[:, ADJUSTED.index("corners")] = 0.0
+    if "network" in parts:
+        last[:] = 0.0
+    return replace(law, terms=terms, last=last)
+
+
+def _free(law: RollingLaw, without: Sequence[str]) -> Ints:
+    """Indices of the numbers that are fitted, of all but the parts that are left out."""
+    flags = {field.name: np.ones_like(getattr(law, field.name)) for field in fields(law)}
+    if "corners" in without:
+        flags["terms"][CORNERS] = 0.0
+        flags["settled"][:] = 0.0
+        flags["last"][:, ADJUSTED.index("corners")] = 0.0
+    if "network" in without:
+        for name in ("first", "bias", "last"):
+            flags[name][:] = 0.0
+    return np.flatnonzero(RollingLaw(**flags).flat())
+
+
+def _linear(law: RollingLaw, without: Sequence[str]) -> Ints:
     """Indices of the numbers that are constant or linear in the material, without the network and the place of rest."""
     materials = law.settled.shape[-1] - 1
     mark = np.zeros_like(law.terms)
     mark[:, : 1 + materials] = 1.0
+    if "corners" in without:
+        mark[CORNERS] = 0.0
     flags = RollingLaw(mark, *(np.zeros_like(part) for part in (law.settled, law.first, law.bias, law.last)))
     return np.flatnonzero(flags.flat())
 

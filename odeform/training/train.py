@@ -65,7 +65,7 @@ def train(
         stagger: Start every n-th frame at a different frame in each sequence, so that the sequences interleave.
         resume: Continue the interrupted training of which `OUT.part` is the state.
         sequences: Train on the first n training sequences, of each object if there are several; default: all.
-        without: Parts of `odeform` to leave out: names of `odeform.training.request.ABLATIONS`.
+        without: Parts of the model to leave out: names of `odeform.training.request.ABLATIONS`.
         objects: The objects to train on and to score, of a scene with several; default: all.
         parts: Half-open ranges of frames to score separately as well.
         report: Called with each line of progress; default: prints it to standard error.

@@ -8,7 +8,7 @@ import pytest
 from odeform.geometry.primitives import octasphere
 from odeform.mechanics.floor import GRAVITY
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
-from odeform.mechanics.rolling.field import make_field
+from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.solver.integrate import SolverSettings, integrate
@@ -30,6 +30,9 @@ def any_law(seed: int = 0) -> RollingLaw:
     return law.like(flat + 0.2 * np.random.default_rng(seed).normal(size=flat.shape))
 
 
+UNITS = units_of(RADIUS)
+
+
 def state(**given: float) -> Floats:
     names = ("ahead", "height", "angle", "speed", "rising", "spin", "one", "two")
     return np.array([given.get(name, 0.0) for name in names])
@@ -40,7 +43,7 @@ def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
     material, states = rng.uniform(-1.0, 1.0, (40, 2)), rng.normal(size=(STATE, 40))
     states[1] = rng.uniform(-0.02, 0.005, 40)
     together = RollingDynamics(law.like(law.flat()[None]), support, RADIUS, material).slopes(states[:, None])[:, 0]
-    alone = [make_field(law, support, RADIUS, material[i])(0.0, states[:, i]) for i in range(40)]
+    alone = [make_field(law, support, RADIUS, material[i])(0.0, UNITS * states[:, i]) / UNITS for i in range(40)]
     assert np.allclose(together.T, alone, rtol=1e-12, atol=1e-12)
     assert (together[4] > 0.0).any()
     assert (together[4] == -GRAVITY).any()
@@ -59,7 +62,7 @@ def test_laws_side_by_side_are_those_alone(support: Support) -> None:
 def test_flight_is_free_fall(support: Support) -> None:
     field = make_field(any_law(), support, RADIUS, np.array([0.5, -0.5]))
     begin = state(height=1.0, speed=2.0, rising=1.0, spin=3.0)
-    found = integrate(field, begin, FINE, 0.4).sample(np.array([0.4]))[0]
+    found = integrate(field, UNITS * begin, FINE, 0.4).sample(np.array([0.4]))[0] / UNITS
     expected = [0.8, 1.0 + 0.4 - 0.5 * GRAVITY * 0.16, 1.2, 2.0, 1.0 - 0.4 * GRAVITY, 3.0]
     assert np.allclose(found[:6], expected, atol=1e-9)
 
@@ -75,7 +78,7 @@ def test_the_floor_gives_no_energy_to_a_round_body(seed: int) -> None:
     lever = RADIUS * (1.0 + 0.1 * float(logs["radius"][0]))
     begin = state(height=0.1, speed=1.0, spin=-5.0)
     times = np.linspace(0.0, 1.5, 600)
-    y = integrate(make_field(law, flat, RADIUS, material), begin, FINE, 1.5).sample(times)
+    y = integrate(make_field(law, flat, RADIUS, material), UNITS * begin, FINE, 1.5).sample(times) / UNITS
     energy = GRAVITY * y[:, 1] + 0.5 * (y[:, 3] ** 2 + y[:, 4] ** 2 + inertia * y[:, 5] ** 2)
     away = y[:, 1] > 1e-3 * float(logs["touch"][0])  # elsewhere, some is in the spring of the contact
     assert away.sum() > 100

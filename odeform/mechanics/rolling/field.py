@@ -6,39 +6,56 @@
 import math
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.dynamics import AHEAD, CLEAR, DEEP, DEPTHS, EXPONENTS, FADING, SPIN, UPWARD
-from odeform.mechanics.rolling.law import ADJUSTED, PLACES, REACHING, RollingLaw
+from odeform.mechanics.rolling.dynamics import AHEAD, CLEAR, DEEP, DEPTHS, EXPONENTS, FADING, SPIN, STATE, UPWARD
+from odeform.mechanics.rolling.law import ADJUSTED, INPUTS, PLACES, REACHING, RollingLaw
 from odeform.mechanics.rolling.support import Support
 from odeform.solver.method import Field
+from odeform.solver.runge_kutta import gemv
 from odeform.types import Floats
 
-__all__ = ["make_field"]
+__all__ = ["make_field", "units_of"]
 
 FULL = 2.0 * math.pi
 AROUND = float(PLACES[-1]) + 4.0 * REACHING
+FIRST, APART = float(PLACES[0]), float(PLACES[1] - PLACES[0])
+
+
+def units_of(radius: float) -> Float[np.ndarray, "8"]:
+    """What the entries of a state are multiplied by to be integrated: angle and spin become the way and the speed of the
+    rim, so that a solver bounds errors in m and m/s alike."""
+    units = np.ones(STATE)
+    units[[2, 5]] = radius
+    return units
 
 
 def make_field(law: RollingLaw, support: Support, radius: float, material: Floats) -> Field:
-    """(t, state (8,)) -> its slope, for the material (Q,) of one body of `radius` m."""
+    """(t, state (8,) in `units_of(radius)`) -> its slope, for the material (Q,) of one body of `radius` m."""
     logs = {name: float(value[0]) for name, value in law.coefficients(material[None]).items()}
-    bases = [logs[name] for name in ADJUSTED]
+    bases = np.array([logs[name] for name in ADJUSTED])
     power = math.exp(min(max(logs["power"], -3.0), 2.0))
     damping_power = 1.0 / (1.0 + math.exp(-logs["damping_power"]))
     touch, lever = 1e-3 * logs["touch"], radius * (1.0 + 0.1 * logs["radius"])
     inertia, share = math.exp(logs["inertia"]) * radius**2, math.exp(min(max(logs["corners"], -6.0), 1.0))
     settled = 1e-3 * (law.settled @ np.concatenate([[1.0], material]))
-    first, last = np.ascontiguousarray(law.first[:4].T), np.ascontiguousarray(law.last.T)
-    bias = law.bias + material @ law.first[4:]
-    heights, slopes, places = support.heights, support.slopes, len(support.heights) - 1
+    # evenly spaced Gaussians are one Gaussian times a polynomial of an exponential, highest power first
+    along = APART / REACHING
+    bumps = (settled * np.exp(-0.5 * (along * np.arange(len(settled))) ** 2))[::-1].tolist()
+    leaning = (np.arange(len(settled)) * along)[::-1].tolist()
+    leaning = [lean * bump for lean, bump in zip(leaning, bumps, strict=True)]
+    first, last = np.asfortranarray(law.first[:INPUTS].T), np.asfortranarray(law.last.T)
+    bias, product = law.bias + material @ law.first[INPUTS:], gemv(bases.dtype)
+    heights, slopes, places = support.heights.tolist(), support.slopes.tolist(), len(support.heights) - 1
     quick, slow = FADING
-    low, high = EXPONENTS
+    lowest, highest = EXPONENTS
     shallowest, deepest = DEPTHS
-    inputs = np.empty(4)
+    inputs = np.empty(INPUTS)
 
     def field(_: float, state: Floats) -> Floats:
-        _, height, angle, ahead, rising, spin, one, two = state.tolist()
+        _, height, angle, ahead, rising, rim, one, two = state.tolist()
+        angle, spin = angle / radius, rim / radius
         if not math.isfinite(height + angle + ahead + rising + spin):  # the integration ends here, with a status
             return np.full_like(state, np.nan)
         fast = rise = turn = 0.0
@@ -47,21 +64,22 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
             place = angle / FULL % 1.0 * places
             index = min(int(place), places - 1)
             part = place - index
-            corner = float(heights[index]) * (1.0 - part) + float(heights[index + 1]) * part
-            corner_slope = float(slopes[index]) * (1.0 - part) + float(slopes[index + 1]) * part
+            corner = heights[index] * (1.0 - part) + heights[index + 1] * part
+            corner_slope = slopes[index] * (1.0 - part) + slopes[index + 1] * part
             gap, tilt = touch - height + share * corner, 0.0
             turned = (angle + math.pi) % FULL - math.pi
             if abs(turned) < AROUND:
-                apart = (turned - PLACES) / REACHING
-                each = settled * np.exp(-0.5 * apart * apart)
-                gap += float(each.sum())
-                tilt -= float(apart @ each) / REACHING
+                apart = (turned - FIRST) / REACHING
+                base, ratio, high, lean = math.exp(-0.5 * apart * apart), math.exp(along * apart), 0.0, 0.0
+                for bump, by in zip(bumps, leaning, strict=True):
+                    high, lean = high * ratio + bump, lean * ratio + by
+                gap += base * high
+                tilt = base * (lean - apart * high) / REACHING
             depth, sliding = min(max(100.0 * gap, shallowest), deepest), ahead - lever * spin
             inputs[:] = depth / DEEP, rising / UPWARD, abs(sliding), abs(ahead) / AHEAD
-            added = (last @ np.tanh(first @ inputs + bias)).tolist()
-            stiffness, damping, friction, rolling, grip, felt = (
-                math.exp(min(max(base + more, low), high)) for base, more in zip(bases, added, strict=True)
-            )
+            exponents = product(1.0, last, np.tanh(product(1.0, first, inputs, 1.0, bias)), 1.0, bases)
+            strong = np.exp(np.minimum(np.maximum(exponents, lowest), highest))
+            stiffness, damping, friction, rolling, grip, felt = strong.tolist()
             push = stiffness * depth**power * max(1.0 - damping * depth**damping_power * rising, 0.0)
             fast = -friction * push * math.tanh(sliding / grip)
             rise = push
@@ -69,6 +87,7 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
             turn = (-fast * lever - push * (brake + felt * corner_slope + tilt)) / inertia
             one += depth / quick
             two += depth / slow
-        return np.array([ahead, rising, spin, fast, rise - GRAVITY, turn, one, two], dtype=state.dtype)
+        slope = [ahead, rising, rim, fast, rise - GRAVITY, radius * turn, one, two]
+        return np.array(slope, dtype=state.dtype)
 
     return field

@@ -14,7 +14,7 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.mechanical.correction import Correction, coordinate_shares
 from odeform.models.mechanical.elastic_body import ElasticBody
-from odeform.models.mechanical.lifted_trajectory import LiftedTrajectory
+from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.corrected_trajectory import CorrectedTrajectory

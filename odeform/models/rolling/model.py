@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.mechanics.rolling.dynamics import MOVING, STATE
-from odeform.mechanics.rolling.field import make_field
+from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.frontier import FrontierPoint
@@ -19,6 +19,7 @@ from odeform.models.rolling.start import Start
 from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
 from odeform.motion.rolling import Rolling
@@ -54,6 +55,8 @@ class RollingODeform(ReducedModel):
         self.begin = float(config["begin_s"])
         """Seconds at which the push is over and the ODE begins."""
         self._radius = float(config["radius_m"])
+        self._units = units_of(self._radius)
+        self._lowest = float(config["lowest_m"])
         self.law = RollingLaw.from_arrays(arrays, len(self._materials))
         self._start = Start.from_arrays(arrays, len(learned))
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.rolling.patterns)
@@ -69,14 +72,18 @@ class RollingODeform(ReducedModel):
         return self.space.rolling
 
     def problem(self, theta: Floats) -> tuple[Field, Floats]:
-        """The initial value problem for theta (P,) in [-1, 1]: the field, and the state (8,) when the push is over."""
+        """The initial value problem for theta (P,) in [-1, 1]: the field, and the state (8,) when the push is over.
+
+        Angle and spin of its states are the way and the speed of the rim (`units_of`).
+        """
         field = make_field(self.law, self._support, self._radius, theta[self._materials])
         start = np.zeros(STATE)
         start[: 2 * MOVING] = self._start.at(theta[None])[0]
-        return field, start
+        return field, start * self._units
 
     def decode(self, states: Float[np.ndarray, "rows states"], theta: Floats) -> Float[np.ndarray, "rows y"]:
-        """States (R, 8) -> (R, 6 + S)."""
+        """States (R, 8) of `problem` -> (R, 6 + S)."""
+        states = states / self._units
         material = np.tile(theta[self._materials], (len(states), 1))
         touch = 1e-3 * self.law.coefficients(material[:1])["touch"]
         deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), material))
@@ -101,18 +108,21 @@ class RollingODeform(ReducedModel):
             lambda: (field, start.astype(float)),
         )
         first = self.decode(start[None].astype(float), theta)[0]
-        return _Begun(solved, self.begin, first, placed(start[None, MOVING:].astype(float), self.rolling.axis)[0])
+        rates = (start.astype(float) / self._units)[None, MOVING:]
+        return _Begun(solved, self.begin, first, placed(rates, self.rolling.axis)[0])
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
         solved = self.integrate(theta, settings, until)
-        if self.correction is None:
-            return solved
-        return CorrectedTrajectory(
-            solved, self.correction.shares, self.correction.over_time(theta), self.correction.stop
-        )
+        if (known := self.correction) is not None:
+            solved = CorrectedTrajectory(solved, known.shares, known.over_time(theta), known.stop)
+        return LiftedTrajectory(solved, self._lowest_points, self._lowest)
+
+    def _lowest_points(self, y: Float[np.ndarray, "times y"]) -> Times:
+        """(T, 6 + S) -> (T,) heights in m of the body's lowest point."""
+        return self.watched_body.sample(self.space.with_modes(y), np.ones(len(y))).lowest
 
 
 @dataclass(frozen=True, eq=False)

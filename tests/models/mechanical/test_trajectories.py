@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from odeform.models.mechanical.correction import coordinate_shares
-from odeform.models.mechanical.lifted_trajectory import MOST, LiftedTrajectory
+from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory
 from odeform.motion.base import SolveStats
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.types import Floats
