@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from odeform.dataset.index import Dataset
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.odeform.inference import Field, make_field
 from odeform.models.odeform.model import ODeform
 from odeform.solver.integrate import SolverSettings, integrate
@@ -65,7 +66,7 @@ def check_orders(model: ODeform, seed: int = 0) -> Checks:
     return {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
 
 
-def check_refining(model: ODeform, dataset: Dataset) -> Checks:
+def check_refining(model: IntegratedModel, dataset: Dataset) -> Checks:
     """`refining_error_ratio`: largest ratio, of any method, between the pooled error on some test sequences and that at
     the next coarser step. The coarsest is one step per frame."""
     window = model.schema.window

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from scipy.stats import rankdata
 
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.odeform.inference import Field
 from odeform.models.odeform.model import ODeform
 from odeform.motion.reduced_motion import as_reduced
@@ -23,7 +24,7 @@ SAMPLES = 2
 HALF_STEP = 0.005  # in halves of the trained range: half a slider step of 1/200 of the range
 
 
-def check_field(model: ODeform, seed: int = 0) -> Checks:
+def check_field(model: IntegratedModel, seed: int = 0) -> Checks:
     """Growth of differences and of the state.
 
     `lyapunov_per_s`: largest finite-time Lyapunov exponent over the window, from the derivative of the final state by
@@ -59,7 +60,7 @@ def check_field(model: ODeform, seed: int = 0) -> Checks:
     }
 
 
-def _divergence(model: ODeform, seed: int) -> float:
+def _divergence(model: IntegratedModel, seed: int) -> float:
     """Windows (at most 10) until a motion of the trained box deforms by more than twice the largest in the window."""
     schema, step = model.schema, SolverSettings("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
     times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
@@ -70,7 +71,7 @@ def _divergence(model: ODeform, seed: int) -> float:
     return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)
 
 
-def check_calibration(model: ODeform, seed: int = 0) -> Checks:
+def check_calibration(model: IntegratedModel, seed: int = 0) -> Checks:
     """Reported solver errors against those measured with tolerance 1e-11: their rank correlation (Spearman), and the
     share of solves in which they are within a factor of 2.
 

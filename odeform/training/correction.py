@@ -24,7 +24,8 @@ EXPLAINED = 0.05  # share of a part's mean square residual on validation, from w
 def with_correction(checkpoint: Checkpoint, data: TrainingData, left_out: float = LEFT_OUT) -> Checkpoint:
     """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
-    `left_out` is the share of its mean square error on validation that modes of the residuals may leave out. Unchanged where that holds for all parts, and where a spline filled in frames.
+    `left_out` is the share of its mean square error on validation that modes of the residuals may leave out. Unchanged
+    where no part is improved, and where a spline filled in frames.
     """
     if not all(data.observed[split].all() for split in data.observed):
         return checkpoint

@@ -216,6 +216,6 @@ def later_errors(model: RollingODeform, data: TrainingData) -> Floats:
     quality, missed = model.qualities["reference"], []
     for theta, truth in zip(data.theta["val"], data.reduced["val"], strict=True):
         corrected = model.trajectory(theta, evaluated, quality, stop).reduced(times[kept - 1 : kept])
-        own = model.integrate(theta, quality, stop).reduced(times[kept - 1 :])
+        own = model.integrate(theta, evaluated, quality, stop).reduced(times[kept - 1 :])
         missed.append(corrected + own[1:] - own[:1] - truth[kept:])
     return 1e3 * small_motion(np.stack(missed), data.space.gyration_radius) / np.sqrt(3.0)

@@ -24,8 +24,8 @@ FIRST, APART = float(PLACES[0]), float(PLACES[1] - PLACES[0])
 
 
 def units_of(radius: float) -> Float[np.ndarray, "8"]:
-    """What the entries of a state are multiplied by to be integrated: angle and spin become the way and the speed of the
-    rim, so that a solver bounds errors in m and m/s alike."""
+    """What the entries of a state are multiplied by to be integrated: angle and spin become the way and the speed of
+    the rim, so that a solver bounds errors in m and m/s alike."""
     units = np.ones(STATE)
     units[[2, 5]] = radius
     return units

@@ -14,11 +14,11 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.mechanical.correction import Correction, coordinate_shares
 from odeform.models.mechanical.elastic_body import ElasticBody
-from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.solver.integrate import SolverSettings

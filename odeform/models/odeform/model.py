@@ -6,14 +6,13 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.frontier import FrontierPoint
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.odeform.config import ModelConfig
 from odeform.models.odeform.correction import Correction
 from odeform.models.odeform.inference import Decoder, Field, make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.odeform.sensitivity import Sensitivities, make_sensitivities
 from odeform.models.odeform.weights import check_weights
-from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
 from odeform.solver.integrate import SolverSettings
@@ -25,7 +24,7 @@ PREFIX = "net."
 """Prefix of the network's arrays in a checkpoint."""
 
 
-class ODeform(ReducedModel):
+class ODeform(IntegratedModel):
     """Latent neural ODEs for pose and deformation (the paper's model, one latent state per object)."""
 
     model = "odeform"
@@ -36,8 +35,6 @@ class ODeform(ReducedModel):
         self.config = ModelConfig(**{**network, "decoder_widths": tuple(network["decoder_widths"])})
         self.weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         check_weights(self.weights, self.config)
-        self.qualities = {name: SolverSettings(**values) for name, values in checkpoint.config["qualities"].items()}
-        self.frontier = tuple(FrontierPoint.from_json(row) for row in checkpoint.config.get("frontier", ()))
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
@@ -58,8 +55,6 @@ class ODeform(ReducedModel):
         return self.integrate(theta, evaluated, settings, until)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
-        """The initial value problem for theta (P,) in [-1, 1]: the field dz/dt = f(t, z), the state at time 0, and the
-        decoder of states."""
         decode, correction = self._decoder(theta), self.correction
         if correction is not None:
             decode = _corrected(decode, correction, theta)

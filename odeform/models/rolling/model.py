@@ -10,10 +10,10 @@ from odeform.mechanics.rolling.dynamics import MOVING, STATE
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
-from odeform.models.frontier import FrontierPoint
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.odeform.correction import Correction
+from odeform.models.odeform.inference import Decoder
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
-from odeform.models.reduced_model import ReducedModel
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start
 from odeform.motion.changed_trajectory import ChangedTrajectory
@@ -29,6 +29,9 @@ from odeform.types import Floats, Times, Vector
 
 __all__ = ["RollingODeform", "placed"]
 
+FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
+"""What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
+later on a corner amplifies what coarser solutions leave."""
 FALLBACK = SolverSettings("rk4", step=1e-3, dtype="float64")
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -39,7 +42,7 @@ def placed(states: Float[np.ndarray, "rows states"], axis: Vector) -> Float[np.n
     return np.concatenate([states[:, :1] * ahead + states[:, 1:2] * UP, states[:, 2:3] * axis], axis=1)
 
 
-class RollingODeform(ReducedModel):
+class RollingODeform(IntegratedModel):
     """The motion of one round body in a plane."""
 
     model = "odeform-rolling"
@@ -48,8 +51,6 @@ class RollingODeform(ReducedModel):
     def _read(self, checkpoint: Checkpoint) -> None:
         super()._read(checkpoint)
         arrays, config = checkpoint.arrays, checkpoint.config
-        self.qualities = {name: SolverSettings(**values) for name, values in config["qualities"].items()}
-        self.frontier = tuple(FrontierPoint.from_json(row) for row in config.get("frontier", ()))
         learned = [parameter.name for parameter in self.schema.learned]
         self._materials = [learned.index(name) for name in config["material"]]
         self.begin = float(config["begin_s"])
@@ -71,32 +72,33 @@ class RollingODeform(ReducedModel):
             raise ValueError("rolling.axis: expected the axis of a rolling body")
         return self.space.rolling
 
-    def problem(self, theta: Floats) -> tuple[Field, Floats]:
-        """The initial value problem for theta (P,) in [-1, 1]: the field, and the state (8,) when the push is over.
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
+        """The initial value problem for theta (P,) in [-1, 1] from when the push is over: the field, the state (8,)
+        there, and the decoder of states (R, 8) to coordinates (R, 6 + S).
 
         Angle and spin of its states are the way and the speed of the rim (`units_of`).
         """
-        field = make_field(self.law, self._support, self._radius, theta[self._materials])
+        material = theta[self._materials]
+        field = make_field(self.law, self._support, self._radius, material)
         start = np.zeros(STATE)
         start[: 2 * MOVING] = self._start.at(theta[None])[0]
-        return field, start * self._units
 
-    def decode(self, states: Float[np.ndarray, "rows states"], theta: Floats) -> Float[np.ndarray, "rows y"]:
-        """States (R, 8) of `problem` -> (R, 6 + S)."""
-        states = states / self._units
-        material = np.tile(theta[self._materials], (len(states), 1))
-        touch = 1e-3 * self.law.coefficients(material[:1])["touch"]
-        deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), material))
+        def decode(_: Times, states: Floats) -> Floats:
+            return self._decoded(states / self._units, material)
+
+        return field, (start * self._units).astype(dtype), decode
+
+    def _decoded(self, states: Float[np.ndarray, "rows states"], material: Floats) -> Float[np.ndarray, "rows y"]:
+        """States (R, 8) of a body of this material (Q,) -> (R, 6 + S)."""
+        each = np.tile(material, (len(states), 1))
+        touch = 1e-3 * self.law.coefficients(each[:1])["touch"]
+        deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), each))
         return np.concatenate([placed(states, self.rolling.axis), deformation], axis=1)
 
-    def integrate(self, theta: Floats, quality: SolverSettings, until: float) -> Trajectory:
+    def integrate(self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float) -> Trajectory:
         """The motion for theta (P,) in [-1, 1], without its correction, solved to `until` seconds."""
-        field, start = self.problem(theta)
-
-        def decode(_: Floats, states: Floats) -> Floats:
-            return self.decode(states, theta)
-
-        start = start.astype(quality.dtype)
+        field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
+        exact = start.astype(float)
         solved = LatentTrajectory(
             field,
             decode,
@@ -105,17 +107,18 @@ class RollingODeform(ReducedModel):
             FALLBACK,
             max(until - self.begin, 1.0 / self.schema.window.rate),
             self.space.gyration_radius,
-            lambda: (field, start.astype(float)),
+            lambda: (field, exact),
+            FINER,
         )
-        first = self.decode(start[None].astype(float), theta)[0]
-        rates = (start.astype(float) / self._units)[None, MOVING:]
-        return _Begun(solved, self.begin, first, placed(rates, self.rolling.axis)[0])
+        first = decode(np.zeros(1), exact[None])[0]
+        rate = placed((exact / self._units)[None, MOVING:], self.rolling.axis)[0]
+        return _Begun(solved, self.begin, first, rate)
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
-        solved = self.integrate(theta, settings, until)
+        solved: Trajectory = self.integrate(theta, evaluated, settings, until)
         if (known := self.correction) is not None:
             solved = CorrectedTrajectory(solved, known.shares, known.over_time(theta), known.stop)
         return LiftedTrajectory(solved, self._lowest_points, self._lowest)

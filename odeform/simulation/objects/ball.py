@@ -84,11 +84,12 @@ def sphere(segments: int = SEGMENTS) -> Mesh:
 
 
 def extremes(schema: Schema) -> tuple[Parameters, ...]:
-    """Softest and heaviest, where a ball flattens most; stiffest and lightest, where its contact is hardest."""
+    """Softest and heaviest, where a ball flattens most; stiffest and lightest, where its contact is hardest. All else,
+    such as a force, is at its highest."""
     defaults = schema.complete(None)
     return tuple(
-        {**defaults, **{p.name: (p.high if (p.name == "bending") == stiff else p.low) for p in schema.learned}}
-        for stiff in (False, True)
+        {**defaults, **{p.name: p.low if p.name == lowest else p.high for p in schema.learned}}
+        for lowest in ("bending", "mass")
     )
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from odeform.models.mechanical.correction import coordinate_shares
-from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory
 from odeform.motion.base import SolveStats
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
+from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory
 from odeform.types import Floats
 
 STOP = 0.2  # s
