@@ -64,8 +64,8 @@ class Parameter:
         >>> import odeform
         >>> mass = odeform.load("kick").schema.parameters[0]
         >>> mass.name, mass.unit, mass.low, mass.high
-        ('mass', 'kg', 0.5, 1.0)
-        >>> mass.normalise(1.0), mass.inside(2.0)
+        ('mass', 'kg', 0.4, 1.5)
+        >>> mass.normalise(1.5), mass.inside(2.0)
         (1.0, False)
     """
 

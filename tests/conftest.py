@@ -1,6 +1,7 @@
 """Shared fixtures: a small simulated data set and models trained on it for seconds, made once for all workers."""
 
 import functools
+import math
 import os
 import subprocess
 from collections.abc import Callable, Iterator
@@ -27,6 +28,9 @@ from odeform.simulation import runner
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.training import config
 from odeform.training.train import train
+
+RANGES = {"mass": (0.5, 1.0), "bending": (0.3, 2.0), "force": (100.0, 150.0), "elevation": (0.5, math.pi / 4)}
+"""Of the small data set: a part of the scene's, in which few sequences tell something of others."""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -112,7 +116,7 @@ def dataset(made_once: MadeOnce) -> Dataset:
     def simulate(folder: Path) -> None:
         with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
             _coarsen(patch)
-            runner.simulate("kick", folder, count=21, seed=3, workers=2)
+            runner.simulate("kick", folder, count=21, seed=3, workers=2, ranges=RANGES)
 
     return open_dataset(made_once("kick", simulate))
 

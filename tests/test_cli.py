@@ -131,14 +131,14 @@ def test_predict_tells_which_times_are_extrapolated(tmp_path: Path, capsys: pyte
 
 
 def test_predict_stops_a_motion_that_sinks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Inside the trained box, soft and heavy: three windows on, it sags too far."""
-    setting = ("--set", "mass=0.99", "bending=0.3", "force=115", "azimuth=0", "elevation=0.5")
-    assert run("predict", "kick", "--out", tmp_path / "a.npz", *setting, "--times", "0:3.6:0.05") == 0
+    """Inside the trained box, soft and heavy: three windows on, what continues this model lets it sag too far."""
+    setting = ("--set", "mass=1.3", "bending=0.335", "force=39.7", "azimuth=0", "elevation=0.947")
+    assert run("predict", "kick/gp", "--out", tmp_path / "a.npz", *setting, "--times", "0:3.6:0.05") == 0
     said = capsys.readouterr()
-    assert (stopped := re.search(r"status stopped at t = (2\.\d+) s", said.out)) is not None
+    assert (stopped := re.search(r"status stopped at t = ([23]\.\d+) s", said.out)) is not None
     assert f"the motion stops at t = {stopped[1]} s, because it sinks into the floor" in said.err
     with np.load(tmp_path / "a.npz", allow_pickle=False) as arrays:
-        assert arrays["vertices"][..., 2].min() > -0.00501
+        assert arrays["vertices"][..., 2].min() > -load("kick/gp").trust.limits.depth
         assert "sinks into the floor" in str(arrays["notes"])
 
 

@@ -70,7 +70,7 @@ def test_the_heading_is_not_learned() -> None:
 def test_outside_is_told_and_the_edge_is_inside() -> None:
     edge = {p.name: p.high for p in SCHEMA.parameters}
     assert SCHEMA.outside(SCHEMA.complete(edge)) == ()
-    assert SCHEMA.outside(SCHEMA.complete({**edge, "force": 151.0, "azimuth": 99.0})) == ("force",)
+    assert SCHEMA.outside(SCHEMA.complete({**edge, "force": 161.0, "azimuth": 99.0})) == ("force",)
 
 
 def test_what_is_beyond_fades() -> None:

@@ -58,7 +58,7 @@ def load(name: str | Path) -> Predictor:
 
     Args:
         name: Path of a checkpoint (`.safetensors`, or `.pth` of the paper's authors), or name of a bundled one: SCENE,
-            which is its ODeform model, or SCENE/MODEL.
+            which is its own ODeform model, or SCENE/MODEL.
 
     Raises:
         InputError: Not a checkpoint, or one of an unknown model.
@@ -66,7 +66,7 @@ def load(name: str | Path) -> Predictor:
     Examples:
         >>> import odeform
         >>> odeform.load("kick").model
-        'odeform'
+        'odeform-rolling'
         >>> odeform.load("mass-elastic/pod-rbf").model
         'pod-rbf'
     """

@@ -34,12 +34,12 @@ class SolverSettings:
 
     Examples:
         >>> import odeform
-        >>> predictor = odeform.load("kick")
+        >>> predictor = odeform.load("mass-elastic")
         >>> predictor.qualities["balanced"]
-        SolverSettings(method='bosh3', step=None, tolerance=0.01, dtype='float32')
+        SolverSettings(method='bosh3', step=None, tolerance=0.004, dtype='float32')
         >>> fine = odeform.SolverSettings("rk4", step=1 / 480)
         >>> predictor.solve(quality=fine).stats.steps
-        480
+        600
     """
 
     method: str

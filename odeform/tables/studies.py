@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from odeform.tables.cells import Runs, models, paragraph, scored_rows, scores_of, table
-from odeform.tables.plan import ABLATED, BALLS, FEWER, FRAMES
+from odeform.tables.plan import ABLATED, BALLS, DROP, FEWER, FRAMES, OURS
 
 __all__ = ["ablations", "learning_curve"]
 
@@ -14,6 +14,8 @@ LABELS = {
     "clock": "the clock of the decoders",
     "parameters": "the parameters of the decoders",
     "random-features": "random features",
+    "network": "the network of the contact law",
+    "corners": "the corners of the mesh, and the place that it rested on",
     "correction": "the regression of what is left",
 }
 
@@ -21,8 +23,9 @@ LABELS = {
 def ablations(runs: Runs) -> list[str]:
     """Rows by what was left out, columns by scene."""
     head = ["without", *(f"{scene}, {unit}" for scene in BALLS for unit in PAIR)]
+    all_parts = dict.fromkeys(parts for scene in BALLS for parts in ABLATED[scene])
     scores = {
-        _label(parts): [cell for scene in BALLS for cell in _pair(runs, scene, without=parts)] for parts in ABLATED
+        _label(parts): [cell for scene in BALLS for cell in _pair(runs, scene, without=parts)] for parts in all_parts
     }
     if not any(any(row) for row in scores.values()):
         return []
@@ -30,7 +33,8 @@ def ablations(runs: Runs) -> list[str]:
         "## Ablations",
         "",
         *paragraph(
-            "`odeform` without some of its parts, trained again with the same steps (`--without`).",
+            f"`{OURS[DROP]}` on the drop and `{OURS['kick']}` on the kick, without some of their parts, trained again",
+            "with the same steps (`--without`). A dash is a part that the other has.",
             "Without the regression of what is left unexplained, the ODE is on its own; the rows below it leave out",
             "more. Deformation is relative, as elsewhere.",
         ),

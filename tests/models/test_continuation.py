@@ -10,6 +10,7 @@ from odeform.dataset.training_data import prepare
 from odeform.models.base import Predictor
 from odeform.models.continuation import PREFIX, ContinuedTrajectory, Dynamics
 from odeform.models.odeform.model import ODeform
+from odeform.models.registry import load
 from odeform.motion.base import SolveStats
 from odeform.schema import REACH, Schema, Window
 from odeform.training.continuation import fit_dynamics
@@ -137,23 +138,28 @@ def test_contacts_alone_change_a_flight(pair: tuple[ODeform, ODeform]) -> None:
         assert bool(added[:, :6].any()) == bool(added[:, 6:].any()) == changed
 
 
-def test_a_continuation_of_an_earlier_version_is_left_out(kick: Predictor) -> None:
-    known, later = kick.checkpoint, kick.schema.window.stop * np.array([1.0, 1.4, 1e9])
+@pytest.fixture
+def drop() -> Predictor:
+    return load("mass-elastic")
+
+
+def test_a_continuation_of_an_earlier_version_is_left_out(drop: Predictor) -> None:
+    known, later = drop.checkpoint, drop.schema.window.stop * np.array([1.0, 1.4, 1e9])
     arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
     older = ODeform(replace(known, arrays={**arrays, f"{PREFIX}centers": np.zeros((3, 2), np.float32)}))
     assert older.dynamics is None
     assert older.schema.window.reach == 0.0
-    assert older.schema.window.soft_clamped(later[2:])[0] == pytest.approx(1.05)
-    assert np.array_equal(older.solve().vertices(later[:1]), kick.solve().vertices(later[:1]))
+    assert older.schema.window.soft_clamped(later[2:])[0] == pytest.approx(1.05 * drop.schema.window.stop)
+    assert np.array_equal(older.solve().vertices(later[:1]), drop.solve().vertices(later[:1]))
 
 
-def test_older_checkpoints_have_none(kick: Predictor) -> None:
-    known, window = kick.checkpoint, kick.schema.window
+def test_older_checkpoints_have_none(drop: Predictor) -> None:
+    known, window = drop.checkpoint, drop.schema.window
     arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
     older = ODeform(replace(known, arrays=arrays, schema=replace(known.schema, window=replace(window, reach=0.0))))
     assert older.dynamics is None
-    assert older.schema.window.soft_clamped(np.array([1e9]))[0] == pytest.approx(1.05)
-    assert np.array_equal(older.solve().vertices(window.times), kick.solve().vertices(window.times))
+    assert older.schema.window.soft_clamped(np.array([1e9]))[0] == pytest.approx(1.05 * drop.schema.window.stop)
+    assert np.array_equal(older.solve().vertices(window.times), drop.solve().vertices(window.times))
 
 
 def test_wrong_arrays_are_refused(flying: Dynamics) -> None:

@@ -10,9 +10,9 @@ TIMES = np.array([0.004, 0.02, 0.11, 0.4, 0.93])
 APART = 1e-4
 
 
-@pytest.fixture(params=["kick", "mass-elastic"])
-def model(request: pytest.FixtureRequest) -> ODeform:
-    loaded = load(request.param)
+@pytest.fixture
+def model() -> ODeform:
+    loaded = load("mass-elastic")
     assert isinstance(loaded, ODeform)
     return loaded
 

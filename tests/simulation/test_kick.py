@@ -56,12 +56,12 @@ def test_longer_samples_start_with_the_shorter() -> None:
 def test_the_arrow_of_the_pulse_is_as_long_as_it_is_strong() -> None:
     scene = get_scene("kick")
     rest = np.asarray(scene.rest_mesh().points)
-    parameters = scene.schema.complete({"force": 75.0, "azimuth": 0.5 * np.pi, "elevation": 0.6})
+    parameters = scene.schema.complete({"force": 80.0, "azimuth": 0.5 * np.pi, "elevation": 0.6})
     (arrow,) = scene.glyphs(parameters, rest)
     direction = np.array([0.0, np.cos(0.6), np.sin(0.6)])
     assert np.allclose(arrow.vector, 0.5 * ARROW * 2.0 * RADIUS * direction, atol=1e-9)
     assert np.allclose(arrow.start + arrow.vector, [0.0, 0.0, RADIUS] - RADIUS * direction, atol=1e-9)
-    assert (arrow.label, arrow.begin, arrow.end) == ("75 N", 0.0, PULSE)
+    assert (arrow.label, arrow.begin, arrow.end) == ("80 N", 0.0, PULSE)
 
 
 @pytest.mark.parametrize("elevation", [0.5, 0.6, 0.785, 0.842])

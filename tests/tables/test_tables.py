@@ -105,7 +105,7 @@ def test_the_page_shows_every_model_and_leaves_missing_entries_empty() -> None:
     )
     for table in ("II", "III", "IV"):
         of, part = plan()[table], text.split(f"## {table}. ")[1].split("\n## ")[0]
-        for one in of:
+        for one in (run for run in of if run.scene != "kick"):
             assert f"| {one.model} |" in part
     ablations = text.split("## Ablations")[1].split("\n## ")[0]
     assert "| nothing | 2 ± 1 | 200 ± 1e+02 | – | – |" in ablations

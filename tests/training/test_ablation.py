@@ -45,8 +45,12 @@ def test_without_random_features(dataset: Dataset, tmp_path: Path) -> None:
 def test_bad_requests() -> None:
     with pytest.raises(InputError, match=f"expected some of {', '.join(ABLATIONS)}"):
         TrainRequest(without=("wings",))
-    with pytest.raises(InputError, match="parts of odeform, got gp"):
+    with pytest.raises(InputError, match="without ode: this is a part of odeform, got gp"):
         TrainRequest("gp", without=("ode",))
+    with pytest.raises(InputError, match="without clock: this is a part of odeform, got odeform-rolling"):
+        TrainRequest("odeform-rolling", without=("clock",))
+    with pytest.raises(InputError, match="without corners: this is a part of odeform-rolling, got odeform"):
+        TrainRequest(without=("corners",))
     with pytest.raises(InputError, match="sequences: expected a positive number"):
         TrainRequest(sequences=0)
 

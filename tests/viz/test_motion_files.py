@@ -24,7 +24,7 @@ TIMES = np.array([0.0, 0.1, 0.25, 0.3])
 
 @pytest.fixture(scope="module")
 def motion() -> Motion:
-    return odeform.load("kick").solve(parameters={"mass": 0.6, "force": 160.0})
+    return odeform.load("kick").solve(parameters={"mass": 0.6, "force": 180.0})
 
 
 def _played(page: str) -> dict[str, Any]:
@@ -45,8 +45,8 @@ def test_a_page_plays_the_motion_at_its_own_speed(motion: Motion) -> None:
     assert played["durationSeconds"] == pytest.approx(0.3)
     moved = {time for time, message in played["messages"] if message.get("name", "").endswith("/body")}
     assert moved >= set(TIMES[1:])
-    assert "force 160 N" in page
-    assert "force = 160 N is outside the trained range, 100 to 150 N" in page
+    assert "force 180 N" in page
+    assert "force = 180 N is outside the trained range, 10 to 160 N" in page
 
 
 def test_nothing_of_a_parameter_becomes_markup(motion: Motion, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -63,7 +63,7 @@ def test_a_recording_has_every_frame(motion: Motion, tmp_path: Path) -> None:
         write_rrd(file, motion, TIMES, None)
     recording = read_recording(path)
     assert [request["time"] for _, request in sorted(recording.requests.items())] == pytest.approx(TIMES.tolist())
-    assert all(request["parameters"]["force"] == 160.0 for request in recording.requests.values())
+    assert all(request["parameters"]["force"] == 180.0 for request in recording.requests.values())
 
 
 @pytest.mark.parametrize("suffix", [".rrd", ".html"])

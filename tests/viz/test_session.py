@@ -170,7 +170,7 @@ def test_the_summary(session: Session, view_request: ViewRequest) -> None:
     late = summarize(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
-    heavy = summarize(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.1})))
+    heavy = summarize(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.6})))
     assert "mass" in heavy
 
 

@@ -24,7 +24,8 @@ def test_an_error_chooses_the_cheapest_setting_that_keeps_to_it(
     app, client = kicked
     assert not client.controls["at most (mm)"].visible
     client.set("quality", ERROR_BUDGET)
-    for point in (kick.frontier[0], kick.frontier[len(kick.frontier) // 2], kick.frontier[-1]):
+    useful = [point for point in kick.frontier if point.solver_error_mm < 50.0]
+    for point in (useful[0], useful[len(useful) // 2], useful[-1]):
         client.set("at most (mm)", 1.001 * point.solver_error_mm)
         assert client.until(lambda point=point: chosen(app) == point.quality.to_json())
     assert client.until(lambda: kick.frontier[-1].quality.method in client.text())

@@ -9,8 +9,7 @@ import pytest
 
 from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
-from odeform.models.odeform.model import ODeform
-from odeform.models.registry import load
+from odeform.models.registry import load, load_model
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.types import MotionSequence
 from odeform_viz.app import App
@@ -164,7 +163,7 @@ def test_a_server_that_closes_ends_its_simulation(kick: Predictor, monkeypatch: 
 def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve: Callable[..., View]) -> None:
     made = kick.checkpoint.provenance
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
-    _, client = serve(Column("odeform", ODeform(other), kick.rest))
+    _, client = serve(Column("odeform", load_model(other), kick.rest))
     assert "young_pa 1.3e+05 (trained on 1.7e+05)" in client.text()
     trained_with = load("mass-elastic").checkpoint.provenance["fixed"]
     assert physics_difference(trained_with, open_dataset("mass-elastic").fixed) == ""
