@@ -15,6 +15,7 @@ from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid, body_spin, rotation_from_vector, vector_from_rotation
 from odeform.identification.observation import Observation
 from odeform.models.base import Predictor
+from odeform.models.frontier import cheapest_within_error
 from odeform.motion.evaluated_basis import evaluate_basis
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import POSE, to_canonical
@@ -24,7 +25,7 @@ from odeform.types import Floats, Frames, PointCloud, Rotations, Times, Vectors
 
 __all__ = ["ACCURATE", "Comparison", "Linear", "derivatives", "parameters_of"]
 
-ACCURATE = SolverSettings("dopri5", tolerance=1e-6)
+ACCURATE, ACCURATE_MM = SolverSettings("dopri5", tolerance=1e-6), 0.01
 """Solver errors stay below 0.01 mm: the first frames of a kick, with model errors of some hundredths, matter most."""
 ENOUGH = 4  # points that define a pose
 APART = 1e-2  # step of central differences, in halves of the trained range
@@ -68,7 +69,9 @@ def _solved(
 
 
 def _motion(predictor: Predictor, theta: Floats, times: Times) -> Floats:
-    motion = _solved(predictor, parameters_of(predictor.schema, theta, 0.0), ACCURATE, float(times.max()))
+    frontier = predictor.frontier  # differences take many motions: the cheapest that is accurate
+    quality = cheapest_within_error(frontier, ACCURATE_MM).quality if frontier else ACCURATE
+    motion = _solved(predictor, parameters_of(predictor.schema, theta, 0.0), quality, float(times.max()))
     return motion.trajectory.reduced(predictor.schema.window.soft_clamped(times))
 
 

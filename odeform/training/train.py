@@ -17,7 +17,7 @@ from odeform.evaluation.residuals import trained_depth, validation_residuals
 from odeform.identification.discrepancy import LEAST, calibrate
 from odeform.io import require_writable
 from odeform.models.base import Predictor
-from odeform.models.odeform.model import ODeform
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.registry import load
 from odeform.schema import OBJECT
 from odeform.training.body import body_arrays
@@ -133,8 +133,8 @@ def _write_scored(
 
 
 def _calibration(predictor: Predictor, dataset: Dataset) -> Arrays:
-    """What `identify` needs to know of the error of an ODeform; of baselines it is measured when it is asked for."""
-    if not isinstance(predictor, ODeform) or len(dataset.select("val")) < LEAST:
+    """What `identify` needs to know of the error of an ODE; of baselines it is measured when it is asked for."""
+    if not isinstance(predictor, IntegratedModel) or len(dataset.select("val")) < LEAST:
         return {}
     return calibrate(predictor, dataset).arrays()
 
