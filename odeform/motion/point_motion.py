@@ -11,6 +11,7 @@ motion of some points of the trained body, and is the same for any shape.
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
+from weakref import WeakMethod
 
 import numpy as np
 from jaxtyping import Float
@@ -206,7 +207,16 @@ class PointMotion(Motion):
         return self._frame.bounded(moved).astype(np.float32)
 
     def _make_watch(self) -> Watch | None:
-        return None if self.trust is UNKNOWN else Watch(self.trust.limits, self.schema.window, self._sample)
+        if self.trust is UNKNOWN:
+            return None
+        sample = WeakMethod(self._sample)  # a watch lives as long as its motion, which it would keep otherwise
+
+        def watched(times: Times) -> Sample:
+            own = sample()
+            assert own is not None
+            return own(times)
+
+        return Watch(self.trust.limits, self.schema.window, watched)
 
     def _sample(self, times: Times) -> Sample:
         """Of the probes. Deformations are bounded by construction."""

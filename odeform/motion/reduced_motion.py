@@ -61,13 +61,13 @@ class ReducedMotion(Motion):
     body: WatchedBody | None = None
 
     def _make_watch(self) -> Watch | None:
-        body = self.body
+        body, trajectory, window = self.body, self.trajectory, self.schema.window
         if body is None:
             return None
-        window = self.schema.window
 
+        # without this motion: what refers to itself stays until Python looks for cycles, and motions are large
         def sample(times: Times) -> Sample:
-            return body.sample(self.trajectory.reduced(times), window.passed(times))
+            return body.sample(trajectory.reduced(times), window.passed(times))
 
         return Watch(self.trust.limits, window, sample)
 
