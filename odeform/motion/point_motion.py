@@ -11,7 +11,6 @@ motion of some points of the trained body, and is the same for any shape.
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
-from weakref import WeakMethod
 
 import numpy as np
 from jaxtyping import Float
@@ -200,25 +199,22 @@ class PointMotion(Motion):
 
     def _displaced(self, trajectory: PointTrajectory, t: float | Times) -> Frames:
         """(T, N, 3) metres, canonical, float32; (1, N, 3) for a single time."""
-        return self._predicted(trajectory, self._clock(t))
-
-    def _predicted(self, trajectory: PointTrajectory, times: Times) -> Frames:
-        moved = trajectory.displacements(times) + self._mean.at(times)[:, None]
-        return self._frame.bounded(moved).astype(np.float32)
+        return _predicted(trajectory, self._mean, self._frame, self._clock(t))
 
     def _make_watch(self) -> Watch | None:
         if self.trust is UNKNOWN:
             return None
-        sample = WeakMethod(self._sample)  # a watch lives as long as its motion, which it would keep otherwise
+        body, probes, mean, frame = self._body, self._probes, self._mean, self._frame
 
-        def watched(times: Times) -> Sample:
-            own = sample()
-            assert own is not None
-            return own(times)
+        # without this motion: what refers to itself stays until Python looks for cycles, and motions are large
+        def sample(times: Times) -> Sample:
+            """Of the probes. Deformations are bounded by construction."""
+            moved = probes.points + _predicted(body, mean, frame, times) + np.array(frame.anchor)
+            return Sample(moved[..., 2].min(axis=1), np.zeros(len(times)), moved.mean(axis=1))
 
-        return Watch(self.trust.limits, self.schema.window, watched)
+        return Watch(self.trust.limits, self.schema.window, sample)
 
-    def _sample(self, times: Times) -> Sample:
-        """Of the probes. Deformations are bounded by construction."""
-        moved = self._probes.points + self._predicted(self._body, times) + np.array(self._frame.anchor)
-        return Sample(moved[..., 2].min(axis=1), np.zeros(len(times)), moved.mean(axis=1))
+
+def _predicted(trajectory: PointTrajectory, mean: MeanMotion, frame: PointFrame, times: Times) -> Frames:
+    moved = trajectory.displacements(times) + mean.at(times)[:, None]
+    return frame.bounded(moved).astype(np.float32)
