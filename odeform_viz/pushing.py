@@ -18,13 +18,14 @@ from odeform.simulation.contacts import Contacts, push_from
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Floats, Geometry, Mesh, Points, Vector
 from odeform_viz.columns import Column
-from odeform_viz.view import Frame
+from odeform_viz.view import ColumnFrame, Frame
 
 __all__ = [
     "ShownPush",
     "contacts_of",
     "describe_push",
     "first_push",
+    "outside_of_push",
     "picked",
     "push_excess",
     "push_shown",
@@ -142,13 +143,13 @@ def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats)
     return None if found is None else (np.asarray(geometry.points[found[0]], dtype=float), found[1])
 
 
-def push_excess(push: Push, forces: tuple[float, float]) -> list[str]:
-    """In what a push is beyond those of the training data, in words."""
-    excess = []
+def push_excess(push: Push, forces: tuple[float, float]) -> dict[str, str]:
+    """In what a push is beyond those of the training data, and how far these go, in words."""
+    excess = {}
     if push.strength > forces[1] * (1.0 + 1e-6):
-        excess.append(f"force (trained up to {forces[1]:g} N)")
+        excess["force"] = f"trained up to {forces[1]:g} N"
     if push.strength > 0.0 and push.steep:
-        excess.append(f"direction (trained up to {math.degrees(CONE):.0f}° off the inward normal)")
+        excess["direction"] = f"trained up to {math.degrees(CONE):.0f}° off the inward normal"
     return excess
 
 
@@ -166,9 +167,21 @@ def describe_push(push: Push, name: str) -> str:
 
 def first_push(frame: Frame) -> tuple[Push, str] | None:
     """The push of the first visible model, and the name of what it pushes; None in scenes without one."""
-    shown = next((c for c in frame.columns if c.column.predictor), None)
+    shown = _first_model(frame)
     if shown is None or contacts_of(shown.motion.schema) is None:
         return None
     parameters = shown.motion.parameters
     name = "shape" if shown.column.loaded else str(parameters[OBJECT])
     return push_from(parameters, surface_of(shown.column, parameters)), name
+
+
+def outside_of_push(frame: Frame) -> list[str]:
+    """What of the push of the first visible model is outside of its training; empty in scenes without one."""
+    shown, found = _first_model(frame), first_push(frame)
+    if shown is None or shown.column.predictor is None or found is None:
+        return []
+    return list(push_excess(found[0], shown.column.predictor.force_range(shown.motion.parameters)))
+
+
+def _first_model(frame: Frame) -> ColumnFrame | None:
+    return next((c for c in frame.columns if c.column.predictor), None)

@@ -216,7 +216,8 @@ class PushPanel(Panel):
             parameters = self._parameters
             push = push_from(parameters, self._surface)
         excess = push_excess(push, self._forces())
-        warning = f"⚠ **extrapolated**: {', '.join(excess)}  \n" if excess else ""
+        parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
+        warning = f"⚠ **extrapolated**: {parts}  \n" if excess else ""
         set_content(self._text, warning + HINT)
 
     async def _clicked(self, event: viser.GuiEvent) -> None:

@@ -2,7 +2,7 @@
 
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.pushing import describe_push, first_push
+from odeform_viz.pushing import describe_push, first_push, outside_of_push
 from odeform_viz.view import Description, Frame
 
 __all__ = ["SummaryPanel", "summarize"]
@@ -36,7 +36,7 @@ def _trust(frame: Frame) -> str:
     if not models:
         return "only the truth is visible" if frame.columns else "no column is visible"
     motion, time = models[0].motion, frame.request.time
-    outside = list(dict.fromkeys(name for c in models for name in c.motion.outside))
+    outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
     if motion.extrapolates(time):
         outside.insert(0, "time")
     foreign = "⚠ **shape not trained**; " if any(c.foreign for c in models) else ""

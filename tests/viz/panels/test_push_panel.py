@@ -94,6 +94,15 @@ def test_clicks_that_move_nothing_say_why(pushed: View, monkeypatch: pytest.Monk
     assert app.request().parameters == before
 
 
+def test_a_push_beyond_training_is_extrapolated_in_every_place(pushed: View) -> None:
+    _, client = pushed
+    assert client.until(lambda: "inside the trained range" in client.text())
+    client.set("tilt up (°)", 58.0)
+    assert client.until(lambda: "direction (trained up to 45° off the inward normal)" in client.text())
+    assert client.until(lambda: "**extrapolated**: direction outside the trained range" in client.text())
+    assert client.until(lambda: "inside the trained range" not in client.text())
+
+
 def test_no_force_is_said(pushed: View) -> None:
     _, client = pushed
     client.set("force (N)", 0.0)
