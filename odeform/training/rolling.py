@@ -64,9 +64,8 @@ def fit_rolling_body(
 
     law, steps = _without(first_law(len(materials), request.seed), request.without), request.steps or STEPS
     some = motions["train"].some(chosen)
-    law = fit_law(law, _linear(law, request.without), support, radius, some, min(LINEAR, steps), report, go_on)
-    free = _free(law, request.without)
-    law = fit_law(law, free, support, radius, some, max(steps - LINEAR, 0), report, go_on)
+    for linear, count in ((True, min(LINEAR, steps)), (False, max(steps - LINEAR, 0))):
+        law = fit_law(law, _free(law, request.without, linear), support, radius, some, count, report, go_on)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
     readout = _readout(data, law, support, radius, motions, request.seed)
@@ -140,28 +139,20 @@ def _without(law: RollingLaw, parts: Sequence[str]) -> RollingLaw:
     return replace(law, terms=terms, last=last)
 
 
-def _free(law: RollingLaw, without: Sequence[str]) -> Ints:
-    """Indices of the numbers that are fitted, of all but the parts that are left out."""
+def _free(law: RollingLaw, without: Sequence[str], linear: bool) -> Ints:
+    """Indices of the numbers that are fitted, of all but the parts that are left out. With `linear`, only of those that
+    are constant or linear in the material, without the network and the place of rest."""
     flags = {field.name: np.ones_like(getattr(law, field.name)) for field in fields(law)}
+    if linear:
+        flags["terms"][:, law.settled.shape[-1] :] = 0.0
     if "corners" in without:
         flags["terms"][CORNERS] = 0.0
-        flags["settled"][:] = 0.0
         flags["last"][:, ADJUSTED.index("corners")] = 0.0
-    if "network" in without:
-        for name in ("first", "bias", "last"):
-            flags[name][:] = 0.0
+    empty = {"settled"} if linear or "corners" in without else set()
+    empty |= {"first", "bias", "last"} if linear or "network" in without else set()
+    for name in empty:
+        flags[name][:] = 0.0
     return np.flatnonzero(RollingLaw(**flags).flat())
-
-
-def _linear(law: RollingLaw, without: Sequence[str]) -> Ints:
-    """Indices of the numbers that are constant or linear in the material, without the network and the place of rest."""
-    materials = law.settled.shape[-1] - 1
-    mark = np.zeros_like(law.terms)
-    mark[:, : 1 + materials] = 1.0
-    if "corners" in without:
-        mark[CORNERS] = 0.0
-    flags = RollingLaw(mark, *(np.zeros_like(part) for part in (law.settled, law.first, law.bias, law.last)))
-    return np.flatnonzero(flags.flat())
 
 
 @dataclass(frozen=True, eq=False)
