@@ -24,7 +24,7 @@ from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Faces, Floats, Frames, Mesh
 
-__all__ = ["Later", "compare_later", "simulate_later"]
+__all__ = ["RESTS", "Later", "compare_later", "simulate_later"]
 
 SPANS = ((0.0, 1.0), (1.0, 1.5), (1.0, 2.0), (2.0, 4.0))
 """Parts of a motion that are scored, in trained windows."""
