@@ -30,7 +30,7 @@ def landing(truth: MotionSequence, stop: float) -> int:
     spans = contacts(truth)[1:]
     later = [span for span in spans if truth.times[span.start] > stop]
     span = (later or spans or [slice(0, None)])[0]
-    return span.start + int(np.ptp(truth.vertices[span, :, 2], axis=1).argmin())
+    return int(span.start + np.ptp(truth.vertices[span, :, 2], axis=1).argmin())
 
 
 def _simulated(name: str, until: float, parameters: Parameters) -> MotionSequence:
