@@ -139,6 +139,8 @@ def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any
             except InputError as error:
                 rows[model] = {"skipped": str(error)}
                 continue
+            if other.checkpoint.sha256 == predictor.checkpoint.sha256:
+                continue
             if other.schema.needs_observations:
                 rows[model] = {"skipped": "interpolates between given frames"}
                 continue
