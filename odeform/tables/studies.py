@@ -34,7 +34,7 @@ def ablations(runs: Runs) -> list[str]:
         "",
         *paragraph(
             f"`{OURS[DROP]}` on the drop and `{OURS['kick']}` on the kick, without some of their parts, trained again",
-            "with the same steps (`--without`). A dash is a part that the other has.",
+            "with the same steps (`--without`). A dash was not run, or is a part that only the other model has.",
             "Without the regression of what is left unexplained, the ODE is on its own; the rows below it leave out",
             "more. Deformation is relative, as elsewhere.",
         ),

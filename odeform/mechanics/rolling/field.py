@@ -43,11 +43,10 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
     # evenly spaced Gaussians are one Gaussian times a polynomial of an exponential, highest power first
     along = APART / REACHING
     bumps = (settled * np.exp(-0.5 * (along * np.arange(len(settled))) ** 2))[::-1].tolist()
-    leaning = (np.arange(len(settled)) * along)[::-1].tolist()
-    leaning = [lean * bump for lean, bump in zip(leaning, bumps, strict=True)]
+    leaning = [along * order * bump for order, bump in zip(reversed(range(len(bumps))), bumps, strict=True)]
     first, last = np.asfortranarray(law.first[:INPUTS].T), np.asfortranarray(law.last.T)
     bias, product = law.bias + material @ law.first[INPUTS:], gemv(bases.dtype)
-    heights, slopes, places = support.heights.tolist(), support.slopes.tolist(), len(support.heights) - 1
+    (heights, slopes), places = support.lists, len(support.heights) - 1
     quick, slow = FADING
     lowest, highest = EXPONENTS
     shallowest, deepest = DEPTHS

@@ -44,10 +44,11 @@ class CorrectedPart:
         r = np.sqrt(5.0 * (apart**2).sum(axis=1))
         # the derivative of matern by each scaled parameter
         slopes = -(5.0 / 3.0) * (1.0 + r) * np.exp(-r) * (apart / self.scales).T
-        covariances = np.concatenate([matern((theta / self.scales)[None], self.theta), slopes])
-        out = covariances @ self.weights @ self.modes
-        out[0] += self.mean
-        return out
+        return np.concatenate([self.value(theta)[None], slopes @ self.weights @ self.modes])
+
+    def value(self, theta: Floats) -> Float[np.ndarray, " entries"]:
+        """(T columns,): the residual alone."""
+        return matern((theta / self.scales)[None], self.theta)[0] @ self.weights @ self.modes + self.mean
 
 
 class Correction:
@@ -87,7 +88,7 @@ class Correction:
         """(T,) s -> (T, 6 + K) at theta (P,) in [-1, 1]: a cubic spline through the trained frames."""
         frames = np.zeros((len(self._times), self._coordinates))
         for name, part in self.parts.items():
-            frames[:, PARTS[name]] = part.at(theta)[0].reshape(len(frames), -1)
+            frames[:, PARTS[name]] = part.value(theta).reshape(len(frames), -1)
         spline = CubicSpline(self._times, frames)
         return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
 
