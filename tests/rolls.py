@@ -56,9 +56,9 @@ def motion(given: dict[str, float]) -> MotionSequence:
     times = np.arange(round(SCHEMA.window.stop * RATE) + 1) / RATE
     start, material = launched(given), np.array([[SCHEMA.parameters[0].normalise(given["mass"])]])
     law = true_law()
-    dynamics = RollingDynamics(law.like(law.flat()[None]), support_of(BALL.points, AXIS), RADIUS, material)
+    dynamics = RollingDynamics(law, support_of(BALL.points, AXIS), RADIUS, material)
     count = 2 * (len(times) - 4)
-    states = dynamics.roll_out(start[:, None], SUBSTEPS, count, 0.5 / RATE / SUBSTEPS)[1::2, :, 0, 0]
+    states = dynamics.roll_out(start[:, None], SUBSTEPS, count, 0.5 / RATE / SUBSTEPS)[1::2, :, 0]
     free = start[:3] - 0.5 / RATE * start[3:6] - [0.0, 0.5 * GRAVITY * (0.5 / RATE) ** 2, 0.0]
     moved = np.concatenate([np.outer((times[:4] / times[3]) ** 2, free), states[:, :3]])
     depth = np.maximum(1e-3 - moved[:, 1], 0.0) * (times > 0.0)

@@ -21,26 +21,33 @@ CHANCE = 0.05  # most that the probability may be that a share of the ODE gains 
 EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
 
 
-def with_correction(checkpoint: Checkpoint, data: TrainingData, left_out: float = LEFT_OUT) -> Checkpoint:
+def with_correction(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
     """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
-    `left_out` is the share of its mean square error on validation that modes of the residuals may leave out. Unchanged
-    where no part is improved, and where a spline filled in frames.
+    Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the correction has faded
+    between these two frames, and has a kernel for those before alone: chance landings later on would hide how smooth
+    a push is in the parameters.
     """
     if not all(data.observed[split].all() for split in data.observed):
         return checkpoint
-    model, times, parts = load_model(checkpoint), data.times, {}
+    model, parts = load_model(checkpoint), {}
     assert isinstance(model, ReducedModel)
+    times = data.times if fading is None else data.times[: fading[1] + 1]
     evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(times[-1])
     own = {
         split: np.stack([model.trajectory(one, evaluated, FINE, stop).reduced(times) for one in data.theta[split]])
         for split in data.theta
     }
     for name, columns in PARTS.items():
-        truth, motion = ({split: _flat(of[split], columns) for split in of} for of in (data.reduced, own))
+        truth, motion = (
+            {split: _flat(of[split][:, : len(times)], columns) for split in of} for of in (data.reduced, own)
+        )
         if not truth["train"].any() and not motion["train"].any():
             continue
-        part, explained = _fitted(data.theta, truth, motion, left_out)
+        if fading is not None:
+            left = np.repeat(_left(fading), truth["train"].shape[1] // len(times))
+            truth = {split: motion[split] + left * (of - motion[split]) for split, of in truth.items()}
+        part, explained = _fitted(data.theta, truth, motion, None if fading is None else 1.0)
         if explained >= EXPLAINED:
             parts[name] = part
     if not parts:
@@ -51,12 +58,19 @@ def with_correction(checkpoint: Checkpoint, data: TrainingData, left_out: float 
     return replace(checkpoint, config=config, arrays={**checkpoint.arrays, **correction.arrays()})
 
 
+def _left(fading: tuple[int, int]) -> Floats:
+    """What is left of a correction, in the frames up to the last of `fading`."""
+    begin, end = fading
+    share = np.clip((np.arange(end + 1) - begin) / (end - begin), 0.0, 1.0)
+    return 1.0 - share**2 * (3.0 - 2.0 * share)
+
+
 def _flat(reduced: Floats, columns: slice) -> Floats:
     return reduced[..., columns].reshape(len(reduced), -1)
 
 
 def _fitted(
-    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], left_out: float
+    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], given: float | None
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
@@ -75,11 +89,13 @@ def _fitted(
     added = motion["val"] - own - ridge.predict(asked, known, motion["train"] - own)
     left = motion["val"] - truth["val"]
     weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
-    share = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
-    share = float(np.clip(share, 0.0, 1.0))
-    gained = np.log(np.maximum(_norms(alone), 1e-30) / np.maximum(_norms(alone + share * added), 1e-30))
-    if _chance(gained) > CHANCE:
-        share = 0.0
+    share = given
+    if share is None:
+        share = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
+        share = float(np.clip(share, 0.0, 1.0))
+        gained = np.log(np.maximum(_norms(alone), 1e-30) / np.maximum(_norms(alone + share * added), 1e-30))
+        if _chance(gained) > CHANCE:
+            share = 0.0
     missed = alone + share * added
     explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
 
@@ -87,7 +103,7 @@ def _fitted(
     rest = truth["train"] - share * motion["train"]
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
-    count = int((dropped > left_out * np.square(missed).sum(axis=1).mean()).sum())
+    count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
     coefficients = ridge.weights(known, (u * sizes)[:, :count])
     part = CorrectedPart(known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share)
     return part, float(explained)

@@ -3,7 +3,7 @@ wrong it is beyond the window."""
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,24 +17,22 @@ from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, RollingLaw, fi
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.kernel_search import search_ridge
 from odeform.models.rolling.model import RollingODeform
-from odeform.models.rolling.readout import Readout, inputs_of
-from odeform.models.rolling.start import Start
+from odeform.models.rolling.readout import inputs_of
+from odeform.models.rolling.start import PUSHES, Start, push_inputs
 from odeform.motion.body import watched_body
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.training.continuation import HELD_OUT
 from odeform.training.request import TrainRequest
 from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
+from odeform.training.rolling_readout import ReadoutRows, fit_readout
 from odeform.types import Arrays, Floats, Ints, PointCloud
 
 __all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 
-PUSHES = ("force", "elevation")  # parameters that act through the push alone
-MOTIONS = 200  # to which the law is fitted, at most
-STEPS = 30  # of the fit
+STEPS = 48  # of the fit of the law
 LINEAR = 8  # of them with a law that is linear in the material and has no network
 SHARE = 0.7  # of the budget for the law
-FEATURES, SHARPNESS = 1500, (0.15, 1.2)  # of the readout; slopes per standard deviation of the inputs
-RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)  # candidates, relative; validation chooses
+LARGE, SMALL = 0.1, 0.2  # of a motion's largest deformation; how much smaller ones count in the readout
 LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
 CORNERS, UNFELT = list(COEFFICIENTS).index("corners"), -6.0  # the coefficient, and a value at which it does nothing
@@ -57,18 +55,16 @@ def fit_rolling_body(
         raise InputError(f"odeform-rolling: expected a parameter besides {' and '.join(PUSHES)}")
     motions = {split: motions_of(data, split, axis, materials) for split in ("train", "val")}
     start = _start(data, motions)
-    chosen = np.random.default_rng(request.seed).permutation(len(data.theta["train"]))[:MOTIONS]
 
     def go_on() -> bool:
         return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
 
     law, steps = _without(first_law(len(materials), request.seed), request.without), request.steps or STEPS
-    some = motions["train"].some(chosen)
     for linear, count in ((True, min(LINEAR, steps)), (False, max(steps - LINEAR, 0))):
-        law = fit_law(law, _free(law, request.without, linear), support, radius, some, count, report, go_on)
+        law = fit_law(law, _free(law, request.without, linear), support, radius, motions["train"], count, report, go_on)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
-    readout = _readout(data, law, support, radius, motions, request.seed)
+    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed)
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "lowest_m": _lowest(data)}
@@ -118,14 +114,17 @@ def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int
 
 
 def _start(data: TrainingData, motions: dict[str, Motions]) -> Start:
-    known, asked = data.theta["train"], data.theta["val"]
+    known, asked = (push_inputs(data.schema, data.theta[split]) for split in ("train", "val"))
     scale = np.repeat([1.0, RATES], MOVING) * np.tile([1.0, 1.0, data.space.gyration_radius], 2)
     states = {split: of.start[: 2 * MOVING].T for split, of in motions.items()}
-    mean = states["train"].mean(axis=0)
-    scaled = {split: (of - mean) * scale for split, of in states.items()}
-    ridge = search_ridge(known, scaled["train"], (asked, scaled["val"]))[0]
-    weights = ridge.weights(known, scaled["train"]) / scale
-    return Start(known / ridge.scales, ridge.scales, weights, mean)
+    linear = np.linalg.lstsq(_with_one(known), states["train"], rcond=None)[0]
+    rest = scale * (states["train"] - _with_one(known) @ linear)
+    ridge = search_ridge(known, rest, (asked, scale * (states["val"] - _with_one(asked) @ linear)))[0]
+    return Start(known / ridge.scales, ridge.scales, ridge.weights(known, rest) / scale, linear)
+
+
+def _with_one(inputs: Floats) -> Float[np.ndarray, "motions rows"]:
+    return np.concatenate([np.ones((len(inputs), 1)), inputs], axis=1)
 
 
 def _without(law: RollingLaw, parts: Sequence[str]) -> RollingLaw:
@@ -155,48 +154,18 @@ def _free(law: RollingLaw, without: Sequence[str], linear: bool) -> Ints:
     return np.flatnonzero(RollingLaw(**flags).flat())
 
 
-@dataclass(frozen=True, eq=False)
-class _Frames:
-    """Inputs (R, I) and outputs (R, S) of the readout, one row for each frame of each motion."""
-
-    inputs: Float[np.ndarray, "rows inputs"]
-    patterns: Float[np.ndarray, "rows patterns"]
-
-
-def _readout(
-    data: TrainingData, law: RollingLaw, support: Support, radius: float, motions: dict[str, Motions], seed: int
-) -> Readout:
-    """Fitted to motions under the law, so that it knows what the law is wrong about."""
-    frames = {split: _frames(data, split, law, support, radius, of) for split, of in motions.items()}
-    train = frames["train"].inputs
-    mean, scale = train.mean(axis=0), np.maximum(train.std(axis=0), 1e-9)
-    rng, (low, high) = np.random.default_rng(seed), SHARPNESS
-    sharpness = low * (high / low) ** rng.random(FEATURES)
-    directions = sharpness * rng.normal(size=(train.shape[1], FEATURES))
-    phases = rng.uniform(0.0, 2.0 * np.pi, FEATURES)
-    empty = Readout(mean, scale, directions, phases, np.zeros((0, 0)))
-    gram, cross = 0.0, 0.0
-    for begin in range(0, len(train), 1 << 12):
-        features = empty.features(train[begin : begin + (1 << 12)])
-        gram = gram + features.T @ features
-        cross = cross + features.T @ frames["train"].patterns[begin : begin + (1 << 12)]
-    assert isinstance(gram, np.ndarray)
-    ridges = [ridge * np.trace(gram) / len(gram) * np.eye(len(gram)) for ridge in RIDGES]
-    found = [Readout(mean, scale, directions, phases, np.linalg.solve(gram + ridge, cross)) for ridge in ridges]
-    val = frames["val"]
-    return min(found, key=lambda one: float(np.square(one(val.inputs) - val.patterns).sum()))
-
-
-def _frames(
-    data: TrainingData, split: str, law: RollingLaw, support: Support, radius: float, motions: Motions
-) -> _Frames:
-    states = roll_out(law.like(law.flat()[None]), support, radius, motions)[:, :, 0]
+def _rows(data: TrainingData, law: RollingLaw, support: Support, radius: float, motions: Motions) -> ReadoutRows:
+    """Motions under the law, so that a readout learns what the law is wrong about."""
+    states = roll_out(law, support, radius, motions)
     count = len(states)
-    rows = states.transpose(1, 2, 0).reshape(STATE, -1)
+    flat = states.transpose(1, 2, 0).reshape(STATE, -1)
     material = np.repeat(motions.material, count, axis=0)
     touch = np.repeat(1e-3 * law.coefficients(motions.material)["touch"], count)
-    patterns = data.reduced[split][:, -count:, POSE:]
-    return _Frames(inputs_of(rows, touch, material), patterns.reshape(len(rows[0]), -1))
+    patterns = data.reduced["train"][..., POSE:]
+    sizes = np.linalg.norm(patterns, axis=2)
+    large = sizes > LARGE * sizes.max(axis=1, keepdims=True)
+    weights = np.where(large[:, -count:], 1.0, SMALL).ravel()
+    return ReadoutRows(inputs_of(flat, touch, material), patterns[:, -count:].reshape(len(weights), -1), weights)
 
 
 def later_errors(model: RollingODeform, data: TrainingData) -> Floats:

@@ -1,8 +1,4 @@
-"""Fits a law of contact to motions of a rolling body: Gauss-Newton on whole roll-outs.
-
-A law has some two hundred numbers. Roll-outs of all its changes together cost little more than one of them, so that
-differences give the Jacobian, and few steps are needed.
-"""
+"""Fits a law of contact to motions of a rolling body: Gauss-Newton on whole roll-outs, with their exact derivatives."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,6 +8,7 @@ from jaxtyping import Float
 
 from odeform.mechanics.rolling.dynamics import MOVING, RollingDynamics
 from odeform.mechanics.rolling.law import RollingLaw
+from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support
 from odeform.types import Floats, Ints
 
@@ -20,9 +17,8 @@ __all__ = ["Motions", "fit_law", "law_error_mm"]
 STEP = 1.05e-3  # s, at most
 ROBUST = 5.0  # mm; larger errors count by their logarithm: a ball that stops on the wrong facet decides nothing
 EVERY = 3  # frames that are compared
-CHANGED = 1e-4  # of a number, for differences
 STEEP = 300.0  # largest derivative that is believed
-TOGETHER = 24  # laws that are rolled out at once
+TOGETHER = 128  # motions whose derivatives are computed at once
 PRIOR = 1e-4  # towards the law that a fit starts from
 TRIES = 7  # of a step, each more cautious
 ENOUGH = 5e-4  # relative gain of a step, below which the fit ends
@@ -46,26 +42,56 @@ class Motions:
 
 
 def roll_out(law: RollingLaw, support: Support, radius: float, motions: Motions) -> Floats:
-    """(T, 8, B, M) states in the frames of `motions`, under laws with one leading axis (B)."""
+    """(T, 8, M) states in the frames of `motions`."""
     dynamics = RollingDynamics(law, support, radius, motions.material)
+    return dynamics.roll_out(motions.start, *_half_frames(motions))[1::2]
+
+
+def _half_frames(motions: Motions) -> tuple[int, int, float]:
+    """Steps in half a frame, half frames, and the seconds of a step."""
     half = max(round(0.5 * motions.frame / STEP + 0.499), 1)
-    states = dynamics.roll_out(motions.start, half, 2 * len(motions.moved) - 1, 0.5 * motions.frame / half)
-    return states[1::2]
+    return half, 2 * len(motions.moved) - 1, 0.5 * motions.frame / half
 
 
-def _missed(states: Floats, motions: Motions, radius: float) -> Float[np.ndarray, "laws errors"]:
-    """Robust errors of states (T, 8, B, M), in units of `ROBUST`, flat."""
+def _missed(states: Floats, motions: Motions, radius: float) -> tuple[Floats, Floats]:
+    """Robust errors of states (T, 8, M) in the compared frames, in units of `ROBUST`, and their derivatives by the
+    position: (E, M, 3) each."""
     scale = 1e3 / ROBUST * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
-    apart = states[::EVERY, :MOVING].transpose(2, 0, 3, 1) - motions.moved[::EVERY]
+    apart = states[::EVERY, :MOVING].swapaxes(1, 2) - motions.moved[::EVERY]
     apart = np.nan_to_num(scale * apart, nan=200.0, posinf=200.0, neginf=-200.0)
-    return np.arcsinh(apart).reshape(len(apart), -1)
+    return np.arcsinh(apart), scale / np.sqrt(1.0 + apart**2)
 
 
 def law_error_mm(law: RollingLaw, support: Support, radius: float, motions: Motions) -> float:
     """Pooled RMSE of the pose in mm, over the frames (T,) and the motions (M,)."""
-    states = roll_out(law.like(law.flat()[None]), support, radius, motions)[:, :MOVING, 0]
-    apart = (states.transpose(0, 2, 1) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
+    states = roll_out(law, support, radius, motions)[:, :MOVING]
+    apart = (states.swapaxes(1, 2) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
     return float(1e3 * np.sqrt(np.square(apart).sum(axis=2).mean() / 3.0))
+
+
+@dataclass
+class _Normal:
+    """Of the errors at a law: their mean square, and with their Jacobian J of E rows, J^T J / E and J^T errors / E."""
+
+    cost: float
+    square: Float[np.ndarray, "free free"]
+    slope: Float[np.ndarray, " free"]
+
+
+def _normal(law: RollingLaw, free: Ints, support: Support, radius: float, motions: Motions) -> _Normal:
+    count, total = len(motions.material), _Normal(0.0, np.zeros((len(free), len(free))), np.zeros(len(free)))
+    for at in range(0, count, TOGETHER):
+        some = motions.some(np.arange(at, min(at + TOGETHER, count)))
+        dynamics, (half, frames, step) = RollingDynamics(law, support, radius, some.material), _half_frames(motions)
+        states, changes = roll_out_with_sensitivities(dynamics, free, some.start, half, frames, step)
+        errors, by_position = _missed(states[1::2], some, radius)
+        jacobian = by_position[..., None].astype(np.float32) * changes[1::2][::EVERY]
+        jacobian = np.clip(np.nan_to_num(jacobian), -STEEP, STEEP).reshape(-1, len(free))
+        share = 1.0 / (errors.size / len(some.material) * count)
+        total.cost += share * float(np.square(errors).sum())
+        total.square += share * (jacobian.T @ jacobian)
+        total.slope += share * (jacobian.T @ errors.ravel())
+    return total
 
 
 def fit_law(
@@ -84,38 +110,28 @@ def fit_law(
     It ends earlier where a step gains hardly anything, and when `go_on` says so.
     """
 
-    def missed(flat: Floats) -> Floats:
-        return _missed(roll_out(law.like(flat), support, radius, motions), motions, radius)
+    def cost_of(trial: RollingLaw) -> float:
+        return float(np.square(_missed(roll_out(trial, support, radius, motions), motions, radius)[0]).mean())
 
-    now = law.flat()
-    first, damping, errors = now[free], 1e-2, missed(now[None])[0]
-    cost = errors @ errors / len(errors)
+    now, first, damping = law, law.flat()[free], 1e-2
     for step in range(steps):
         if not go_on():
             break
-        jacobian = np.empty((len(errors), len(free)), dtype=np.float32)
-        for at in range(0, len(free), TOGETHER):
-            some = free[at : at + TOGETHER]
-            changed = np.tile(now, (len(some), 1))
-            changed[np.arange(len(some)), some] += CHANGED
-            jacobian[:, at : at + TOGETHER] = ((missed(changed) - errors) / CHANGED).T
-        jacobian = np.clip(jacobian, -STEEP, STEEP)
-        normal = (jacobian.T @ jacobian).astype(float) / len(errors) + PRIOR * np.eye(len(free))
-        slope = (jacobian.T @ errors) / len(errors) + PRIOR * (now[free] - first)
+        known, numbers = _normal(now, free, support, radius, motions), now.flat()
+        normal = known.square + PRIOR * np.eye(len(free))
+        slope = known.slope + PRIOR * (numbers[free] - first)
         for _ in range(TRIES):
             change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope)
-            trial = now.copy()
+            trial = numbers.copy()
             trial[free] += np.clip(change, -1.0, 1.0)
-            trial_errors = missed(trial[None])[0]
-            trial_cost = trial_errors @ trial_errors / len(errors)
-            if trial_cost < cost:
+            cost = cost_of(law.like(trial))
+            if cost < known.cost:
                 break
             damping *= 6.0
         else:
             break
-        gained, damping = cost - trial_cost, max(damping / 4.0, 1e-6)
-        now, errors, cost = trial, trial_errors, trial_cost
+        now, damping = law.like(trial), max(damping / 4.0, 1e-6)
         report(f"contact law, step {step + 1}: robust pose error {ROBUST * np.sqrt(cost):.2f} mm (train)")
-        if gained < ENOUGH * cost:
+        if known.cost - cost < ENOUGH * known.cost:
             break
-    return law.like(now)
+    return now

@@ -10,6 +10,7 @@ from odeform.mechanics.floor import GRAVITY
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw, first_law
+from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Status
@@ -42,21 +43,29 @@ def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
     law, rng = any_law(), np.random.default_rng(1)
     material, states = rng.uniform(-1.0, 1.0, (40, 2)), rng.normal(size=(STATE, 40))
     states[1] = rng.uniform(-0.02, 0.005, 40)
-    together = RollingDynamics(law.like(law.flat()[None]), support, RADIUS, material).slopes(states[:, None])[:, 0]
+    together = RollingDynamics(law, support, RADIUS, material).slopes(states)
     alone = [make_field(law, support, RADIUS, material[i])(0.0, UNITS * states[:, i]) / UNITS for i in range(40)]
     assert np.allclose(together.T, alone, rtol=1e-12, atol=1e-12)
     assert (together[4] > 0.0).any()
     assert (together[4] == -GRAVITY).any()
 
 
-def test_laws_side_by_side_are_those_alone(support: Support) -> None:
-    laws, material = [any_law(seed) for seed in range(3)], np.array([[0.3, -0.4], [-0.9, 0.1]])
-    states = np.stack([state(height=-0.004, speed=1.0, spin=4.0), state(height=-0.001, rising=-1.0)], axis=1)
-    several = laws[0].like(np.stack([law.flat() for law in laws]))
-    together = RollingDynamics(several, support, RADIUS, material).roll_out(states, 4, 20, 1e-3)
-    for index, law in enumerate(laws):
-        alone = RollingDynamics(law.like(law.flat()[None]), support, RADIUS, material).roll_out(states, 4, 20, 1e-3)
-        assert np.allclose(together[:, :, index], alone[:, :, 0], rtol=1e-12, atol=1e-14)
+def test_derivatives_by_the_law_are_those_of_differences(support: Support) -> None:
+    law, rng, count = any_law(), np.random.default_rng(1), 30
+    material, states = rng.uniform(-1.0, 1.0, (count, 2)), rng.normal(size=(STATE, count))
+    states[1], states[2] = rng.uniform(-0.02, 0.005, count), rng.uniform(-1.0, 1.0, count)
+    flat, chosen = law.flat(), rng.permutation(len(law.flat()))[:40]
+    roll, dynamics = (4, 10, 1e-3), RollingDynamics(law, support, RADIUS, material)
+    rolled, changes = roll_out_with_sensitivities(dynamics, chosen, states, *roll)
+    assert np.array_equal(rolled, dynamics.roll_out(states, *roll))
+    for index, number in enumerate(chosen):
+        step = 1e-6 * (np.arange(len(flat)) == number)
+        up, down = (
+            RollingDynamics(law.like(flat + sign * step), support, RADIUS, material).roll_out(states, *roll)
+            for sign in (1.0, -1.0)
+        )
+        expected = ((up - down)[:, :3] / 2e-6).swapaxes(1, 2)
+        assert np.allclose(changes[..., index], expected, rtol=1e-3, atol=1e-4 * np.abs(expected).max() + 1e-8)
 
 
 def test_flight_is_free_fall(support: Support) -> None:

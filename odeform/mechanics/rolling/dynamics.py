@@ -9,18 +9,34 @@ are the accelerations by which the floor pushes up, and brakes a contact that sl
 on the angle: a mesh has corners, and its own weight has settled the body where it rested. That turns it, too.
 """
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.law import ADJUSTED, PLACES, REACHING, RollingLaw
+from odeform.mechanics.rolling.law import ADJUSTED, INPUTS, PLACES, REACHING, RollingLaw
 from odeform.mechanics.rolling.support import Support
 from odeform.types import Floats, Ints
 
-__all__ = ["FADING", "MOVING", "STATE", "RollingDynamics"]
+__all__ = [
+    "AHEAD",
+    "AROUND",
+    "CLEAR",
+    "DEEP",
+    "DEPTHS",
+    "EXPONENTS",
+    "FADING",
+    "MOVING",
+    "POWERS",
+    "SHARES",
+    "SPIN",
+    "STATE",
+    "UPWARD",
+    "Contacts",
+    "RollingDynamics",
+    "limited",
+]
 
 MOVING = 3
 """Coordinates of the position, which come first; their rates come next."""
@@ -30,112 +46,137 @@ CLEAR = 2e-3  # m above the touch from which on nothing touches, corners include
 FASTEST = 60.0  # m/s and rad/s: rates beyond are no motion, and are kept from overflowing
 DEEP, UPWARD, AHEAD = 2.0, 2.0, 2.0  # units of the network's inputs: cm, m/s, m/s
 EXPONENTS = (-12.0, 8.0)
+POWERS = (-3.0, 2.0)  # the logarithm
+SHARES = (-6.0, 1.0)  # the logarithm of the corners' share
 DEPTHS = (1e-9, 1e3)  # cm: what is shallower does not touch, what is deeper is lost
+AROUND = float(PLACES[-1]) + 4.0 * REACHING  # rad: beyond, nothing has settled
 SPIN = 1.0  # rad/s, from which on rolling is braked fully
 
 
 @dataclass(frozen=True, eq=False)
-class _Contact:
-    """What all motions of one call share, (...) by law and motion."""
+class Contacts:
+    """What the floor does at one moment to the bodies that touch it, (C,) each."""
 
-    logs: dict[str, Floats]
-    power: Floats
-    damping_power: Floats
-    touch: Floats
-    lever: Floats
-    inertia: Floats
-    settled: Floats
+    rows: Ints
+    """Of all motions."""
+    angle: Floats
+    moving: Float[np.ndarray, "3 contacts"]
+    """Speed ahead and up, and spin."""
+    corners: Floats
+    """By how much the corners make the body higher (m)."""
+    corner_slopes: Floats
+    settled_slopes: Floats
+    reached: Float[np.ndarray, "contacts places"]
+    """How much each of the places where the body has settled counts."""
+    apart: Float[np.ndarray, "contacts places"]
+    """How far off they are, in units of `REACHING`."""
+    depth: Floats
+    """cm."""
+    sliding: Floats
+    inputs: Float[np.ndarray, "contacts inputs"]
+    """Of the network."""
+    hidden: Float[np.ndarray, "contacts hidden"]
+    exponents: Float[np.ndarray, "contacts adjusted"]
+    strong: Float[np.ndarray, "contacts adjusted"]
+    """The coefficients that the network changes."""
+    spring: Floats
+    """The push (m/s^2) without its damping."""
+    damped: Floats
+    """Its factor; below zero, the floor does not push."""
+    grip: Floats
+    """Share of the friction that acts, with its sign."""
+    brake: Floats
+    """The lever in m by which the push brakes rolling."""
+    push: Floats
+    drag: Floats
+    turn: Floats
+    """The angular acceleration."""
 
 
 class RollingDynamics:
-    """The field of B laws and M motions at once."""
+    """The field of M motions at once."""
 
     def __init__(
         self, law: RollingLaw, support: Support, radius: float, material: Float[np.ndarray, "motions materials"]
     ) -> None:
-        """`law` has one leading axis (B); `radius` is that of the body in m, `material` that of each motion."""
-        self._law, self._support = law, support
-        self._material = material
-        logs = law.coefficients(material)
+        """`radius` is that of the body in m, `material` that of each motion."""
+        self.law, self.support, self.radius, self.material = law, support, radius, material
+        self.logs = logs = law.coefficients(material)
         linear = np.concatenate([np.ones((len(material), 1)), material], axis=1)
-        self._contact = _Contact(
-            logs,
-            np.exp(np.clip(logs["power"], -3.0, 2.0)),
-            1.0 / (1.0 + np.exp(-logs["damping_power"])),
-            1e-3 * logs["touch"],
-            radius * (1.0 + 0.1 * logs["radius"]),
-            np.exp(logs["inertia"]) * radius**2,
-            1e-3 * np.einsum("bpt,mt->bmp", law.settled, linear),
-        )
+        self.settled = 1e-3 * linear @ law.settled.T
+        """(M, places) m by which the bodies stand higher at each of `PLACES`."""
+        self.touch, self.lever = 1e-3 * logs["touch"], radius * (1.0 + 0.1 * logs["radius"])
+        self.inertia = np.exp(logs["inertia"]) * radius**2
+        self.power = np.exp(np.clip(logs["power"], *POWERS))
+        self.damping_power = 1.0 / (1.0 + np.exp(-logs["damping_power"]))
+        self.share = np.exp(np.clip(logs["corners"], *SHARES))
+        self._bases = np.stack([logs[name] for name in ADJUSTED], axis=1)
+        self._bias = law.bias + material @ law.first[INPUTS:]
 
-    def slopes(self, states: Float[np.ndarray, "states laws motions"]) -> Floats:
-        """(8, B, M) -> (8, B, M)."""
-        shared, out = self._contact, np.zeros_like(states)
-        ahead, rising, spin = out[:MOVING] = states[MOVING : 2 * MOVING]
-        out[4] = -GRAVITY
-        out[6:] = -states[6:] / np.array(FADING)[:, None, None]
-        near = shared.touch + CLEAR > states[1]
-        laws, motions = np.nonzero(near)
-        if not len(laws):
-            return out
-        angle, fast, up, turning = states[2][near], ahead[near], rising[near], spin[near]
-        lever, inertia = shared.lever[near], shared.inertia[near]
-        corners, corner_slopes = self._support.at(angle)
-        settled, settled_slopes = self._settled(angle, laws, motions)
-        high = shared.touch[near] + settled - states[1][near]
-        share = np.exp(np.clip(shared.logs["corners"][near], -6.0, 1.0))
-        depth = np.clip(100.0 * (high + share * corners), *DEPTHS)
-        sliding = fast - lever * turning
-        strong = self._adjusted(depth, up, sliding, fast, laws, motions)
-        push = strong["stiffness"] * depth ** shared.power[near]
-        push *= np.maximum(1.0 - strong["damping"] * depth ** shared.damping_power[near] * up, 0.0)
-        drag = -strong["friction"] * push * np.tanh(sliding / strong["grip"])
-        brake = strong["rolling"] * np.tanh(turning / SPIN)
-        torque = -drag * lever - push * (brake + strong["corners"] * corner_slopes + settled_slopes)
-        out[3][near] += drag
-        out[4][near] += push
-        out[5][near] += torque / inertia
+    def slopes(self, states: Float[np.ndarray, "states motions"]) -> Floats:
+        """(8, M) -> (8, M)."""
+        return self.with_contacts(states)[0]
+
+    def with_contacts(self, states: Float[np.ndarray, "states motions"]) -> tuple[Floats, Contacts]:
+        """The `slopes` (8, M), and what causes them."""
+        out = np.empty_like(states)
+        out[:MOVING] = states[MOVING : 2 * MOVING]
+        out[MOVING : 2 * MOVING] = np.array([0.0, -GRAVITY, 0.0])[:, None]
+        out[6:] = -states[6:] / np.array(FADING)[:, None]
+        touching = self._contacts(states)
+        rows = touching.rows
+        out[3, rows] = touching.drag
+        out[4, rows] += touching.push
+        out[5, rows] = touching.turn
         for index, fading in enumerate(FADING):
-            out[6 + index][near] += depth / fading
-        return out
+            out[6 + index, rows] += touching.depth / fading
+        return out, touching
 
-    def _settled(self, angle: Floats, laws: Ints, motions: Ints) -> tuple[Floats, Floats]:
-        """How much higher (m) the body stands where it has settled, and the slope by the angle (m per rad)."""
-        height, slope = np.zeros_like(angle), np.zeros_like(angle)
+    def _contacts(self, states: Floats) -> Contacts:
+        rows = np.flatnonzero(self.touch + CLEAR > states[1])
+        height, angle = states[1, rows], states[2, rows]
+        moving = fast, up, spin = states[MOVING : 2 * MOVING, rows]
+        corners, corner_slopes = self.support.at(angle)
         turned = np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
-        here = np.flatnonzero(np.abs(turned) < PLACES[-1] + 4.0 * REACHING)
-        if len(here):
-            apart = (turned[here, None] - PLACES) / REACHING
-            each = self._contact.settled[laws[here], motions[here]] * np.exp(-0.5 * apart**2)
-            height[here], slope[here] = each.sum(axis=1), (-apart / REACHING * each).sum(axis=1)
-        return height, slope
-
-    def _adjusted(
-        self, depth: Floats, up: Floats, sliding: Floats, fast: Floats, laws: Ints, motions: Ints
-    ) -> dict[str, Floats]:
-        """The coefficients that the network changes, for each contact (C,)."""
-        inputs = [depth / DEEP, up / UPWARD, np.abs(sliding), np.abs(fast) / AHEAD]
-        x = np.concatenate([np.stack(inputs, axis=1), self._material[motions]], axis=1)
-        added, law = np.empty((len(x), len(ADJUSTED))), self._law
-        cuts = np.searchsorted(laws, np.arange(len(law.bias) + 1))
-        for index, (begin, end) in enumerate(itertools.pairwise(cuts)):
-            hidden = np.tanh(x[begin:end] @ law.first[index] + law.bias[index])
-            added[begin:end] = hidden @ law.last[index]
-        logs = self._contact.logs
-        return {
-            name: np.exp(np.clip(logs[name][laws, motions] + added[:, i], *EXPONENTS))
-            for i, name in enumerate(ADJUSTED)
-        }
+        apart = (turned[:, None] - PLACES) / REACHING
+        reached = np.exp(-0.5 * apart**2) * (np.abs(turned) < AROUND)[:, None]
+        settled = reached * self.settled[rows]
+        settled_slopes = -(apart * settled).sum(axis=1) / REACHING
+        gap = self.touch[rows] + settled.sum(axis=1) - height + self.share[rows] * corners
+        depth = np.clip(100.0 * gap, *DEPTHS)
+        lever = self.lever[rows]
+        sliding = fast - lever * spin
+        inputs = np.stack([depth / DEEP, up / UPWARD, np.abs(sliding), np.abs(fast) / AHEAD], axis=1)
+        hidden = np.tanh(inputs @ self.law.first[:INPUTS] + self._bias[rows])
+        exponents = self._bases[rows] + hidden @ self.law.last
+        strong = np.exp(np.clip(exponents, *EXPONENTS))
+        stiffness, damping, friction, rolling, slow, felt = strong.T
+        spring = stiffness * depth ** self.power[rows]
+        damped = 1.0 - damping * depth ** self.damping_power[rows] * up
+        push = spring * np.maximum(damped, 0.0)
+        grip = np.tanh(sliding / slow)
+        drag = -friction * push * grip
+        brake = rolling * np.tanh(spin / SPIN)
+        torque = -drag * lever - push * (brake + felt * corner_slopes + settled_slopes)
+        return Contacts(
+            rows, angle, moving, corners, corner_slopes, settled_slopes, reached, apart, depth, sliding, inputs, hidden,
+            exponents, strong, spring, damped, grip, brake, push, drag, torque / self.inertia[rows],
+        )  # fmt: skip
 
     def roll_out(self, start: Float[np.ndarray, "states motions"], steps: int, count: int, step: float) -> Floats:
-        """(T, 8, B, M) from states (8, M): at the start and after each `steps` midpoint steps of `step` s."""
-        state = np.repeat(start[:, None], len(self._law.bias), axis=1)
+        """(T, 8, M) from states (8, M): at the start and after each `steps` midpoint steps of `step` s."""
+        state = start
         out = np.empty((count + 1, *state.shape))
         out[0] = state
         for frame in range(1, count + 1):
             for _ in range(steps):
                 middle = state + 0.5 * step * self.slopes(state)
                 state = state + step * self.slopes(middle)
-                np.clip(state[MOVING : 2 * MOVING], -FASTEST, FASTEST, out=state[MOVING : 2 * MOVING])
+                limited(state)
             out[frame] = state
         return out
+
+
+def limited(state: Float[np.ndarray, "states motions"]) -> None:
+    """Keeps the rates of states (8, M) from overflowing, in place."""
+    np.clip(state[MOVING : 2 * MOVING], -FASTEST, FASTEST, out=state[MOVING : 2 * MOVING])

@@ -9,7 +9,20 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.dynamics import AHEAD, CLEAR, DEEP, DEPTHS, EXPONENTS, FADING, SPIN, STATE, UPWARD
+from odeform.mechanics.rolling.dynamics import (
+    AHEAD,
+    AROUND,
+    CLEAR,
+    DEEP,
+    DEPTHS,
+    EXPONENTS,
+    FADING,
+    POWERS,
+    SHARES,
+    SPIN,
+    STATE,
+    UPWARD,
+)
 from odeform.mechanics.rolling.law import ADJUSTED, INPUTS, PLACES, REACHING, RollingLaw
 from odeform.mechanics.rolling.support import Support
 from odeform.solver.method import Field
@@ -19,7 +32,6 @@ from odeform.types import Floats
 __all__ = ["make_field", "units_of"]
 
 FULL = 2.0 * math.pi
-AROUND = float(PLACES[-1]) + 4.0 * REACHING
 FIRST, APART = float(PLACES[0]), float(PLACES[1] - PLACES[0])
 
 
@@ -35,10 +47,10 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
     """(t, state (8,) in `units_of(radius)`) -> its slope, for the material (Q,) of one body of `radius` m."""
     logs = {name: float(value[0]) for name, value in law.coefficients(material[None]).items()}
     bases = np.array([logs[name] for name in ADJUSTED])
-    power = math.exp(min(max(logs["power"], -3.0), 2.0))
+    power = math.exp(min(max(logs["power"], POWERS[0]), POWERS[1]))
     damping_power = 1.0 / (1.0 + math.exp(-logs["damping_power"]))
     touch, lever = 1e-3 * logs["touch"], radius * (1.0 + 0.1 * logs["radius"])
-    inertia, share = math.exp(logs["inertia"]) * radius**2, math.exp(min(max(logs["corners"], -6.0), 1.0))
+    inertia, share = math.exp(logs["inertia"]) * radius**2, math.exp(min(max(logs["corners"], SHARES[0]), SHARES[1]))
     settled = 1e-3 * (law.settled @ np.concatenate([[1.0], material]))
     # evenly spaced Gaussians are one Gaussian times a polynomial of an exponential, highest power first
     along = APART / REACHING

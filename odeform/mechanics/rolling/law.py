@@ -19,6 +19,7 @@ __all__ = [
     "HIDDEN",
     "INPUTS",
     "PLACES",
+    "PLAIN",
     "REACHING",
     "RollingLaw",
     "first_law",
@@ -51,32 +52,29 @@ INPUTS = 4
 
 @dataclass(frozen=True, eq=False)
 class RollingLaw:
-    """The numbers of one law, or of several, in leading axes (...)."""
+    """The numbers of one law."""
 
-    terms: Float[np.ndarray, "*laws coefficients terms"]
+    terms: Float[np.ndarray, "coefficients terms"]
     """Of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
-    settled: Float[np.ndarray, "*laws places linear"]
+    settled: Float[np.ndarray, "places linear"]
     """Of linear functions of the material: mm by which the body stands higher at each of `PLACES`."""
-    first: Float[np.ndarray, "*laws inputs hidden"]
-    bias: Float[np.ndarray, "*laws hidden"]
-    last: Float[np.ndarray, "*laws hidden adjusted"]
+    first: Float[np.ndarray, "inputs hidden"]
+    bias: Float[np.ndarray, " hidden"]
+    last: Float[np.ndarray, "hidden adjusted"]
 
-    def flat(self) -> Float[np.ndarray, "*laws numbers"]:
+    def flat(self) -> Float[np.ndarray, " numbers"]:
         """All numbers in one axis."""
-        parts = [getattr(self, field.name) for field in fields(self)]
-        batch = self.bias.shape[:-1]
-        return np.concatenate([part.reshape(*batch, -1) for part in parts], axis=-1)
+        return np.concatenate([getattr(self, field.name).ravel() for field in fields(self)])
 
-    def like(self, flat: Float[np.ndarray, "*laws numbers"]) -> "RollingLaw":
-        """Laws of the same sizes with the numbers (..., n) of `flat`."""
-        shapes = [getattr(self, field.name).shape[self.bias.ndim - 1 :] for field in fields(self)]
-        cuts = np.cumsum([np.prod(shape) for shape in shapes])[:-1]
-        parts = np.split(flat, cuts, axis=-1)
-        return RollingLaw(*(p.reshape(*flat.shape[:-1], *shape) for p, shape in zip(parts, shapes, strict=True)))
+    def like(self, flat: Float[np.ndarray, " numbers"]) -> "RollingLaw":
+        """A law of the same sizes with the numbers (n,) of `flat`."""
+        shapes = [getattr(self, field.name).shape for field in fields(self)]
+        parts = np.split(flat, np.cumsum([np.prod(shape) for shape in shapes])[:-1])
+        return RollingLaw(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
     def coefficients(self, material: Float[np.ndarray, "motions materials"]) -> dict[str, Floats]:
-        """By name (..., M), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
-        found = np.einsum("...ct,mt->c...m", self.terms, material_terms(material))
+        """By name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
+        found = self.terms @ material_terms(material).T
         return dict(zip([*COEFFICIENTS, *PLAIN], found, strict=True))
 
     def arrays(self) -> Arrays:

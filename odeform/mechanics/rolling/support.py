@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Floats, Points, Vector
+from odeform.types import Floats, Ints, Points, Vector
 
 __all__ = ["Support", "support_of"]
 
@@ -31,12 +31,21 @@ class Support:
 
     def at(self, angles: Floats) -> tuple[Floats, Floats]:
         """Heights and slopes (...) at angles (...) in rad, of any size."""
-        place = np.mod(angles / (2.0 * np.pi), 1.0) * (len(self.heights) - 1)
-        index = np.minimum(place.astype(int), len(self.heights) - 2)
-        share = place - index
+        index, share = self._place(angles)
         return tuple(  # pyright: ignore
             table[index] + share * (table[index + 1] - table[index]) for table in (self.heights, self.slopes)
         )
+
+    def bends(self, angles: Floats) -> Floats:
+        """(...) derivatives of the slopes at angles (...) in rad, m per rad^2."""
+        index, _ = self._place(angles)
+        return (self.slopes[index + 1] - self.slopes[index]) * (len(self.slopes) - 1) / (2.0 * np.pi)
+
+    def _place(self, angles: Floats) -> tuple[Ints, Floats]:
+        """Of angles (...) in the tables: the entry before, and how far on towards the next one."""
+        place = np.mod(angles / (2.0 * np.pi), 1.0) * (len(self.heights) - 1)
+        index = np.minimum(place.astype(int), len(self.heights) - 2)
+        return index, place - index
 
 
 def support_of(points: Points, axis: Vector) -> Support:

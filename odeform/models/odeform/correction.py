@@ -25,7 +25,7 @@ PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(
 
 @dataclass(frozen=True, eq=False)
 class CorrectedPart:
-    """The regression of one part of y, over all frames of the trained window."""
+    """The regression of one part of y, over all corrected frames."""
 
     theta: Float[np.ndarray, "sequences parameters"]
     """Training parameters, divided by the length scales."""
@@ -52,7 +52,7 @@ class CorrectedPart:
 
 
 class Correction:
-    """Adds to the motions of the ODE, within the trained window; beyond it, the last value is kept."""
+    """Adds to the motions of the ODE in the first frames, or in all; beyond them, the last value is kept."""
 
     def __init__(self, times: Floats, coordinates: int, parts: dict[str, CorrectedPart]) -> None:
         """`times` (T,) s of the frames, the number 6 + K of coordinates, and the corrected `parts` by name."""
@@ -64,7 +64,7 @@ class Correction:
 
     @property
     def stop(self) -> float:
-        """s: the end of the trained window."""
+        """s: the last of the corrected frames."""
         return float(self._times[-1])
 
     def first(self, modes: int) -> "Correction":
@@ -85,7 +85,7 @@ class Correction:
         return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
 
     def over_time(self, theta: Floats) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
-        """(T,) s -> (T, 6 + K) at theta (P,) in [-1, 1]: a cubic spline through the trained frames."""
+        """(T,) s -> (T, 6 + K) at theta (P,) in [-1, 1]: a cubic spline through the corrected frames."""
         frames = np.zeros((len(self._times), self._coordinates))
         for name, part in self.parts.items():
             frames[:, PARTS[name]] = part.value(theta).reshape(len(frames), -1)

@@ -15,7 +15,7 @@ from odeform.models.odeform.correction import Correction
 from odeform.models.odeform.inference import Decoder
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.rolling.readout import Readout, inputs_of
-from odeform.models.rolling.start import Start
+from odeform.models.rolling.start import Start, push_inputs
 from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -59,7 +59,7 @@ class RollingODeform(IntegratedModel):
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
         self.law = RollingLaw.from_arrays(arrays, len(self._materials))
-        self._start = Start.from_arrays(arrays, len(learned))
+        self._start = Start.from_arrays(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.rolling.patterns)
         self.correction = Correction.from_arrays(arrays, self.space.coordinates, len(learned))
         # the body that viewers show is smoother than the one whose corners it rolls over
@@ -81,7 +81,7 @@ class RollingODeform(IntegratedModel):
         material = theta[self._materials]
         field = make_field(self.law, self._support, self._radius, material)
         start = np.zeros(STATE)
-        start[: 2 * MOVING] = self._start.at(theta[None])[0]
+        start[: 2 * MOVING] = self._start.at(push_inputs(self.schema, theta[None]))[0]
 
         def decode(_: Times, states: Floats) -> Floats:
             return self._decoded(states / self._units, material)

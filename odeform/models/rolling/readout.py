@@ -1,4 +1,4 @@
-"""How a rolling body is deformed, from the state of its motion: a linear readout of random features."""
+"""How a rolling body is deformed, from the state of its motion: a small network."""
 
 from dataclasses import dataclass, fields
 
@@ -9,10 +9,14 @@ from odeform.arrays import finite_arrays
 from odeform.mechanics.rolling.dynamics import STATE
 from odeform.types import Arrays
 
-__all__ = ["Readout", "inputs_of"]
+__all__ = ["SIZE", "Readout", "inputs_of"]
 
 NEAR = 0.02  # m above the touch over which a contact that comes is felt
-INPUTS = 10  # besides the material
+HIGHEST = 0.03  # m above the touch from which on heights are alike
+TURNS = np.arange(1, 17)  # how often each wave goes around the body: its mesh has corners
+INPUTS = 7 + 2 * len(TURNS)  # besides the material
+SIZE = 192
+"""Hidden units of each of two layers."""
 
 
 def inputs_of(
@@ -20,39 +24,42 @@ def inputs_of(
 ) -> Float[np.ndarray, "rows inputs"]:
     """What the deformation follows from: depths now and before, how the contact moves, and which side is down.
 
-    States (8, R), the heights in m below which the floor is touched (R,), and the material (R, Q) -> (R, 10 + Q).
+    States (8, R), the heights in m below which the floor is touched (R,), and the material (R, Q) -> (R, 39 + Q).
     """
     assert len(states) == STATE
     _, height, angle, ahead, rising, spin, one, two = states
     above = height - touch
     near = np.exp(-np.maximum(above, 0.0) / NEAR)
-    deep = 100.0 * np.maximum(-above, 0.0)
-    sides = [np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)]
-    moving = [near * rising, near * ahead, near * spin]
-    return np.concatenate([np.stack([deep, one, two, *moving, *sides], axis=1), material], axis=1)
+    depths = [100.0 * np.maximum(-above, 0.0), 50.0 * np.minimum(above, HIGHEST), one, two]
+    sides = np.exp(1j * angle[:, None] * TURNS)
+    own = np.stack([*depths, near * rising, near * ahead, near * spin], axis=1)
+    return np.concatenate([own, sides.real, sides.imag, material], axis=1)
+
+
+def _silu(x: Float[np.ndarray, "rows hidden"]) -> Float[np.ndarray, "rows hidden"]:
+    return 0.5 * x * (1.0 + np.tanh(0.5 * x))
 
 
 @dataclass(frozen=True, eq=False)
 class Readout:
-    """Amplitudes of patterns from inputs (R, I)."""
+    """Amplitudes of patterns from inputs (R, I): three linear layers, with SiLU between them."""
 
     mean: Float[np.ndarray, " inputs"]
     """Of the training inputs."""
     scale: Float[np.ndarray, " inputs"]
     """Their standard deviation."""
-    directions: Float[np.ndarray, "inputs features"]
-    phases: Float[np.ndarray, " features"]
-    weights: Float[np.ndarray, "rows patterns"]
-    """Of the features, the inputs, and a constant."""
-
-    def features(self, inputs: Float[np.ndarray, "rows inputs"]) -> Float[np.ndarray, "rows features"]:
-        """Random Fourier features (Rahimi and Recht 2008), the inputs, and one."""
-        x = (inputs - self.mean) / self.scale
-        return np.concatenate([np.cos(x @ self.directions + self.phases), x, np.ones((len(x), 1))], axis=1)
+    first: Float[np.ndarray, "inputs hidden"]
+    first_bias: Float[np.ndarray, " hidden"]
+    middle: Float[np.ndarray, "hidden hidden"]
+    middle_bias: Float[np.ndarray, " hidden"]
+    last: Float[np.ndarray, "hidden patterns"]
+    last_bias: Float[np.ndarray, " patterns"]
 
     def __call__(self, inputs: Float[np.ndarray, "rows inputs"]) -> Float[np.ndarray, "rows patterns"]:
         """Amplitudes (R, S) in m."""
-        return self.features(inputs) @ self.weights
+        x = ((inputs - self.mean) / self.scale).astype(self.first.dtype)
+        x = _silu(x @ self.first + self.first_bias)
+        return _silu(x @ self.middle + self.middle_bias) @ self.last + self.last_bias
 
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, by name; `from_arrays` reads them."""
@@ -61,9 +68,11 @@ class Readout:
     @classmethod
     def from_arrays(cls, arrays: Arrays, materials: int, patterns: int) -> "Readout":
         """KeyError for a missing array, ValueError unless they are finite and fit each other."""
-        inputs, count = INPUTS + materials, len(arrays["readout.phases"])
-        shapes = {"mean": (inputs,), "scale": (inputs,), "directions": (inputs, count), "phases": (count,)}
-        found = finite_arrays(arrays, "readout.", {**shapes, "weights": (count + inputs + 1, patterns)})
+        inputs, hidden = INPUTS + materials, len(arrays["readout.first_bias"])
+        shapes = {"mean": (inputs,), "scale": (inputs,), "first": (inputs, hidden), "first_bias": (hidden,)}
+        shapes |= {"middle": (hidden, hidden), "middle_bias": (hidden,)}
+        shapes |= {"last": (hidden, patterns), "last_bias": (patterns,)}
+        found = finite_arrays(arrays, "readout.", shapes)
         if not (found["scale"] > 0.0).all():
             raise ValueError("readout.scale: expected positive numbers")
         return cls(**found)

@@ -8,34 +8,58 @@ from jaxtyping import Float
 from odeform.arrays import finite_arrays
 from odeform.mechanics.rolling.dynamics import MOVING
 from odeform.models.contact.kernel import matern
+from odeform.schema import Schema
 from odeform.types import Arrays
 
-__all__ = ["Start"]
+__all__ = ["PUSHES", "Start", "push_inputs"]
+
+PUSHES = ("force", "elevation")
+"""Parameters that act through the push alone."""
+MASS = "mass"
+UNIT = 100.0  # m/s^2
+
+
+def push_inputs(schema: Schema, theta: Float[np.ndarray, "motions parameters"]) -> Float[np.ndarray, "motions inputs"]:
+    """(M, P) in [-1, 1] -> (M, I): the material, and by how much the push accelerates the body ahead and up, in
+    100 m/s^2. The parameters as they are in a scene without force, elevation or mass."""
+    learned = {parameter.name: i for i, parameter in enumerate(schema.learned)}
+    if not {MASS, *PUSHES} <= learned.keys():
+        return theta
+    force, elevation, mass = (schema.learned[learned[n]].denormalise(theta[:, learned[n]]) for n in (*PUSHES, MASS))
+    strength = force / (UNIT * mass)
+    material = [theta[:, i] for name, i in learned.items() if name not in PUSHES]
+    return np.stack([*material, strength * np.cos(elevation), strength * np.sin(elevation)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Position and velocity at one moment; the kernel is Matern 5/2."""
+    """Position and velocity at one moment: linear in the inputs, and a rest; the kernel is Matern 5/2."""
 
-    theta: Float[np.ndarray, "sequences parameters"]
-    """Training parameters, divided by the length scales."""
-    scales: Float[np.ndarray, " parameters"]
+    inputs: Float[np.ndarray, "sequences inputs"]
+    """Of the training motions, divided by the length scales."""
+    scales: Float[np.ndarray, " inputs"]
     weights: Float[np.ndarray, "sequences 6"]
-    mean: Float[np.ndarray, "6"]
+    linear: Float[np.ndarray, "rows 6"]
+    """Of one, and of the inputs."""
 
-    def at(self, theta: Float[np.ndarray, "motions parameters"]) -> Float[np.ndarray, "motions 6"]:
-        """(M, P) in [-1, 1] -> (M, 6): ahead, height (m), angle (rad), and their rates."""
-        return self.mean + matern(theta / self.scales, self.theta) @ self.weights
+    def at(self, inputs: Float[np.ndarray, "motions inputs"]) -> Float[np.ndarray, "motions 6"]:
+        """(M, I) -> (M, 6): ahead, height (m), angle (rad), and their rates."""
+        return self.linear[0] + inputs @ self.linear[1:] + matern(inputs / self.scales, self.inputs) @ self.weights
 
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, by name; `from_arrays` reads them."""
         return {f"start.{field.name}": getattr(self, field.name) for field in fields(self)}
 
     @classmethod
-    def from_arrays(cls, arrays: Arrays, parameters: int) -> "Start":
+    def from_arrays(cls, arrays: Arrays, inputs: int) -> "Start":
         """KeyError for a missing array, ValueError unless they are finite and fit each other."""
-        count, size = len(arrays["start.theta"]), 2 * MOVING
-        shapes = {"theta": (count, parameters), "scales": (parameters,), "weights": (count, size), "mean": (size,)}
+        count, size = len(arrays["start.inputs"]), 2 * MOVING
+        shapes = {
+            "inputs": (count, inputs),
+            "scales": (inputs,),
+            "weights": (count, size),
+            "linear": (1 + inputs, size),
+        }
         found = finite_arrays(arrays, "start.", shapes)
         if not (found["scales"] > 0.0).all():
             raise ValueError("start.scales: expected positive numbers")
