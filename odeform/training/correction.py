@@ -24,9 +24,9 @@ EXPLAINED = 0.05  # share of a part's mean square residual on validation, from w
 def with_correction(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
     """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
-    Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the correction has faded
-    between these two frames, and has a kernel for those before alone: chance landings later on would hide how smooth
-    a push is in the parameters.
+    Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the correction fades from
+    the first of these frames to the last, and its kernel is chosen for those before: chance landings later on would
+    hide how smooth a push is in the parameters.
     """
     if not all(data.observed[split].all() for split in data.observed):
         return checkpoint
@@ -44,10 +44,13 @@ def with_correction(checkpoint: Checkpoint, data: TrainingData, fading: tuple[in
         )
         if not truth["train"].any() and not motion["train"].any():
             continue
+        entries = searched = truth["train"].shape[1]
+        given = None
         if fading is not None:
-            left = np.repeat(_left(fading), truth["train"].shape[1] // len(times))
+            searched, given = entries * (fading[0] + 1) // len(times), 1.0
+            left = np.repeat(_left(fading), entries // len(times))
             truth = {split: motion[split] + left * (of - motion[split]) for split, of in truth.items()}
-        part, explained = _fitted(data.theta, truth, motion, None if fading is None else 1.0)
+        part, explained = _fitted(data.theta, truth, motion, searched, given)
         if explained >= EXPLAINED:
             parts[name] = part
     if not parts:
@@ -70,18 +73,19 @@ def _flat(reduced: Floats, columns: slice) -> Floats:
 
 
 def _fitted(
-    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], given: float | None
+    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], searched: int, given: float | None
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
-    Length scales and ridge are those of the motions themselves: residuals on training do not tell how smooth those of
+    Length scales and ridge are those of the first `searched` entries of the motions themselves: residuals on training do not tell how smooth those of
     other parameters are. The share has the smallest error on validation, relative in each sequence: in small sets one
     hard sequence would decide. It is zero where that gain may be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
     mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
     # inner products are all that the search needs: coordinates in place of entries
-    u, sizes, _ = np.linalg.svd(np.concatenate([truth["train"], truth["val"]]) - mean, full_matrices=False)
+    both = (np.concatenate([truth["train"], truth["val"]]) - mean)[:, :searched]
+    u, sizes, _ = np.linalg.svd(both, full_matrices=False)
     outputs, expected = np.split(u * sizes, [len(known)])
     ridge = search_ridge(known, outputs)[0]  # without validation, where what it predicts is compared with the ODE
 

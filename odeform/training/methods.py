@@ -40,7 +40,7 @@ from odeform.types import Arrays
 __all__ = ["Run", "is_resumable", "train_model"]
 
 WITH_KINKS = SolverSettings("dopri5", tolerance=1e-8, dtype="float64")  # finer ones take thousands of steps at contacts
-RINGING = 0.1  # s after a push over which the correction of a body that rolls fades
+WHOLE, RINGING = 2, 12  # frames after a push, up to which the correction of a body that rolls is whole, and fades
 NARROW = 1e-3  # of a scene's range, by which that of an object is wider than its data
 
 
@@ -156,8 +156,7 @@ def _train_rolling(run: Run) -> Checkpoint:
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
     if "correction" not in run.request.without:
-        ringing = round(RINGING * data.schema.window.rate)
-        checkpoint = with_correction(checkpoint, data, (data.first_free, data.first_free + ringing))
+        checkpoint = with_correction(checkpoint, data, (data.first_free + WHOLE, data.first_free + RINGING))
     checkpoint = with_qualities(checkpoint, data, WITH_KINKS)
     later = later_errors(RollingODeform(checkpoint), data).astype(np.float32)
     return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later})
