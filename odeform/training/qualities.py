@@ -21,6 +21,9 @@ SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
 """Solver error that a quality may add, as a share of the model's own error: in total, and of the deformation alone. A
 tenth adds half a per cent to the total error, three tenths add four per cent to that of the deformation."""
 
+USELESS = 10.0
+"""Times the model's own error: settings with a larger error are never shown."""
+
 
 def _candidates(step: float) -> list[SolverSettings]:
     tolerances = [float(f"{digit}e-{power}") for power in range(2, 8) for digit in (6, 4, 3, 2, 1)]
@@ -33,7 +36,7 @@ def _candidates(step: float) -> list[SolverSettings]:
 def measure_frontier(
     model: ReducedModel, data: TrainingData, reference: SolverSettings = EXACT
 ) -> tuple[tuple[FrontierPoint, ...], tuple[float, float]]:
-    """The non-dominated settings, and the model's own errors in mm, over the validation sequences.
+    """The non-dominated settings that are of use, and the model's own errors in mm, over the validation sequences.
 
     The solver's error is measured against the `reference`, the model's is that of the reference against the data; both
     in total and of the deformation alone, as root mean squares over points, coordinates and time.
@@ -61,7 +64,9 @@ def measure_frontier(
     for quality in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(quality)
         points.append(FrontierPoint(quality, evaluations, *errors_mm(reduced, truth)))
-    return non_dominated(points), errors_mm(truth, data.reduced["val"])
+    own = errors_mm(truth, data.reduced["val"])
+    useful = [point for point in points if point.solver_error_mm <= USELESS * own[0]]
+    return non_dominated(useful or points), own
 
 
 def choose_qualities(

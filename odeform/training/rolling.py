@@ -29,7 +29,7 @@ from odeform.types import Arrays, Floats, Ints, PointCloud
 
 __all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 
-STEPS = 48  # of the fit of the law
+STEPS = 40  # of the fit of the law
 LINEAR = 8  # of them with a law that is linear in the material and has no network
 SHARE = 0.7  # of the budget for the law
 LARGE, SMALL = 0.1, 0.2  # of a motion's largest deformation; how much smaller ones count in the readout
