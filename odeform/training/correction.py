@@ -77,9 +77,10 @@ def _fitted(
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
-    Length scales and ridge are those of the first `searched` entries of the motions themselves: residuals on training do not tell how smooth those of
-    other parameters are. The share has the smallest error on validation, relative in each sequence: in small sets one
-    hard sequence would decide. It is zero where that gain may be chance, as with few validation motions it often is.
+    Length scales and ridge are those of the first `searched` entries of the motions themselves: residuals on training
+    do not tell how smooth those of other parameters are. Unless `given`, the share has the smallest error on
+    validation, relative in each sequence: in small sets one hard sequence would decide. It is zero where that gain may
+    be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
     mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)

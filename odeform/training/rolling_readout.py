@@ -13,7 +13,7 @@ from odeform.types import Floats
 
 __all__ = ["ReadoutRows", "fit_readout"]
 
-EPOCHS, FEWEST, BATCH = 40, 400, 512
+EPOCHS, FEWEST, BATCH = 90, 400, 512
 RATE, WARM, DECAY = 4e-3, 0.1, 1e-3
 
 

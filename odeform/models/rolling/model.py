@@ -33,6 +33,7 @@ FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
 """What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
 later on a corner amplifies what coarser solutions leave."""
 FALLBACK = SolverSettings("rk4", step=1e-3, dtype="float64")
+RISING = 0.04  # s
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -133,24 +134,27 @@ class _Push:
     """The motion during the push: from rest to where the ODE begins, with its velocity there."""
 
     begin: float
-    y: Float[np.ndarray, " y"]
+    pose: Float[np.ndarray, "6"]
     rate: Float[np.ndarray, "6"]
 
-    def at(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s from 0 to `begin` -> (T, 6 + S): cubic in time."""
+    def at(self, times: Times) -> Float[np.ndarray, "times 6"]:
+        """(T,) s from 0 to `begin` -> (T, 6): cubic in time."""
         share = (times / self.begin)[:, None]
-        out = share**2 * (3.0 - 2.0 * share) * self.y
-        out[:, :POSE] += share**2 * (share - 1.0) * self.begin * self.rate
-        return out
+        ramp = share**2 * (3.0 - 2.0 * share) * self.pose
+        return ramp + share**2 * (share - 1.0) * self.begin * self.rate
 
 
 class _Begun(ChangedTrajectory):
-    """A motion that is solved from the end of the push on."""
+    """A motion that is solved from the end of the push on.
+
+    How the push deforms the body does not follow from the motion: it is regressed (`Correction`). What contacts do
+    takes its place in `RISING` seconds.
+    """
 
     def __init__(self, own: Trajectory, begin: float, y: Floats, rate: Floats) -> None:
         """`y` (6 + S,) and the pose's `rate` (6,) per second are those at `begin` seconds."""
         super().__init__(own)
-        self._push = _Push(begin, y, rate)
+        self._push, self._first = _Push(begin, y[:POSE], rate), y
 
     @property
     def last_good(self) -> float:
@@ -161,7 +165,11 @@ class _Begun(ChangedTrajectory):
         """(T,) s -> (T, 6 + S), zero at time 0."""
         times = np.asarray(times, dtype=float)
         push, later = self._push, times > self._push.begin
-        out = push.at(np.minimum(times, push.begin))
+        out = np.zeros((len(times), len(self._first)))
+        out[~later, :POSE] = push.at(times[~later])
         if later.any():
-            out[later] = push.y + self.own.reduced(times[later] - push.begin)
+            after = times[later] - push.begin
+            out[later] = self._first + self.own.reduced(after)
+            risen = np.minimum(after / RISING, 1.0)
+            out[later, POSE:] *= (risen**2 * (3.0 - 2.0 * risen))[:, None]
         return out
