@@ -15,6 +15,7 @@ from odeform.types import Floats, Ints
 __all__ = ["Motions", "fit_law", "law_error_mm"]
 
 STEP = 1.05e-3  # s, at most
+HEIGHTS = 2.5  # times what other errors count: they decide when a landing comes, and how deep it is
 ROBUST = 5.0  # mm; larger errors count by their logarithm: a ball that stops on the wrong facet decides nothing
 EVERY = 3  # frames that are compared
 STEEP = 300.0  # largest derivative that is believed
@@ -56,7 +57,7 @@ def _half_frames(motions: Motions) -> tuple[int, int, float]:
 def _missed(states: Floats, motions: Motions, radius: float) -> tuple[Floats, Floats]:
     """Robust errors of states (T, 8, M) in the compared frames, in units of `ROBUST`, and their derivatives by the
     position: (E, M, 3) each."""
-    scale = 1e3 / ROBUST * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
+    scale = 1e3 / ROBUST * np.array([1.0, HEIGHTS, radius * np.sqrt(2.0 / 3.0)])
     apart = states[::EVERY, :MOVING].swapaxes(1, 2) - motions.moved[::EVERY]
     apart = np.nan_to_num(scale * apart, nan=200.0, posinf=200.0, neginf=-200.0)
     return np.arcsinh(apart), scale / np.sqrt(1.0 + apart**2)
