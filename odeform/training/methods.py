@@ -156,7 +156,8 @@ def _train_rolling(run: Run) -> Checkpoint:
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
     if "correction" not in run.request.without:
-        checkpoint = with_correction(checkpoint, data, (data.first_free + WHOLE, data.first_free + RINGING))
+        end = min(data.first_free + RINGING, len(data.times) - 1)
+        checkpoint = with_correction(checkpoint, data, (data.first_free + WHOLE, end))
     checkpoint = with_qualities(checkpoint, data, WITH_KINKS)
     later = later_errors(RollingODeform(checkpoint), data).astype(np.float32)
     return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later})

@@ -64,7 +64,8 @@ def fit_rolling_body(
         law = fit_law(law, _free(law, request.without, linear), support, radius, motions["train"], count, report, go_on)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
-    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed)
+    share = min(steps / STEPS, 1.0)
+    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, share)
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "lowest_m": _lowest(data)}

@@ -27,8 +27,8 @@ class ReadoutRows:
     weights: Float[np.ndarray, " rows"]
 
 
-def fit_readout(rows: ReadoutRows, seed: int) -> Readout:
-    """The network after a training whose length follows from the number of rows."""
+def fit_readout(rows: ReadoutRows, seed: int, share: float = 1.0) -> Readout:
+    """The network after a training whose length follows from the number of rows: `share` of it."""
     mean, scale = rows.inputs.mean(axis=0), np.maximum(rows.inputs.std(axis=0), 1e-6)
     size = max(float(rows.patterns.std()), 1e-12)
     inputs, patterns, weights = (
@@ -39,11 +39,11 @@ def fit_readout(rows: ReadoutRows, seed: int) -> Readout:
     layers = [nn.Linear(inputs.shape[1], SIZE), nn.Linear(SIZE, SIZE), nn.Linear(SIZE, patterns.shape[1])]
     network = nn.Sequential(layers[0], nn.SiLU(), layers[1], nn.SiLU(), layers[2])
     optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    steps = max(EPOCHS * len(inputs) // BATCH, FEWEST)
+    steps = max(round(share * EPOCHS * len(inputs) / BATCH), FEWEST)
     with small_batches():
         for step in range(steps):
-            share = step / steps
-            optimiser.param_groups[0]["lr"] = RATE * min(1.0, (share + 1e-3) / WARM) * cosine_decay(share)
+            done = step / steps
+            optimiser.param_groups[0]["lr"] = RATE * min(1.0, (done + 1e-3) / WARM) * cosine_decay(done)
             some = torch.randint(len(inputs), (BATCH,))
             missed = (network(inputs[some]) - patterns[some]).square().sum(dim=1)
             optimiser.zero_grad()
