@@ -1,5 +1,6 @@
 """The regression of what a trained ODE leaves unexplained, kept where it explains validation motions."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -73,7 +74,11 @@ def _flat(reduced: Floats, columns: slice) -> Floats:
 
 
 def _fitted(
-    theta: dict[str, Floats], truth: dict[str, Floats], motion: dict[str, Floats], searched: int, given: float | None
+    theta: Mapping[str, Floats],
+    truth: Mapping[str, Floats],
+    motion: Mapping[str, Floats],
+    searched: int,
+    given: float | None,
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 

@@ -78,74 +78,82 @@ def _advance(changes: Floats, here: Floats, linear: _Linear, step: float) -> Non
     changes[rows, MOVING:] += Single(step) * pushed
 
 
-def _linearised(dynamics: RollingDynamics, at: Contacts, free: Ints) -> _Linear:
-    """Of the accelerations ahead, up and turning (3,), by the chain rule: by what acts on them directly, first."""
-    rows, law = at.rows, dynamics.law
-    fast, up, spin = at.moving
+def _directly(dynamics: RollingDynamics, at: Contacts) -> dict[str, Floats]:
+    """How the accelerations ahead, up and turning change, (3, C) each, with what acts on them without the network: the
+    depth, the speed up and of sliding, the spin, the slope of the settled place, and the coefficients by name."""
+    rows, (_, up, spin) = at.rows, at.moving
     _, damping, friction, rolling, slow, felt = at.strong.T
     lever, inertia, power = dynamics.lever[rows], dynamics.inertia[rows], dynamics.power[rows]
-    faster = dynamics.damping_power[rows]
-    pushes, logs = (at.damped > 0.0) * 1.0, np.log(at.depth)
-    strength = damping * at.depth**faster
+    faster, logs = dynamics.damping_power[rows], np.log(at.depth)
+    levers = at.brake + felt * at.corner_slopes + at.settled_slopes
+    braked = -1.0 * (at.damped > 0.0) * at.spring * damping * at.depth**faster  # the push's derivative by the speed up
+    slip = -friction * at.push * (1.0 - at.grip**2) / slow
+    nothing = np.zeros(len(rows))
 
     def of(push: Floats, drag: Floats | float = 0.0, torque: Floats | float = 0.0) -> Floats:
         """(3, C) from the derivatives of the push, and what else the drag and the torque depend on."""
         ahead = drag - friction * at.grip * push
-        levers = at.brake + felt * at.corner_slopes + at.settled_slopes
         return np.stack([ahead, push, (torque - lever * ahead - levers * push) / inertia])
 
-    nothing = np.zeros(len(rows))
-    slip = -friction * at.push * (1.0 - at.grip**2) / slow
-    by_depth = of((power * at.push - pushes * at.spring * strength * faster * up) / at.depth)
-    by_up = of(-pushes * at.spring * strength)
-    by_sliding = of(nothing, slip)
-    by_spin = of(nothing, torque=-at.push * rolling * (1.0 - np.tanh(spin / SPIN) ** 2) / SPIN)
-    by_slope = of(nothing, torque=-at.push)
-    by_exponent = {
+    log_power = dynamics.logs["power"][rows]
+    steeper = power * logs * ((log_power > POWERS[0]) & (log_power < POWERS[1]))
+    return {
+        "depth": of((power * at.push + braked * faster * up) / at.depth),
+        "up": of(braked),
+        "sliding": of(nothing, slip),
+        "spin": of(nothing, torque=-at.push * rolling * (1.0 - np.tanh(spin / SPIN) ** 2) / SPIN),
+        "slope": of(nothing, torque=-at.push),
         "stiffness": of(at.push),
-        "damping": of(-pushes * at.spring * strength * up),
+        "power": of(at.push * steeper),
+        "damping": of(braked * up),
+        "damping_power": of(braked * up * logs * faster * (1.0 - faster)),
         "friction": of(nothing, at.drag),
-        "rolling": of(nothing, torque=-at.push * at.brake),
         "grip": of(nothing, -slip * at.sliding),
+        "rolling": of(nothing, torque=-at.push * at.brake),
+        "inertia": np.stack([nothing, nothing, -at.turn]),
         "corners": of(nothing, torque=-at.push * felt * at.corner_slopes),
+        "radius": 0.1 * dynamics.radius * of(nothing, torque=-at.drag),
     }
+
+
+def _linearised(dynamics: RollingDynamics, at: Contacts, free: Ints) -> _Linear:
+    """The accelerations by the state and by the law, by the chain rule."""
+    rows, law, by = at.rows, dynamics.law, _directly(dynamics, at)
+    fast, _, spin = at.moving
     inside = (at.exponents > EXPONENTS[0]) & (at.exponents < EXPONENTS[1])
-    adjusted = np.stack([by_exponent[name] for name in ADJUSTED], axis=2) * inside
+    adjusted = np.stack([by[name] for name in ADJUSTED], axis=2) * inside
 
     # through the network: of what it is told, and of its weights
     behind = (adjusted @ law.last.T) * (1.0 - at.hidden**2)
     told = behind @ law.first[:INPUTS].T / np.array([DEEP, UPWARD, 1.0, AHEAD])
-    by_depth = by_depth + told[..., 0]
-    by_up = by_up + told[..., 1]
-    by_sliding = by_sliding + told[..., 2] * np.sign(at.sliding)
-    by_ahead = told[..., 3] * np.sign(fast)
+    by_sliding = by["sliding"] + told[..., 2] * np.sign(at.sliding)
 
     deep = (at.depth > DEPTHS[0]) & (at.depth < DEPTHS[1])
-    by_gap, share = 100.0 * deep * by_depth, dynamics.share[rows]
+    by_gap, share = 100.0 * deep * (by["depth"] + told[..., 0]), dynamics.share[rows]
     settled = at.reached * dynamics.settled[rows]
+    felt = at.strong[:, ADJUSTED.index("corners")]
     bent = felt * dynamics.support.bends(at.angle) + ((at.apart**2 - 1.0) * settled).sum(axis=1) / REACHING**2
-    by_angle = by_gap * (at.settled_slopes + share * at.corner_slopes) + by_slope * bent
-    by_state = [-by_gap, by_angle, by_sliding + by_ahead, by_up, by_spin - lever * by_sliding]
+    by_state = [
+        -by_gap,
+        by_gap * (at.settled_slopes + share * at.corner_slopes) + by["slope"] * bent,
+        by_sliding + told[..., 3] * np.sign(fast),
+        by["up"] + told[..., 1],
+        by["spin"] - dynamics.lever[rows] * by_sliding,
+    ]
 
-    log_power, log_share = dynamics.logs["power"][rows], dynamics.logs["corners"][rows]
-    by_name = dict(zip(ADJUSTED, np.moveaxis(adjusted, 2, 0), strict=True))
-    by_name["power"] = of(at.push * logs * power) * ((log_power > POWERS[0]) & (log_power < POWERS[1]))
-    by_name["damping_power"] = of(-pushes * at.spring * strength * up * logs * faster * (1.0 - faster))
-    by_name["inertia"] = np.stack([nothing, nothing, -at.turn])
-    by_name["corners"] = by_name["corners"] + by_gap * share * at.corners * (
-        (log_share > SHARES[0]) & (log_share < SHARES[1])
-    )
-    by_name["touch"] = 1e-3 * by_gap
-    by_name["radius"] = 0.1 * dynamics.radius * (of(nothing, torque=-at.drag) - spin * by_sliding)
+    log_share = dynamics.logs["corners"][rows]
+    higher = share * at.corners * ((log_share > SHARES[0]) & (log_share < SHARES[1]))
+    by |= dict(zip(ADJUSTED, np.moveaxis(adjusted, 2, 0), strict=True))
+    by |= {"corners": by["corners"] + by_gap * higher, "touch": 1e-3 * by_gap}
+    by["radius"] = by["radius"] - 0.1 * dynamics.radius * spin * by_sliding
 
     material = dynamics.material[rows]
     linear = np.concatenate([np.ones((len(rows), 1)), material], axis=1)
-    places = 1e-3 * (by_gap[..., None] * at.reached - by_slope[..., None] * at.apart * at.reached / REACHING)
-    inputs = np.concatenate([at.inputs, material], axis=1)
+    places = 1e-3 * (by_gap[..., None] * at.reached - by["slope"][..., None] * at.apart * at.reached / REACHING)
     parts = [
-        _products(np.stack([by_name[name] for name in NAMES], axis=2), material_terms(material)),
+        _products(np.stack([by[name] for name in NAMES], axis=2), material_terms(material)),
         _products(places, linear),
-        _products(inputs, behind),
+        _products(np.concatenate([at.inputs, material], axis=1), behind),
         behind,
         _products(at.hidden, adjusted),
     ]

@@ -22,12 +22,12 @@ UNIT = 100.0  # m/s^2
 def push_inputs(schema: Schema, theta: Float[np.ndarray, "motions parameters"]) -> Float[np.ndarray, "motions inputs"]:
     """(M, P) in [-1, 1] -> (M, I): the material, and by how much the push accelerates the body ahead and up, in
     100 m/s^2. The parameters as they are in a scene without force, elevation or mass."""
-    learned = {parameter.name: i for i, parameter in enumerate(schema.learned)}
-    if not {MASS, *PUSHES} <= learned.keys():
+    if not {MASS, *PUSHES} <= {p.name for p in schema.learned}:
         return theta
-    force, elevation, mass = (schema.learned[learned[n]].denormalise(theta[:, learned[n]]) for n in (*PUSHES, MASS))
+    own = {p.name: np.array([p.denormalise(float(u)) for u in theta[:, i]]) for i, p in enumerate(schema.learned)}
+    force, elevation, mass = (own[name] for name in (*PUSHES, MASS))
     strength = force / (UNIT * mass)
-    material = [theta[:, i] for name, i in learned.items() if name not in PUSHES]
+    material = [theta[:, i] for i, p in enumerate(schema.learned) if p.name not in PUSHES]
     return np.stack([*material, strength * np.cos(elevation), strength * np.sin(elevation)], axis=1)
 
 
