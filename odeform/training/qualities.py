@@ -15,7 +15,7 @@ from odeform.motion.reduced_space import POSE, motion_rmse
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats
 
-__all__ = ["choose_qualities", "measure_frontier", "with_qualities"]
+__all__ = ["USELESS", "choose_qualities", "measure_frontier", "with_qualities"]
 
 SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
 """Solver error that a quality may add, as a share of the model's own error: in total, and of the deformation alone. A

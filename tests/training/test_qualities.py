@@ -12,7 +12,7 @@ from odeform.models.frontier import FrontierPoint
 from odeform.models.odeform.model import ODeform
 from odeform.solver.integrate import SolverSettings
 from odeform.training import qualities
-from odeform.training.qualities import choose_qualities, measure_frontier
+from odeform.training.qualities import USELESS, choose_qualities, measure_frontier
 
 Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
 
@@ -32,6 +32,11 @@ def test_a_frontier_trades_work_for_accuracy(measured: Measured, predictors: dic
     assert frontier[-1].deformation_error_mm < 1e-2 * deformation_mm
     motion = predictors["odeform"].solve(quality=frontier[0].quality)
     assert motion.stats.evaluations == pytest.approx(work[0], rel=0.3)
+
+
+def test_what_is_far_worse_than_the_model_is_left_out(measured: Measured) -> None:
+    frontier, (own, _) = measured
+    assert all(point.solver_error_mm <= USELESS * own for point in frontier)
 
 
 def test_qualities_are_points_of_it(measured: Measured) -> None:

@@ -14,6 +14,7 @@ from odeform.mechanics.rolling.law import first_law
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.base import Predictor
 from odeform.models.rolling.model import RollingODeform
+from odeform.models.rolling.start import push_inputs
 from odeform.motion.reduced_space import POSE, motion_rmse
 from odeform.training.request import TrainRequest
 from odeform.training.rolling import fit_rolling_body, motions_of
@@ -52,6 +53,7 @@ def test_a_dent_that_stays_below_needs_few_patterns(data: TrainingData, dataset:
     assert data.reduced["val"].shape[2] == data.space.coordinates == POSE + rolling.patterns
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_the_true_law_explains_the_motions_and_a_fit_approaches_it(data: TrainingData) -> None:
     support, motions = support_of(BALL.points, AXIS), motions_of(data, "train", AXIS, [0])
     start, true = first_law(1, 0), true_law()
@@ -93,7 +95,7 @@ def test_what_is_shown_does_not_depend_on_what_was_asked_before(predictor: Predi
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damaged", ["law.terms", "start.weights", "readout.weights", "rolling.harmonics"])
+@pytest.mark.parametrize("damaged", ["law.terms", "start.weights", "readout.first", "rolling.harmonics"])
 def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> None:
     arrays = {**predictor.checkpoint.arrays, damaged: np.zeros(2)}
     with pytest.raises(InputError, match=damaged):
@@ -101,6 +103,29 @@ def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> 
     missing = replace(predictor.checkpoint, arrays={name: a for name, a in arrays.items() if name != damaged})
     with pytest.raises(InputError, match="missing or wrong"):
         RollingODeform(missing)
+
+
+@pytest.mark.slow
+def test_later_motions_are_those_of_the_ode_alone(predictor: Predictor) -> None:
+    assert isinstance(predictor, RollingODeform)
+    assert predictor.correction is not None
+    end, theta = predictor.correction.stop, np.array([0.2, -0.3, 0.5])
+    assert 0.1 < end < 0.5 * predictor.schema.window.stop
+    evaluated, quality = predictor.evaluate_basis(predictor.rest, 0.0), predictor.qualities["reference"]
+    corrected = predictor.trajectory(theta, evaluated, quality, 1.0)
+    alone = predictor.integrate(theta, evaluated, quality, 1.0)
+    later, pushed = np.linspace(end, 1.0, 50), np.array([0.01, 0.02, 0.05])
+    assert np.allclose(corrected.reduced(later), alone.reduced(later), atol=1e-9)
+    assert np.abs(corrected.reduced(pushed) - alone.reduced(pushed)).max() > 1e-4
+
+
+def test_pushes_are_known_by_how_they_accelerate(data: TrainingData) -> None:
+    schema, theta = data.schema, np.array([[0.3, 0.5, -0.2]])
+    mass, force, elevation = (p.denormalise(float(u)) for p, u in zip(schema.learned, theta[0], strict=True))
+    ahead, up = 0.01 * force / mass * np.array([np.cos(elevation), np.sin(elevation)])
+    assert push_inputs(schema, theta)[0] == pytest.approx([0.3, ahead, up])
+    other = replace(schema, parameters=schema.parameters[:2])
+    assert np.array_equal(push_inputs(other, theta[:, :2]), theta[:, :2])
 
 
 def test_data_of_other_motions_are_refused(data: TrainingData, tmp_path: Path) -> None:

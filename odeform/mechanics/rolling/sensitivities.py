@@ -161,7 +161,7 @@ def _linearised(dynamics: RollingDynamics, at: Contacts, free: Ints) -> _Linear:
     return _Linear(rows, np.stack(by_state, axis=2).astype(Single).swapaxes(0, 1), by_law)
 
 
-def _products(left: Float[np.ndarray, "*three contacts a"], right: Float[np.ndarray, "*three contacts b"]) -> Floats:
+def _products(left: Float[np.ndarray, "*left contacts a"], right: Float[np.ndarray, "*right contacts b"]) -> Floats:
     """(3, C, A B) all products of two, one of which has the axis of the accelerations."""
     out = left[..., :, None] * right[..., None, :]
     return out.reshape(*out.shape[:2], out.shape[2] * out.shape[3])
