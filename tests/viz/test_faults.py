@@ -128,6 +128,7 @@ def test_a_full_disk_is_one_line_and_the_page_goes_on(
     else:  # in memory, so that it needs no disk
         client.click("Simulate this")
         assert client.until(lambda: len(app.columns.all) == 2, 240.0)
+        assert client.until(lambda: client.controls["Simulate this"].visible)
     client.set("mass (kg)", 0.9)
     client.set("time (s)", 0.4)
     assert client.until(lambda: _shown(app) == (0.9, 0.4) and app.presenter.settled)
