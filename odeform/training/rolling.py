@@ -22,6 +22,7 @@ from odeform.models.rolling.start import PUSHES, Start, push_inputs
 from odeform.motion.body import watched_body
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.training.continuation import HELD_OUT
+from odeform.training.pruning import LARGE
 from odeform.training.request import TrainRequest
 from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
 from odeform.training.rolling_readout import ReadoutRows, fit_readout
@@ -32,7 +33,7 @@ __all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 STEPS = 40  # of the fit of the law
 LINEAR = 8  # of them with a law that is linear in the material and has no network
 SHARE = 0.7  # of the budget for the law
-LARGE, SMALL = 0.1, 0.2  # of a motion's largest deformation; how much smaller ones count in the readout
+SMALL = 0.2  # how much deformations that are not large count in the training of the network
 LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
 CORNERS, UNFELT = list(COEFFICIENTS).index("corners"), -6.0  # the coefficient, and a value at which it does nothing
@@ -156,7 +157,7 @@ def _free(law: RollingLaw, without: Sequence[str], linear: bool) -> Ints:
 
 
 def _rows(data: TrainingData, law: RollingLaw, support: Support, radius: float, motions: Motions) -> ReadoutRows:
-    """Motions under the law, so that a readout learns what the law is wrong about."""
+    """Those of motions under the law, so that what is read out of them knows what the law is wrong about."""
     states = roll_out(law, support, radius, motions)
     count = len(states)
     flat = states.transpose(1, 2, 0).reshape(STATE, -1)

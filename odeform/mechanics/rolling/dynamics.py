@@ -159,9 +159,28 @@ class RollingDynamics:
         brake = rolling * np.tanh(spin / SPIN)
         torque = -drag * lever - push * (brake + felt * corner_slopes + settled_slopes)
         return Contacts(
-            rows, angle, moving, corners, corner_slopes, settled_slopes, reached, apart, depth, sliding, inputs, hidden,
-            exponents, strong, spring, damped, grip, brake, push, drag, torque / self.inertia[rows],
-        )  # fmt: skip
+            rows=rows,
+            angle=angle,
+            moving=moving,
+            corners=corners,
+            corner_slopes=corner_slopes,
+            settled_slopes=settled_slopes,
+            reached=reached,
+            apart=apart,
+            depth=depth,
+            sliding=sliding,
+            inputs=inputs,
+            hidden=hidden,
+            exponents=exponents,
+            strong=strong,
+            spring=spring,
+            damped=damped,
+            grip=grip,
+            brake=brake,
+            push=push,
+            drag=drag,
+            turn=torque / self.inertia[rows],
+        )
 
     def roll_out(self, start: Float[np.ndarray, "states motions"], steps: int, count: int, step: float) -> Floats:
         """(T, 8, M) from states (8, M): at the start and after each `steps` midpoint steps of `step` s."""
