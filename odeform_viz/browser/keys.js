@@ -6,6 +6,7 @@
 const TYPED = "input:not([type=checkbox]), textarea, select, [contenteditable=true]";
 const SLIDER_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Home", "End", "PageUp", "PageDown"];
 const CLICK_KEYS = [" ", "Enter"];
+const CONTROLS = "button, input[type=checkbox], [role=tab]";
 
 document.body.addEventListener("keydown", (event) => {
   const on = (selector) => event.target === document.activeElement && event.target.closest(selector) !== null;
@@ -21,10 +22,16 @@ document.documentElement.addEventListener("keydown", (event) => {
   if (event.key === "ArrowLeft" || event.key === "ArrowRight") event.stopPropagation();
 });
 
-// a control that the mouse has left focused does not take Space or Enter
+// a control that the mouse has pressed does not take Space or Enter, also before it loses the focus: a page that is busy
+// lets go late, and the browser counts a key of any kind as the keyboard's focus (:focus-visible) until then
+let pressed = null;
+document.addEventListener("pointerdown", (event) => {
+  pressed = event.target.closest(CONTROLS);
+}, true);
 document.addEventListener("keydown", (event) => {
-  const control = event.target.closest("button, input[type=checkbox], [role=tab]");
-  if (control && CLICK_KEYS.includes(event.key) && !control.matches(":focus-visible")) control.blur();
+  if (event.key === "Tab") pressed = null;
+  const control = event.target.closest(CONTROLS);
+  if (control && control === pressed && CLICK_KEYS.includes(event.key)) control.blur();
 }, true);
 
 const release = () => setTimeout(() => document.activeElement && document.activeElement.blur(), 0);

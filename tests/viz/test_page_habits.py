@@ -130,6 +130,18 @@ def test_space_plays_and_arrows_step_also_after_a_click(dark: Tab) -> None:
     assert dark.errors == []
 
 
+def test_a_button_that_the_mouse_holds_does_not_take_space(dark: Tab) -> None:
+    page, clock = dark.page, dark.app.clock
+    clock.pause()
+    dark.button("next").hover()
+    page.mouse.down()
+    page.keyboard.press("ArrowRight")  # from now on the button has the keyboard's focus for the browser
+    page.keyboard.press("Space")
+    assert until(lambda: clock.playing)
+    page.mouse.up()
+    clock.pause()
+
+
 def test_an_upload_is_not_called_successful_before_it_is_read(dark: Tab, tmp_path: Path) -> None:
     broken = tmp_path / "broken.ply"
     broken.write_text("ply\n")
