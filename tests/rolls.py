@@ -1,5 +1,7 @@
-"""A data set of a ball that is thrown and rolls, by a known law of contact, with a dent where it touches the floor."""
+"""Data sets of a ball that is thrown and rolls, or falls straight, by a known law of contact, with a dent where it
+touches the floor."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -61,24 +63,65 @@ def motion(given: dict[str, float]) -> MotionSequence:
     states = dynamics.roll_out(start[:, None], SUBSTEPS, count, 0.5 / RATE / SUBSTEPS)[1::2, :, 0]
     free = start[:3] - 0.5 / RATE * start[3:6] - [0.0, 0.5 * GRAVITY * (0.5 / RATE) ** 2, 0.0]
     moved = np.concatenate([np.outer((times[:4] / times[3]) ** 2, free), states[:, :3]])
+    return recorded(times, moved, given)
+
+
+def recorded(times: Floats, moved: Floats, given: dict[str, float]) -> MotionSequence:
+    """What is seen of a ball that is (T, 3) ahead, above where it would touch the floor (m), and turned (rad)."""
     depth = np.maximum(1e-3 - moved[:, 1], 0.0) * (times > 0.0)
     turn = rotation_from_vector(moved[:, 2:3] * AXIS)
     turned = BALL.points @ turn.swapaxes(1, 2)
     near = np.exp(4.0 * (-turned[..., 2] / RADIUS - 1.0))
-    turned[..., 2] += 2.0 * depth[:, None] * near
-    vertices = turned + moved[:, None, :2] @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) + [0.0, 0.0, RADIUS]
     weights = surface_weights(BALL)
+    turned[..., 2] += 2.0 * depth[:, None] * (near - (near @ weights)[:, None])  # the law is that of the mass centre
+    vertices = turned + moved[:, None, :2] @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) + [0.0, 0.0, RADIUS]
     return MotionSequence(times, vertices.astype(np.float32), BALL.faces, weights, dict(given))
 
 
+FALL = Schema(
+    scene="falls",
+    parameters=(Parameter("mass", "kg", 0.5, 1.0, 0.7, scale="log"),),
+    window=Window(0.0, 0.8, RATE),
+)
+HEIGHT = 0.2  # m
+
+
+def fall(given: dict[str, float]) -> MotionSequence:
+    """All frames of a ball that falls from rest under the law of `motion`, but bounces more."""
+    times = np.arange(round(FALL.window.stop * RATE) + 1) / RATE
+    law, material = true_law(), np.array([[FALL.parameters[0].normalise(given["mass"])]])
+    terms = law.terms.copy()
+    terms[2, 0] -= 1.5
+    dynamics = RollingDynamics(replace(law, terms=terms), support_of(BALL.points, AXIS), RADIUS, material)
+    start = np.zeros((STATE, 1))
+    start[1] = HEIGHT
+    moved = dynamics.roll_out(start, 4 * SUBSTEPS, len(times) - 1, 0.25 / RATE / SUBSTEPS)[:, :3, 0]
+    moved[:, [0, 2]] = 0.0
+    return recorded(times, moved, given)
+
+
 def rolls(count: int = 60, seed: int = 0) -> Dataset:
-    """`count` sequences, in memory."""
+    """`count` sequences of balls that are pushed, in memory."""
+    return _dataset(SCHEMA, motion, count, seed, {"pulse_s": PULSE})
+
+
+def falls(count: int = 40, seed: int = 0) -> Dataset:
+    """`count` sequences of balls that fall, in memory."""
+    return _dataset(FALL, fall, count, seed, {})
+
+
+def _dataset(
+    schema: Schema,
+    made: Callable[[dict[str, float]], MotionSequence],
+    count: int,
+    seed: int,
+    fixed: dict[str, float],
+) -> Dataset:
     rng, held, entries = np.random.default_rng(seed), {}, []
     splits = assign_splits_in_blocks(count, 0, count)
     for index in range(count):
-        given = {p.name: p.denormalise(float(rng.uniform(-1.0, 1.0))) for p in SCHEMA.parameters}
-        entry = Entry(f"rolls_{index:05d}", splits[index], given, sha256=f"rolls{index}")
-        held[entry.name] = replace(motion(given), name=entry.name)
+        given = {p.name: p.denormalise(float(rng.uniform(-1.0, 1.0))) for p in schema.parameters}
+        entry = Entry(f"{schema.scene}_{index:05d}", splits[index], given, sha256=f"{schema.scene}{index}")
+        held[entry.name] = replace(made(given), name=entry.name)
         entries.append(entry)
-    fixed = {"pulse_s": PULSE}
-    return Dataset(Path("rolls"), SCHEMA, tuple(entries), lambda entry: held[entry.name], fixed=fixed)
+    return Dataset(Path(schema.scene), schema, tuple(entries), lambda entry: held[entry.name], fixed=fixed)

@@ -35,8 +35,8 @@ FINAL = (19, 20)
 """The last frame of pushed objects: what `pe-gnn` predicts, and what the other models have there."""
 IMPACT = (30, 89)
 """Frames of the drop from just before the first contact to after the second; every 3rd, 5th and 8th ends beyond."""
-OURS = {DROP: "odeform", "kick": "odeform-rolling"}
-"""The model of each scene of one ball whose seeds, ablations and learning curve are shown."""
+OURS, LATENT = "odeform-rolling", "odeform"
+"""The model of the balls whose seeds, ablations and learning curve are shown; and the latent ODE of the paper."""
 SEEDS = (0, 1, 2)
 """Seeds of `OURS`. The best baselines are deterministic."""
 UNTIL, AHEAD = (40, 70), 10
@@ -49,15 +49,17 @@ SCORED_PUSHES = {"pe-gnn": (FINAL,), **dict.fromkeys(("odeform", *SOLVED), (FRAM
 FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253), FORCE: (25, 50, 100)}
 """Training sequences of the learning curve, of each object: about an eighth, a quarter and a half of all."""
 ABLATED = {
-    DROP: (
+    (OURS, DROP): ((), ("correction",), ("network",)),
+    (OURS, "kick"): ((), ("correction",), ("network",), ("corners",)),
+    (LATENT, DROP): (
         (),
         ("correction",),
         *((*parts, "correction") for parts in (("ode",), ("clock",), ("parameters",), ("clock", "parameters"))),
         ("random-features", "correction"),
     ),
-    "kick": ((), ("correction",), ("network",), ("corners",)),
 }
-"""Parts that ablations of `OURS` leave out. On the drop, the regression of what is left would hide what others give."""
+"""Parts that ablations leave out, by model and scene. Of the latent ODE, the regression of what is left would hide what
+other parts give."""
 MINUTES = {DROP: 4, "kick": 12}
 """About what the budget of each scene took on an idle core when it was set."""
 PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 8400}
@@ -66,7 +68,9 @@ STEPS = {"direct": 2000, "node": 900, "rnn": 1400, "occupancy-flow": 590, "odefo
 ODEFORM_STEPS = {FRAMES[DROP][1]: 330, UNTIL[0]: 900, UNTIL[1]: 690}
 """Steps of `odeform` on the drop by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials
 and random features included. The time of a step of the per-point baselines (`STEPS`) does not depend on the frames."""
-KICK_STEPS = {"odeform-rolling": 40, "odeform": 3000, **{model: 3 * steps for model, steps in STEPS.items()}}
+ROLLING_STEPS = {DROP: 60, "kick": 40}
+"""Steps of `odeform-rolling`. They took 3 to 7 minutes on one core."""
+KICK_STEPS = {"odeform": 3000, **{model: 3 * steps for model, steps in STEPS.items()}}
 """Steps on the kick, with three times the time of the drop."""
 SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}
 """Steps of `odeform` on every 3rd, 5th or 8th frame of the drop: a step then takes more sequences."""
@@ -80,7 +84,7 @@ def plan(share: float = 1.0) -> dict[str, list[Run]]:
         + [_pushed(model) for model in ("odeform", *BASELINES, "pe-gnn")],
         "III": [*_extrapolation(), *(_pushed(model, PUSH[0]) for model in ("odeform", *BASELINES))],
         "IV": list(_interpolation()),
-        "ablations": [replace(run, without=parts) for run in _seeds() for parts in ABLATED[run.scene]],
+        "ablations": [replace(run, without=parts) for run in _ablated() for parts in ABLATED[run.model, run.scene]],
         "learning curve": list(_curve()),
     }
     return {
@@ -92,6 +96,8 @@ def plan(share: float = 1.0) -> dict[str, list[Run]]:
 def _steps(model: str, scene: str, frames: int, every: int = 1) -> int | None:
     if model in SOLVED:
         return None
+    if model == OURS:
+        return ROLLING_STEPS[scene]
     if scene == "kick":
         return KICK_STEPS[model]
     if model != "odeform":
@@ -118,13 +124,17 @@ def _each_object() -> Iterable[Run]:
 
 def _unseen(scene: str) -> Iterable[Run]:
     """Table II: unseen parameters."""
-    yield from (_whole(OURS[scene], scene, seed) for seed in SEEDS)
-    yield from (_whole(model, scene) for model in ("odeform", *BASELINES, "odeform-per-point"))
+    yield from (_whole(OURS, scene, seed) for seed in SEEDS)
+    yield from (_whole(model, scene) for model in (LATENT, *BASELINES, "odeform-per-point"))
 
 
 def _seeds() -> list[Run]:
     """`OURS` on all frames of the scenes of one ball, with all seeds."""
-    return [_whole(OURS[scene], scene, seed) for scene in reversed(BALLS) for seed in SEEDS]
+    return [_whole(OURS, scene, seed) for scene in reversed(BALLS) for seed in SEEDS]
+
+
+def _ablated() -> list[Run]:
+    return [*_seeds(), _whole(LATENT, DROP)]
 
 
 def _curve() -> Iterable[Run]:
@@ -138,7 +148,7 @@ def _curve() -> Iterable[Run]:
 def _extrapolation() -> Iterable[Run]:
     """Table III: frames after the trained ones."""
     for until in UNTIL:
-        for model in ("odeform", *BASELINES):
+        for model in (OURS, LATENT, *BASELINES):
             yield Run(model, DROP, ((until, until + AHEAD),), _steps(model, DROP, until), until=until)
 
 
@@ -153,8 +163,8 @@ def _interpolation() -> Iterable[Run]:
         for every in INTERVALS:
             yield Run(model, DROP, (IMPACT,), _steps(model, DROP, FRAMES[DROP][1], every), every=every, stagger=stagger)
 
-    for model in ("odeform", *BASELINES):
+    for model in (OURS, LATENT, *BASELINES):
         yield _whole(model, DROP)
         yield from subsampled(model, stagger=True)
-    for model in ("odeform", "pod-rbf", "occupancy-flow"):
+    for model in (OURS, LATENT, "pod-rbf", "occupancy-flow"):
         yield from subsampled(model, stagger=False)

@@ -4,28 +4,29 @@ from collections.abc import Sequence
 from typing import Any
 
 from odeform.tables.cells import Runs, models, paragraph, scored_rows, scores_of, table
-from odeform.tables.plan import ABLATED, BALLS, DROP, FEWER, FRAMES, OURS
+from odeform.tables.plan import ABLATED, FEWER, FRAMES
 
 __all__ = ["ablations", "learning_curve"]
 
 PAIR = ("RMSE", "deformation, %")
 LABELS = {
+    "correction": "the regression of what is left",
     "ode": "the ODE: states stay as they start",
     "clock": "the clock of the decoders",
     "parameters": "the parameters of the decoders",
     "random-features": "random features",
     "network": "the network of the contact law",
     "corners": "the corners of the mesh, and the place that it rested on",
-    "correction": "the regression of what is left",
 }
 
 
 def ablations(runs: Runs) -> list[str]:
-    """Rows by what was left out, columns by scene."""
-    head = ["without", *(f"{scene}, {unit}" for scene in BALLS for unit in PAIR)]
-    all_parts = dict.fromkeys(parts for scene in BALLS for parts in ABLATED[scene])
+    """Rows by what was left out, columns by model and scene."""
+    head = ["without", *(f"{model} on {scene}, {unit}" for model, scene in ABLATED for unit in PAIR)]
+    all_parts = dict.fromkeys(parts for of in ABLATED.values() for parts in of)
     scores = {
-        _label(parts): [cell for scene in BALLS for cell in _pair(runs, scene, without=parts)] for parts in all_parts
+        _label(parts): [cell for model, scene in ABLATED for cell in _pair(runs, scene, model=model, without=parts)]
+        for parts in all_parts
     }
     if not any(any(row) for row in scores.values()):
         return []
@@ -33,10 +34,10 @@ def ablations(runs: Runs) -> list[str]:
         "## Ablations",
         "",
         *paragraph(
-            f"`{OURS[DROP]}` on the drop and `{OURS['kick']}` on the kick, without some of their parts, trained again",
-            "with the same steps (`--without`). A dash was not run, or is a part that only the other model has.",
-            "Without the regression of what is left unexplained, the ODE is on its own; the rows below it leave out",
-            "more. Deformation is relative, as elsewhere.",
+            "Models without some of their parts, trained again with the same steps (`--without`).",
+            "A dash was not run, or is a part that the model or the scene does not have.",
+            "Without the regression of what is left unexplained, the ODE is on its own.",
+            "Deformation is relative, as elsewhere.",
         ),
         "",
         *table(head, scored_rows(scores)),
@@ -45,10 +46,7 @@ def ablations(runs: Runs) -> list[str]:
 
 def _label(parts: Sequence[str]) -> str:
     """What a row leaves out, in words."""
-    others = [LABELS[part] for part in parts if part != "correction"]
-    if not parts:
-        return "nothing"
-    return ", ".join(f"– {label}" for label in others) if others else LABELS["correction"]
+    return "; ".join(LABELS[part] for part in sorted(parts, key=list(LABELS).index)) or "nothing"
 
 
 def _pair(runs: Runs, scene: str, **attributes: Any) -> list[list[float]]:

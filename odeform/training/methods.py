@@ -156,11 +156,13 @@ def _train_rolling(run: Run) -> Checkpoint:
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
     if "correction" not in run.request.without:
-        end = min(data.first_free + RINGING, len(data.times) - 1)
-        checkpoint = with_correction(checkpoint, data, (data.first_free + WHOLE, end))
+        free = data.first_free
+        fading = (free + WHOLE, min(free + RINGING, len(data.times) - 1)) if free else None
+        checkpoint = with_correction(checkpoint, data, fading)
     checkpoint = with_qualities(checkpoint, data, WITH_KINKS)
-    later = later_errors(RollingODeform(checkpoint), data).astype(np.float32)
-    return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later})
+    if (later := later_errors(RollingODeform(checkpoint), data)) is None:
+        return checkpoint
+    return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later.astype(np.float32)})
 
 
 def _fit(run: Run) -> Checkpoint:

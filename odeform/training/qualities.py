@@ -1,6 +1,6 @@
 """Cost and error of the integration: the frontier of a checkpoint, measured on its own validation split."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +9,10 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
+from odeform.models.integrated_model import IntegratedModel
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load_model
+from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE, motion_rmse
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats
@@ -39,14 +41,15 @@ def measure_frontier(
     """The non-dominated settings that are of use, and the model's own errors in mm, over the validation sequences.
 
     The solver's error is measured against the `reference`, the model's is that of the reference against the data; both
-    in total and of the deformation alone, as root mean squares over points, coordinates and time.
+    in total and of the deformation alone, as root mean squares over points, coordinates and time. Of an ODE that goes
+    on beyond the window, the solver's error is that of its own motion: a correction may hide it, but it ends there.
     """
-    evaluated = model.evaluate_basis(model.rest, 0.0)
+    evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(data.times[-1])
+    alone = model.integrate if isinstance(model, IntegratedModel) and model.continues_itself else model.trajectory
 
-    def motions(quality: SolverSettings) -> tuple[Floats, float]:
+    def motions(quality: SolverSettings, solve: Callable[..., Trajectory] = alone) -> tuple[Floats, float]:
         """(S, T, y), NaN where the integration failed, and the mean number of evaluations."""
-        stop = float(data.times[-1])
-        solved = [model.trajectory(theta, evaluated, quality, stop) for theta in data.theta["val"]]
+        solved = [solve(theta, evaluated, quality, stop) for theta in data.theta["val"]]
         reduced = [s.reduced(data.times) + (0.0 if s.stats.status == "ok" else np.nan) for s in solved]
         return np.stack(reduced), float(np.mean([s.stats.evaluations for s in solved]))
 
@@ -64,7 +67,7 @@ def measure_frontier(
     for quality in _candidates(float(data.times[1] - data.times[0])):
         reduced, evaluations = motions(quality)
         points.append(FrontierPoint(quality, evaluations, *errors_mm(reduced, truth)))
-    own = errors_mm(truth, data.reduced["val"])
+    own = errors_mm(motions(reference, model.trajectory)[0], data.reduced["val"])
     useful = [point for point in points if point.solver_error_mm <= USELESS * own[0]]
     return non_dominated(useful or points), own
 

@@ -3,7 +3,7 @@ wrong it is beyond the window."""
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,11 @@ from jaxtyping import Float
 from odeform.dataset.training_data import TrainingData
 from odeform.errors import InputError
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.dynamics import MOVING, STATE
+from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, STATE
 from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.kernel_search import search_ridge
-from odeform.models.rolling.model import RollingODeform
+from odeform.models.rolling.model import UNTURNED, RollingODeform
 from odeform.models.rolling.readout import inputs_of
 from odeform.models.rolling.start import PUSHES, Start, push_inputs
 from odeform.motion.body import watched_body
@@ -24,19 +24,48 @@ from odeform.motion.reduced_space import POSE, small_motion
 from odeform.training.continuation import HELD_OUT
 from odeform.training.pruning import LARGE
 from odeform.training.request import TrainRequest
-from odeform.training.rolling_law import Motions, fit_law, law_error_mm, roll_out
+from odeform.training.rolling_law import ROBUST, STEP, Motions, fit_law, law_error_mm, roll_out
 from odeform.training.rolling_readout import ReadoutRows, fit_readout
 from odeform.types import Arrays, Floats, Ints, PointCloud
 
 __all__ = ["fit_rolling_body", "later_errors", "motions_of"]
 
-STEPS = 40  # of the fit of the law
-LINEAR = 8  # of them with a law that is linear in the material and has no network
+
+@dataclass(frozen=True)
+class Stage:
+    """A part of the fit of the law."""
+
+    steps: int
+    frames: float = 1.0
+    """Share of the frames from the first landing on."""
+    linear: bool = False
+    """Whether the law is linear in the material and has no network yet."""
+    robust: float = ROBUST
+    """mm."""
+    step: float = STEP
+    """s."""
+    damping: float = 1e-2
+
+
+COARSE = 50.0  # mm
+FINE = 3.5e-4  # s: at the speed of a fall, floor and wall are stiff
+PUSHED = (Stage(8, linear=True, damping=1.0), Stage(32))
+FALLING = (
+    Stage(8, 0.0, linear=True, robust=COARSE, damping=1.0),
+    Stage(8, 0.0, robust=COARSE),
+    Stage(10, 0.0),
+    Stage(6, 0.56, robust=COARSE),
+    Stage(8, robust=COARSE),
+    Stage(20, step=FINE),
+)
+"""The first landings come first: what is wrong about one, the next amplify until nothing can be learned from them."""
+
 SHARE = 0.7  # of the budget for the law
 SMALL = 0.2  # how much deformations that are not large count in the training of the network
 LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
 CORNERS, UNFELT = list(COEFFICIENTS).index("corners"), -6.0  # the coefficient, and a value at which it does nothing
+STILL = 0.1  # of the radius by which points of a body that moves only up and down may be beside its line
 RATES = 0.3  # s: errors of rates count as they are after this time
 
 
@@ -45,11 +74,13 @@ def fit_rolling_body(
 ) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and settings of the checkpoint, without the correction.
 
-    `InputError` for data of a body that is not round, does not roll about one horizontal axis, or is not pushed first,
-    and where frames are left out.
+    `InputError` for data of a body that is not round, or neither rolls about one horizontal axis nor moves only up and
+    down, and where frames are left out.
     """
     begin = time.process_time()
-    axis, radius = _checked(data, request)
+    axis, radius = _checked(data)
+    # what does not turn stands on one corner
+    without = request.without if data.space.rolling else (*request.without, "corners")
     support = support_of(data.rest, axis)
     materials = [i for i, p in enumerate(data.schema.learned) if p.name not in PUSHES]
     if not materials:
@@ -60,33 +91,57 @@ def fit_rolling_body(
     def go_on() -> bool:
         return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
 
-    law, steps = _without(first_law(len(materials), request.seed), request.without), request.steps or STEPS
-    for linear, count in ((True, min(LINEAR, steps)), (False, max(steps - LINEAR, 0))):
-        law = fit_law(law, _free(law, request.without, linear), support, radius, motions["train"], count, report, go_on)
+    stages = PUSHED if data.first_free else FALLING
+    share = (request.steps or _steps(stages)) / _steps(stages)
+    law = _without(first_law(len(materials), request.seed), without)
+    for stage in stages:
+        motions = {split: replace(of, step=stage.step) for split, of in motions.items()}
+        some, free = motions["train"].landings(stage.frames), _free(law, without, stage.linear)
+        steps, how = round(share * stage.steps), (stage.robust, stage.damping)
+        law = fit_law(law, free, support, radius, some, steps, report, go_on, *how)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
-    share = min(steps / STEPS, 1.0)
-    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, share)
+    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, min(share, 1.0))
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
-    settings = {"material": names, "begin_s": _begin(data), "radius_m": radius, "lowest_m": _lowest(data)}
-    settings |= {"val": val, "qualities": {}}
+    settings = {"material": names, "begin_s": _begin(data), "clearance_m": _clearance(data), "radius_m": radius}
+    settings |= {"lowest_m": _lowest(data), "val": val, "qualities": {}}
     return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
 
 
-def _checked(data: TrainingData, request: TrainRequest) -> tuple[Floats, float]:
+def _steps(stages: Sequence[Stage]) -> int:
+    return sum(stage.steps for stage in stages)
+
+
+def _checked(data: TrainingData) -> tuple[Floats, float]:
     """The axis and the radius of the body."""
-    rolling = data.space.rolling
-    if rolling is None or abs(rolling.axis[2]) > LEVEL:
-        raise InputError("odeform-rolling: expected motions of a body that rolls about one horizontal axis")
+    rolling, poses = data.space.rolling, data.reduced["train"][..., :POSE]
     distances = np.linalg.norm(data.rest, axis=1)
+    radius = float(distances.mean())
+    aside = np.abs(np.concatenate([poses[..., :2], radius * poses[..., 3:]], axis=-1)).max()
+    if aside > STILL * radius if rolling is None else abs(rolling.axis[2]) > LEVEL:
+        raise InputError(
+            "odeform-rolling: expected motions of a body that rolls about one horizontal axis, or only up and down"
+        )
     if distances.min() < (1.0 - ROUND) * distances.max():
         raise InputError("odeform-rolling: expected a round body, about its mass centre")
-    if not all(observed.all() for observed in data.observed.values()):
-        raise InputError("odeform-rolling: expected no --every or --stagger")
-    if not 0 < data.first_free < len(data.times) - 3:
-        raise InputError("odeform-rolling: expected motions that begin with a push, and go on after it")
-    return rolling.axis, float(distances.mean())
+    if data.first_free and not _is_observed(data):
+        raise InputError("odeform-rolling: expected no --every or --stagger where a push is to be observed")
+    if not (0 if rolling is None else 1) <= data.first_free < len(data.times) - 3:
+        raise InputError(
+            "odeform-rolling: expected motions that begin with a push, and go on after it, or a straight fall"
+        )
+    return UNTURNED if rolling is None else rolling.axis, radius
+
+
+def _is_observed(data: TrainingData) -> bool:
+    return all(observed.all() for observed in data.observed.values())
+
+
+def _clearance(data: TrainingData) -> float:
+    """m of the lowest point at rest above the floor, zero for a body that lies on it."""
+    lowest = float(data.rest[:, 2].min() + data.space.anchor[2])
+    return lowest if lowest > CLEAR else 0.0
 
 
 def _lowest(data: TrainingData) -> float:
@@ -107,12 +162,17 @@ def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int
     y, first = data.reduced[split], data.first_free
     frame = float(data.times[1] - data.times[0])
     along = np.cross(axis, [0.0, 0.0, 1.0])
-    moved = np.stack([y[..., :3] @ along, y[..., 2], y[..., 3:POSE] @ axis], axis=-1)
-    before, after = moved[:, first], moved[:, first + 1]
+    moved = np.stack([y[..., :3] @ along, y[..., 2] + _clearance(data), y[..., 3:POSE] @ axis], axis=-1)
     start = np.zeros((STATE, len(y)))
-    start[:MOVING], start[MOVING : 2 * MOVING] = 0.5 * (before + after).T, (after - before).T / frame
-    start[1] += GRAVITY * frame**2 / 8.0  # between the two, a body that flies is higher than their mean
-    return Motions(data.theta[split][:, materials], start, moved[:, first + 1 :].transpose(1, 0, 2), frame)
+    if first == 0:  # falls from rest
+        moved[..., [0, 2]] = 0.0
+        start[1], start[MOVING + 1] = _clearance(data) - GRAVITY * frame**2 / 8.0, -GRAVITY * frame / 2.0
+    else:
+        before, after = moved[:, first], moved[:, first + 1]
+        start[:MOVING], start[MOVING : 2 * MOVING] = 0.5 * (before + after).T, (after - before).T / frame
+        start[1] += GRAVITY * frame**2 / 8.0  # between the two, a body that flies is higher than their mean
+    later, seen = moved[:, first + 1 :].transpose(1, 0, 2), data.observed[split][:, first + 1 :].T
+    return Motions(data.theta[split][:, materials], start, later, seen, frame)
 
 
 def _start(data: TrainingData, motions: dict[str, Motions]) -> Start:
@@ -166,13 +226,16 @@ def _rows(data: TrainingData, law: RollingLaw, support: Support, radius: float, 
     patterns = data.reduced["train"][..., POSE:]
     sizes = np.linalg.norm(patterns, axis=2)
     large = sizes > LARGE * sizes.max(axis=1, keepdims=True)
-    weights = np.where(large[:, -count:], 1.0, SMALL).ravel()
-    return ReadoutRows(inputs_of(flat, touch, material), patterns[:, -count:].reshape(len(weights), -1), weights)
+    weights, seen = np.where(large[:, -count:], 1.0, SMALL).ravel(), motions.seen.T.ravel()
+    inputs, patterns = inputs_of(flat, touch, material), patterns[:, -count:].reshape(len(weights), -1)
+    return ReadoutRows(inputs[seen], patterns[seen], weights[seen])
 
 
-def later_errors(model: RollingODeform, data: TrainingData) -> Floats:
+def later_errors(model: RollingODeform, data: TrainingData) -> Floats | None:
     """(S, L) RMSE in mm of validation motions over the last third of the window, where the motion of the ODE goes on
-    from the corrected one, as it does beyond the window."""
+    from the corrected one, as it does beyond the window. None where a spline filled in frames."""
+    if not _is_observed(data):
+        return None
     evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
     kept, stop = round((1.0 - HELD_OUT) * len(times)), float(times[-1])
     quality, missed = model.qualities["reference"], []

@@ -6,20 +6,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from odeform.mechanics.rolling.dynamics import MOVING, RollingDynamics
+from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, RollingDynamics
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support
-from odeform.types import Floats, Ints
+from odeform.types import Bools, Floats, Ints
 
-__all__ = ["Motions", "fit_law", "law_error_mm"]
+__all__ = ["ROBUST", "Motions", "fit_law", "law_error_mm", "roll_out"]
 
-STEP = 1.05e-3  # s, at most
+STEP = 1.05e-3  # s
 HEIGHTS = 2.5  # times what other errors count: they decide when a landing comes, and how deep it is
-ROBUST = 5.0  # mm; larger errors count by their logarithm: a ball that stops on the wrong facet decides nothing
-EVERY = 3  # frames that are compared
+ROBUST = 5.0
+"""mm: larger errors count by their logarithm, so that a ball that stops on the wrong facet decides nothing."""
+EVERY, FEW = 3, 90  # frames: of more than a few, only some are compared
 STEEP = 300.0  # largest derivative that is believed
 TOGETHER = 128  # motions whose derivatives are computed at once
+LANDING = 26  # frames that a landing takes at most
 PRIOR = 1e-4  # towards the law that a fit starts from
 TRIES = 7  # of a step, each more cautious
 ENOUGH = 5e-4  # relative gain of a step, below which the fit ends
@@ -34,12 +36,28 @@ class Motions:
     """(8, M) states at the end of the push."""
     moved: Float[np.ndarray, "frames motions 3"]
     """Ahead, height (m) and angle (rad) in the frames after it: half a frame later, and every frame from there on."""
+    seen: Bools
+    """(T, M) whether a frame is of the data."""
     frame: float
     """s."""
+    step: float = STEP
+    """s that a step of their integration takes at most."""
 
     def some(self, rows: Ints) -> "Motions":
         """Of the motions with the indices `rows` (R,) only."""
-        return replace(self, material=self.material[rows], start=self.start[:, rows], moved=self.moved[:, rows])
+        material, start = self.material[rows], self.start[:, rows]
+        return replace(self, material=material, start=start, moved=self.moved[:, rows], seen=self.seen[:, rows])
+
+    @property
+    def every(self) -> int:
+        """How many frames on the next one is compared: where there are few, or some are not of the data, all."""
+        return EVERY if self.seen.all() and len(self.moved) > FEW else 1
+
+    def landings(self, share: float) -> "Motions":
+        """Up to that share of the frames from the first landing on only, and at least to the end of that landing."""
+        landed = int((self.moved[..., 1] < CLEAR).any(axis=1).argmax())
+        count = landed + max(round(share * (len(self.moved) - landed)), LANDING)
+        return replace(self, moved=self.moved[:count], seen=self.seen[:count])
 
 
 def roll_out(law: RollingLaw, support: Support, radius: float, motions: Motions) -> Floats:
@@ -50,24 +68,25 @@ def roll_out(law: RollingLaw, support: Support, radius: float, motions: Motions)
 
 def _half_frames(motions: Motions) -> tuple[int, int, float]:
     """Steps in half a frame, half frames, and the seconds of a step."""
-    half = max(round(0.5 * motions.frame / STEP + 0.499), 1)
+    half = max(round(0.5 * motions.frame / motions.step + 0.499), 1)
     return half, 2 * len(motions.moved) - 1, 0.5 * motions.frame / half
 
 
-def _missed(states: Floats, motions: Motions, radius: float) -> tuple[Floats, Floats]:
-    """Robust errors of states (T, 8, M) in the compared frames, in units of `ROBUST`, and their derivatives by the
-    position: (E, M, 3) each."""
-    scale = 1e3 / ROBUST * np.array([1.0, HEIGHTS, radius * np.sqrt(2.0 / 3.0)])
-    apart = states[::EVERY, :MOVING].swapaxes(1, 2) - motions.moved[::EVERY]
+def _missed(states: Floats, motions: Motions, radius: float, robust: float) -> tuple[Floats, Floats]:
+    """Robust errors of states (T, 8, M) in the compared frames, in units of `robust` mm, and their derivatives by the
+    position: (E, M, 3) each, zero where a frame is not of the data."""
+    seen = motions.seen[:: motions.every, :, None]
+    scale = seen * 1e3 / robust * np.array([1.0, HEIGHTS, radius * np.sqrt(2.0 / 3.0)])
+    apart = states[:: motions.every, :MOVING].swapaxes(1, 2) - motions.moved[:: motions.every]
     apart = np.nan_to_num(scale * apart, nan=200.0, posinf=200.0, neginf=-200.0)
     return np.arcsinh(apart), scale / np.sqrt(1.0 + apart**2)
 
 
 def law_error_mm(law: RollingLaw, support: Support, radius: float, motions: Motions) -> float:
-    """Pooled RMSE of the pose in mm, over the frames (T,) and the motions (M,)."""
+    """Pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
     states = roll_out(law, support, radius, motions)[:, :MOVING]
     apart = (states.swapaxes(1, 2) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
-    return float(1e3 * np.sqrt(np.square(apart).sum(axis=2).mean() / 3.0))
+    return float(1e3 * np.sqrt(np.square(apart)[motions.seen].mean()))
 
 
 @dataclass
@@ -79,16 +98,16 @@ class _Normal:
     slope: Float[np.ndarray, " free"]
 
 
-def _normal(law: RollingLaw, free: Ints, support: Support, radius: float, motions: Motions) -> _Normal:
-    count, total = len(motions.material), _Normal(0.0, np.zeros((len(free), len(free))), np.zeros(len(free)))
+def _normal(law: RollingLaw, free: Ints, support: Support, radius: float, motions: Motions, robust: float) -> _Normal:
+    total = _Normal(0.0, np.zeros((len(free), len(free))), np.zeros(len(free)))
+    count, share = len(motions.material), 1.0 / (MOVING * motions.seen[:: motions.every].sum())
     for at in range(0, count, TOGETHER):
         some = motions.some(np.arange(at, min(at + TOGETHER, count)))
         dynamics, (half, frames, step) = RollingDynamics(law, support, radius, some.material), _half_frames(motions)
         states, changes = roll_out_with_sensitivities(dynamics, free, some.start, half, frames, step)
-        errors, by_position = _missed(states[1::2], some, radius)
-        jacobian = by_position[..., None].astype(np.float32) * changes[1::2][::EVERY]
+        errors, by_position = _missed(states[1::2], some, radius, robust)
+        jacobian = by_position[..., None].astype(np.float32) * changes[1::2][:: some.every]
         jacobian = np.clip(np.nan_to_num(jacobian), -STEEP, STEEP).reshape(-1, len(free))
-        share = 1.0 / (errors.size / len(some.material) * count)
         total.cost += share * float(np.square(errors).sum())
         total.square += share * (jacobian.T @ jacobian)
         total.slope += share * (jacobian.T @ errors.ravel())
@@ -104,21 +123,26 @@ def fit_law(
     steps: int,
     report: Callable[[str], None],
     go_on: Callable[[], bool] = lambda: True,
+    robust: float = ROBUST,
+    damping: float = 1e-2,
 ) -> RollingLaw:
     """The law after at most `steps` steps of Levenberg and Marquardt, in which the numbers with the indices
-    `free` (F,) change; `radius` is in m.
+    `free` (F,) change; `radius` is in m, and errors count in full up to about `robust` mm.
+    `damping` is that of the first step: 1 where the law is far off, and its derivatives tell little.
 
     It ends earlier where a step gains hardly anything, and when `go_on` says so.
     """
 
     def cost_of(trial: RollingLaw) -> float:
-        return float(np.square(_missed(roll_out(trial, support, radius, motions), motions, radius)[0]).mean())
+        states = roll_out(trial, support, radius, motions)
+        missed = _missed(states, motions, radius, robust)[0]
+        return float(np.square(missed).sum() / (MOVING * motions.seen[:: motions.every].sum()))
 
-    now, first, damping = law, law.flat()[free], 1e-2
+    now, first = law, law.flat()[free]
     for step in range(steps):
         if not go_on():
             break
-        known, numbers = _normal(now, free, support, radius, motions), now.flat()
+        known, numbers = _normal(now, free, support, radius, motions, robust), now.flat()
         normal = known.square + PRIOR * np.eye(len(free))
         slope = known.slope + PRIOR * (numbers[free] - first)
         for _ in range(TRIES):
@@ -132,7 +156,7 @@ def fit_law(
         else:
             break
         now, damping = law.like(trial), max(damping / 4.0, 1e-6)
-        report(f"contact law, step {step + 1}: robust pose error {ROBUST * np.sqrt(cost):.2f} mm (train)")
+        report(f"contact law, step {step + 1}: robust pose error {robust * np.sqrt(cost):.2f} mm (train)")
         if known.cost - cost < ENOUGH * known.cost:
             break
     return now

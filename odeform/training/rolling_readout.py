@@ -14,6 +14,7 @@ from odeform.types import Floats
 __all__ = ["ReadoutRows", "fit_readout"]
 
 EPOCHS, FEWEST, BATCH = 90, 400, 512
+CONSTANT = 1e-6  # standard deviation below which an input says nothing
 RATE, WARM, DECAY = 4e-3, 0.1, 1e-3
 
 
@@ -29,7 +30,8 @@ class ReadoutRows:
 
 def fit_readout(rows: ReadoutRows, seed: int, share: float = 1.0) -> Readout:
     """The network after a training whose length follows from the number of rows: `share` of it."""
-    mean, scale = rows.inputs.mean(axis=0), np.maximum(rows.inputs.std(axis=0), 1e-6)
+    mean, scale = rows.inputs.mean(axis=0), rows.inputs.std(axis=0)
+    scale[scale < CONSTANT] = 1.0
     size = max(float(rows.patterns.std()), 1e-12)
     inputs, patterns, weights = (
         torch.as_tensor(a, dtype=torch.float32)

@@ -83,6 +83,11 @@ class LatentTrajectory:
         """Seconds up to which the integration succeeded."""
         return float("inf") if self._last.status is Status.OK else self._last.end
 
+    def states(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, state)."""
+        self._extend(float(times.max()))
+        return self._sample(times)
+
     def reduced(self, times: Floats) -> Floats:
         """(T,) seconds -> (T, 6 + K), read-only; zero at time 0."""
         requested = np.asarray(times, dtype=float)

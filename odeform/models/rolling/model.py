@@ -1,6 +1,5 @@
-"""ODeform for a round body that is pushed, flies and rolls: the ODE is its motion, under a learned law of contact."""
-
-from dataclasses import dataclass
+"""ODeform for a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under a learned law of
+contact."""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,37 +13,38 @@ from odeform.models.integrated_model import IntegratedModel
 from odeform.models.odeform.correction import Correction
 from odeform.models.odeform.inference import Decoder
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
+from odeform.models.rolling.phases import Begun, Resumed
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start, push_inputs
-from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
-from odeform.motion.rolling import Rolling
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
 from odeform.types import Floats, Times, Vector
 
-__all__ = ["RollingODeform", "placed"]
+__all__ = ["UNTURNED", "RollingODeform", "placed"]
 
 FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
 """What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
 later on a corner amplifies what coarser solutions leave."""
 FALLBACK = SolverSettings("rk4", step=1e-3, dtype="float64")
-RISING = 0.04  # s
 UP = np.array([0.0, 0.0, 1.0])
+UNTURNED = np.array([0.0, 1.0, 0.0])
+"""The axis of a body that does not turn: any level one."""
 
 
-def placed(states: Float[np.ndarray, "rows states"], axis: Vector) -> Float[np.ndarray, "rows 6"]:
-    """(R, 8) states of a body that turns about the level unit vector `axis` -> (R, 6): shift (m), rotation vector."""
+def placed(moved: Float[np.ndarray, "rows 3"], axis: Vector) -> Float[np.ndarray, "rows 6"]:
+    """(R, 3) ahead, up (m) and angle (rad), about the level unit vector `axis` -> (R, 6): shift (m), rotation vector.
+    The same of their rates."""
     ahead = np.cross(axis, UP)
-    return np.concatenate([states[:, :1] * ahead + states[:, 1:2] * UP, states[:, 2:3] * axis], axis=1)
+    return np.concatenate([moved[:, :1] * ahead + moved[:, 1:2] * UP, moved[:, 2:] * axis], axis=1)
 
 
 class RollingODeform(IntegratedModel):
-    """The motion of one round body in a plane."""
+    """The motion of one round body in a plane, or up and down."""
 
     model = "odeform-rolling"
     continues_itself = True
@@ -56,22 +56,18 @@ class RollingODeform(IntegratedModel):
         self._materials = [learned.index(name) for name in config["material"]]
         self.begin = float(config["begin_s"])
         """Seconds at which the push is over and the ODE begins."""
+        self._clearance = float(config.get("clearance_m", 0.0))
+        """m of the lowest point at rest above the floor, which states count their heights from."""
+        self._axis = UNTURNED if self.space.rolling is None else self.space.rolling.axis
         self._radius = float(config["radius_m"])
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
         self.law = RollingLaw.from_arrays(arrays, len(self._materials))
         self._start = Start.from_arrays(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
-        self._readout = Readout.from_arrays(arrays, len(self._materials), self.rolling.patterns)
+        self._readout = Readout.from_arrays(arrays, len(self._materials), self.space.coordinates - POSE)
         self.correction = Correction.from_arrays(arrays, self.space.coordinates, len(learned))
         # the body that viewers show is smoother than the one whose corners it rolls over
-        self._support = support_of(self.space.basis.scale * self.space.basis.centers, self.rolling.axis)
-
-    @property
-    def rolling(self) -> Rolling:
-        """Its axis, and its patterns of deformation. ValueError in a checkpoint without."""
-        if self.space.rolling is None:
-            raise ValueError("rolling.axis: expected the axis of a rolling body")
-        return self.space.rolling
+        self._support = support_of(self.space.basis.scale * self.space.basis.centers, self._axis)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
         """The initial value problem for theta (P,) in [-1, 1] from when the push is over: the field, the state (8,)
@@ -94,82 +90,64 @@ class RollingODeform(IntegratedModel):
         each = np.tile(material, (len(states), 1))
         touch = 1e-3 * self.law.coefficients(each[:1])["touch"]
         deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), each))
-        return np.concatenate([placed(states, self.rolling.axis), deformation], axis=1)
+        moved = states[:, :MOVING] - [0.0, self._clearance, 0.0]
+        return np.concatenate([placed(moved, self._axis), deformation], axis=1)
 
-    def integrate(self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float) -> Trajectory:
+    def integrate(self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float) -> Begun:
         """The motion for theta (P,) in [-1, 1], without its correction, solved to `until` seconds."""
-        field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
-        exact = start.astype(float)
-        solved = LatentTrajectory(
-            field,
-            decode,
-            start,
-            quality,
-            FALLBACK,
-            max(until - self.begin, 1.0 / self.schema.window.rate),
-            self.space.gyration_radius,
-            lambda: (field, exact),
-            FINER,
-        )
-        first = decode(np.zeros(1), exact[None])[0]
-        rate = placed((exact / self._units)[None, MOVING:], self.rolling.axis)[0]
-        return _Begun(solved, self.begin, first, rate)
+        field, start, decode = self.problem(theta, evaluated, _precision(quality))
+        solved = self._solved(field, start, decode, quality, until - self.begin)
+        first = decode(np.zeros(1), start[None])[0]
+        rate = placed((start / self._units)[None, MOVING : 2 * MOVING], self._axis)[0]
+        return Begun(solved, self.begin, first, rate)
+
+    def _solved(
+        self, field: Field, start: Floats, decode: Decoder, quality: SolverSettings, seconds: float
+    ) -> LatentTrajectory:
+        exact, least = start.astype(float), 1.0 / self.schema.window.rate
+        arm, seconds = self.space.gyration_radius, max(seconds, least)
+        return LatentTrajectory(field, decode, start, quality, FALLBACK, seconds, arm, lambda: (field, exact), FINER)
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
-        solved: Trajectory = self.integrate(theta, evaluated, settings, until)
-        if (known := self.correction) is not None:
-            solved = CorrectedTrajectory(solved, known.shares, known.over_time(theta), known.stop)
-        return LiftedTrajectory(solved, self._lowest_points, self._lowest)
+        known, window = self.correction, self.schema.window
+        if known is None:
+            return self._lifted(self.integrate(theta, evaluated, settings, until))
+        resumed = known.stop >= window.stop
+        begun = self.integrate(theta, evaluated, settings, min(until, known.stop) if resumed else until)
+        corrected = CorrectedTrajectory(begun, known.shares, known.over_time(theta), known.stop)
+        if not resumed:
+            return self._lifted(corrected)
+
+        def resume() -> tuple[Trajectory, Floats]:
+            field, _, decode = self.problem(theta, evaluated, _precision(settings))
+            start = begun.state(known.stop) + self._units * self._added(begun, corrected, known.stop)
+            start = start.astype(_precision(settings))
+            solved = self._solved(field, start, decode, settings, until - known.stop)
+            return solved, decode(np.zeros(1), start[None])[0, POSE:]
+
+        return self._lifted(Resumed(corrected, known.stop, resume))
+
+    def _added(self, own: Trajectory, corrected: Trajectory, time: float) -> Float[np.ndarray, "8"]:
+        """What the correction adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
+        so short that corrected frames do not tell the velocity."""
+        frame = 1.0 / self.schema.window.rate
+        times = np.array([time - frame, time])
+        added = corrected.reduced(times)[:, :POSE] - own.reduced(times)[:, :POSE]
+        moved = np.stack([added[:, :3] @ np.cross(self._axis, UP), added[:, 2], added[:, 3:] @ self._axis], axis=1)
+        if self.space.rolling is None:
+            moved[:, [0, 2]] = 0.0
+        return np.concatenate([moved[1], (moved[1] - moved[0]) / frame, np.zeros(STATE - 2 * MOVING)])
+
+    def _lifted(self, motion: Trajectory) -> LiftedTrajectory:
+        return LiftedTrajectory(motion, self._lowest_points, self._lowest)
 
     def _lowest_points(self, y: Float[np.ndarray, "times y"]) -> Times:
         """(T, 6 + S) -> (T,) heights in m of the body's lowest point."""
         return self.watched_body.sample(self.space.with_modes(y), np.ones(len(y))).lowest
 
 
-@dataclass(frozen=True, eq=False)
-class _Push:
-    """The motion during the push: from rest to where the ODE begins, with its velocity there."""
-
-    begin: float
-    pose: Float[np.ndarray, "6"]
-    rate: Float[np.ndarray, "6"]
-
-    def at(self, times: Times) -> Float[np.ndarray, "times 6"]:
-        """(T,) s from 0 to `begin` -> (T, 6): cubic in time."""
-        share = (times / self.begin)[:, None]
-        ramp = share**2 * (3.0 - 2.0 * share) * self.pose
-        return ramp + share**2 * (share - 1.0) * self.begin * self.rate
-
-
-class _Begun(ChangedTrajectory):
-    """A motion that is solved from the end of the push on.
-
-    How the push deforms the body does not follow from the motion: it is regressed (`Correction`). What contacts do
-    takes its place in `RISING` seconds.
-    """
-
-    def __init__(self, own: Trajectory, begin: float, y: Floats, rate: Floats) -> None:
-        """`y` (6 + S,) and the pose's `rate` (6,) per second are those at `begin` seconds."""
-        super().__init__(own)
-        self._push, self._first = _Push(begin, y[:POSE], rate), y
-
-    @property
-    def last_good(self) -> float:
-        """Seconds up to which it is valid."""
-        return self._push.begin + self.own.last_good
-
-    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + S), zero at time 0."""
-        times = np.asarray(times, dtype=float)
-        push, later = self._push, times > self._push.begin
-        out = np.zeros((len(times), len(self._first)))
-        out[~later, :POSE] = push.at(times[~later])
-        if later.any():
-            after = times[later] - push.begin
-            out[later] = self._first + self.own.reduced(after)
-            risen = np.minimum(after / RISING, 1.0)
-            out[later, POSE:] *= (risen**2 * (3.0 - 2.0 * risen))[:, None]
-        return out
+def _precision(quality: SolverSettings) -> type:
+    return np.float32 if quality.dtype == "float32" else np.float64
