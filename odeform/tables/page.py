@@ -140,7 +140,7 @@ def _unseen(runs: Runs, shipped: Mapping[str, Mapping[str, float]]) -> list[str]
         counts = [r["parameters"] for run, r in runs.items() if run.model == row[0] and run.scene == DROP]
         row.insert(1, f"{max(counts):,}" if counts else "–")
     longer = [number(shipped[f"{scene} {key_of(window)}"][metric]) for scene, window in asked for metric in METRICS]
-    rows.append(["odeform, bundled checkpoint: trained longer", "", *longer])
+    rows.append(["bundled checkpoint of ODeform", "", *longer])
     paper = [
         [name, *map(number, UNSEEN.get(name, (None,) * 3)), *map(number, UNSEEN_FORCE[name])] for name in UNSEEN_FORCE
     ]
@@ -186,6 +186,7 @@ def _extrapolated(runs: Runs, simple: Mapping[str, Mapping[str, float]]) -> list
             f"Pushed objects are trained to frame {PUSH[0] - 1} at 100 Hz, as in the paper.",
             "Models of reduced coordinates, rivals included, are continued by dynamics that are fitted to the training",
             "motions within the window; without it, baselines hold their last trained frame.",
+            "`odeform-rolling` has no such continuation: its own ODE goes on.",
             "The true frames, continued, are the least error that this continuation leaves: its floor.",
         ),
         "",

@@ -49,7 +49,7 @@ class Stage:
 
 COARSE = 50.0  # mm
 FINE = 3.5e-4  # s: at the speed of a fall, floor and wall are stiff
-PUSHED = (Stage(8, linear=True, damping=1.0), Stage(32))
+PUSHED = (Stage(8, linear=True), Stage(32))
 FALLING = (
     Stage(8, 0.0, linear=True, robust=COARSE, damping=1.0),
     Stage(8, 0.0, robust=COARSE),

@@ -45,8 +45,8 @@ class Begun(ChangedTrajectory):
         super().__init__(own)
         self._solved, self._push, self._first = own, _Push(begin, y[:POSE], rate), y
 
-    def state(self, time: float) -> Floats:
-        """(state,) of the ODE at `time` seconds, after the push."""
+    def state(self, time: float) -> Float[np.ndarray, "8"]:
+        """That of the ODE at `time` seconds, after the push."""
         return self._solved.states(np.array([time - self._push.begin]))[0]
 
     @property
