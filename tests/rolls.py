@@ -81,9 +81,9 @@ def recorded(times: Floats, moved: Floats, given: dict[str, float]) -> MotionSeq
 FALL = Schema(
     scene="falls",
     parameters=(Parameter("mass", "kg", 0.5, 1.0, 0.7, scale="log"),),
-    window=Window(0.0, 0.8, RATE),
+    window=Window(0.0, 0.5, RATE),
 )
-HEIGHT = 0.2  # m
+HEIGHT = 0.1  # m
 
 
 def fall(given: dict[str, float]) -> MotionSequence:
@@ -105,7 +105,7 @@ def rolls(count: int = 60, seed: int = 0) -> Dataset:
     return _dataset(SCHEMA, motion, count, seed, {"pulse_s": PULSE})
 
 
-def falls(count: int = 40, seed: int = 0) -> Dataset:
+def falls(count: int = 20, seed: int = 0) -> Dataset:
     """`count` sequences of balls that fall, in memory."""
     return _dataset(FALL, fall, count, seed, {})
 

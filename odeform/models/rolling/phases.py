@@ -76,8 +76,11 @@ class Resumed(ChangedTrajectory):
         self._stop, self._resume = stop, resume
 
     @cached_property
-    def _later(self) -> tuple[Trajectory, Floats]:
-        return self._resume()
+    def _later(self) -> tuple[Trajectory, Floats, Floats]:
+        """What is solved from `stop` on, the coordinates (6 + S,) that are added to it, and what these give up."""
+        solved, deformation = self._resume()
+        end = self.own.reduced(np.array([self._stop]))[0]
+        return solved, end, np.concatenate([np.zeros(POSE), end[POSE:] - deformation])
 
     @property
     def last_good(self) -> float:
@@ -91,12 +94,10 @@ class Resumed(ChangedTrajectory):
         times = np.asarray(times, dtype=float)
         out, later = self.own.reduced(np.minimum(times, self._stop)), times > self._stop
         if later.any() and self.own.last_good >= self._stop:
-            (solved, deformation), after = self._later, times[later] - self._stop
-            # what the correction adds to the deformation gives way to what follows from the motion
-            given_up = np.zeros(out.shape[1])
-            given_up[POSE:] = out[later][0, POSE:] - deformation
+            (solved, end, given_up), after = self._later, times[later] - self._stop
             out = out.copy()
-            out[later] += solved.reduced(after) - _risen(after)[:, None] * given_up
+            # what the correction adds to the deformation gives way to what follows from the motion
+            out[later] = end + solved.reduced(after) - _risen(after)[:, None] * given_up
         return out
 
 
