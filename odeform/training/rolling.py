@@ -45,6 +45,7 @@ class Stage:
     step: float = STEP
     """s."""
     damping: float = 1e-2
+    """Of the first step; see `fit_law`."""
 
 
 COARSE = 50.0  # mm
@@ -75,7 +76,7 @@ def fit_rolling_body(
     """Arrays and settings of the checkpoint, without the correction.
 
     `InputError` for data of a body that is not round, or neither rolls about one horizontal axis nor moves only up and
-    down, and where frames are left out.
+    down, and where frames of a push are left out.
     """
     begin = time.process_time()
     axis, radius = _checked(data)
@@ -92,16 +93,16 @@ def fit_rolling_body(
         return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
 
     stages = PUSHED if data.first_free else FALLING
-    share = (request.steps or _steps(stages)) / _steps(stages)
+    counts = _steps(stages, request.steps)
     law = _without(first_law(len(materials), request.seed), without)
-    for stage in stages:
+    for stage, steps in zip(stages, counts, strict=True):
         motions = {split: replace(of, step=stage.step) for split, of in motions.items()}
         some, free = motions["train"].landings(stage.frames), _free(law, without, stage.linear)
-        steps, how = round(share * stage.steps), (stage.robust, stage.damping)
-        law = fit_law(law, free, support, radius, some, steps, report, go_on, *how)
+        law = fit_law(law, free, support, radius, some, steps, report, go_on, stage.robust, stage.damping)
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
-    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, min(share, 1.0))
+    share = min(sum(counts) / sum(stage.steps for stage in stages), 1.0)
+    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, share)
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "clearance_m": _clearance(data), "radius_m": radius}
@@ -109,8 +110,11 @@ def fit_rolling_body(
     return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
 
 
-def _steps(stages: Sequence[Stage]) -> int:
-    return sum(stage.steps for stage in stages)
+def _steps(stages: Sequence[Stage], total: int | None) -> list[int]:
+    """Those of each stage: in the same shares where they are `total` together, the first ones first."""
+    ends = np.cumsum([stage.steps for stage in stages])
+    ends = ends if total is None else np.ceil(total * ends / ends[-1] - 1e-9).astype(int)
+    return np.diff(ends, prepend=0).tolist()
 
 
 def _checked(data: TrainingData) -> tuple[Floats, float]:

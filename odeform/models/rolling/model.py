@@ -97,8 +97,9 @@ class RollingODeform(IntegratedModel):
         """The motion for theta (P,) in [-1, 1], without its correction, solved to `until` seconds."""
         field, start, decode = self.problem(theta, evaluated, _precision(quality))
         solved = self._solved(field, start, decode, quality, until - self.begin)
-        first = decode(np.zeros(1), start[None])[0]
-        rate = placed((start / self._units)[None, MOVING : 2 * MOVING], self._axis)[0]
+        exact = start.astype(float)
+        first = decode(np.zeros(1), exact[None])[0]
+        rate = placed((exact / self._units)[None, MOVING : 2 * MOVING], self._axis)[0]
         return Begun(solved, self.begin, first, rate)
 
     def _solved(
