@@ -49,7 +49,7 @@ def page(found: Mapping[str, Any]) -> str:
                 "includes trials of its settings on the validation split.",
                 "Unlike minutes, steps do not depend on the load of the machine.",
                 f"On an idle core each budget took about {MINUTES[DROP]} minutes when it was set, and",
-                f"{MINUTES['kick']} on the kick.",
+                f"{MINUTES['kick']} on the kick; that of `odeform-rolling` on the drop takes twice as long.",
                 f"Here, with two runs at a time: {_taken(runs)}.",
             ),
             "",

@@ -69,7 +69,7 @@ ODEFORM_STEPS = {FRAMES[DROP][1]: 330, UNTIL[0]: 900, UNTIL[1]: 690}
 """Steps of `odeform` on the drop by number of frames. They took about `MINUTES` on one core of an AMD EPYC 7003, trials
 and random features included. The time of a step of the per-point baselines (`STEPS`) does not depend on the frames."""
 ROLLING_STEPS = {DROP: 60, "kick": 40}
-"""Steps of `odeform-rolling`. They took 3 to 7 minutes on one core."""
+"""Steps of `odeform-rolling`. They took 5 to 8 minutes of processor time: on the drop, more than other models have."""
 KICK_STEPS = {"odeform": 3000, **{model: 3 * steps for model, steps in STEPS.items()}}
 """Steps on the kick, with three times the time of the drop."""
 SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}

@@ -67,6 +67,7 @@ LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
 CORNERS, UNFELT = list(COEFFICIENTS).index("corners"), -6.0  # the coefficient, and a value at which it does nothing
 STILL = 0.1  # of the radius by which points of a body that moves only up and down may be beside its line
+FALLEN = 0.9  # of the time to the first landing, for which the fall is checked
 RATES = 0.3  # s: errors of rates count as they are after this time
 
 
@@ -92,7 +93,7 @@ def fit_rolling_body(
     def go_on() -> bool:
         return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
 
-    stages = PUSHED if data.first_free else FALLING
+    stages = FALLING if data.space.rolling is None else PUSHED
     counts = _steps(stages, request.steps)
     law = _without(first_law(len(materials), request.seed), without)
     for stage, steps in zip(stages, counts, strict=True):
@@ -100,7 +101,7 @@ def fit_rolling_body(
         some, free = motions["train"].landings(stage.frames), _free(law, without, stage.linear)
         law = fit_law(law, free, support, radius, some, steps, report, go_on, stage.robust, stage.damping)
     error = law_error_mm(law, support, radius, motions["val"])
-    report(f"contact law alone, from the end of the push on: pose RMSE {error:.2f} mm (val)")
+    report(f"contact law alone: pose RMSE {error:.2f} mm (val)")
     share = min(sum(counts) / sum(stage.steps for stage in stages), 1.0)
     readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, share)
     names = [data.schema.learned[i].name for i in materials]
@@ -119,23 +120,31 @@ def _steps(stages: Sequence[Stage], total: int | None) -> list[int]:
 
 def _checked(data: TrainingData) -> tuple[Floats, float]:
     """The axis and the radius of the body."""
-    rolling, poses = data.space.rolling, data.reduced["train"][..., :POSE]
-    distances = np.linalg.norm(data.rest, axis=1)
+    rolling, distances = data.space.rolling, np.linalg.norm(data.rest, axis=1)
     radius = float(distances.mean())
-    aside = np.abs(np.concatenate([poses[..., :2], radius * poses[..., 3:]], axis=-1)).max()
-    if aside > STILL * radius if rolling is None else abs(rolling.axis[2]) > LEVEL:
+    if rolling is not None and abs(rolling.axis[2]) > LEVEL:
+        raise InputError("odeform-rolling: expected motions of a body that rolls about one horizontal axis")
+    if rolling is None and not _falls_straight(data, radius):
         raise InputError(
-            "odeform-rolling: expected motions of a body that rolls about one horizontal axis, or only up and down"
+            "odeform-rolling: expected a body that rolls about one horizontal axis, or falls straight from rest"
         )
     if distances.min() < (1.0 - ROUND) * distances.max():
         raise InputError("odeform-rolling: expected a round body, about its mass centre")
-    if data.first_free and not _is_observed(data):
+    if rolling is not None and not _is_observed(data):
         raise InputError("odeform-rolling: expected no --every or --stagger where a push is to be observed")
-    if not (0 if rolling is None else 1) <= data.first_free < len(data.times) - 3:
-        raise InputError(
-            "odeform-rolling: expected motions that begin with a push, and go on after it, or a straight fall"
-        )
+    if rolling is not None and not 0 < data.first_free < len(data.times) - 3:
+        raise InputError("odeform-rolling: expected motions that begin with a push, and go on after it")
     return UNTURNED if rolling is None else rolling.axis, radius
+
+
+def _falls_straight(data: TrainingData, radius: float) -> bool:
+    """Whether no point of the body leaves its line by much, and it falls from rest as what is dropped does."""
+    poses, clearance = data.reduced["train"][..., :POSE], _clearance(data)
+    aside = np.abs(np.concatenate([poses[..., :2], radius * poses[..., 3:]], axis=-1)).max()
+    early = data.times < FALLEN * np.sqrt(2.0 * clearance / GRAVITY)
+    off = np.abs(poses[..., 2] + 0.5 * GRAVITY * data.times**2)[:, early]
+    seen = data.observed["train"][:, early]
+    return clearance > 0.0 and data.first_free == 0 and aside < STILL * radius and bool((off[seen] < CLEAR).all())
 
 
 def _is_observed(data: TrainingData) -> bool:
@@ -168,7 +177,7 @@ def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int
     along = np.cross(axis, [0.0, 0.0, 1.0])
     moved = np.stack([y[..., :3] @ along, y[..., 2] + _clearance(data), y[..., 3:POSE] @ axis], axis=-1)
     start = np.zeros((STATE, len(y)))
-    if first == 0:  # falls from rest
+    if data.space.rolling is None:  # falls from rest
         moved[..., [0, 2]] = 0.0
         start[1], start[MOVING + 1] = _clearance(data) - GRAVITY * frame**2 / 8.0, -GRAVITY * frame / 2.0
     else:

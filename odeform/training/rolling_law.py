@@ -21,7 +21,7 @@ ROBUST = 5.0
 EVERY, FEW = 3, 90  # frames: of more than a few, only some are compared
 STEEP = 300.0  # largest derivative that is believed
 TOGETHER = 128  # motions whose derivatives are computed at once
-LANDING = 26  # frames that a landing takes at most
+LANDING = 0.217  # s that a landing takes at most
 PRIOR = 1e-4  # towards the law that a fit starts from
 TRIES = 7  # of a step, each more cautious
 ENOUGH = 5e-4  # relative gain of a step, below which the fit ends
@@ -29,11 +29,11 @@ ENOUGH = 5e-4  # relative gain of a step, below which the fit ends
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """Motions of M bodies from the end of the push on."""
+    """Motions of M bodies from the end of the push, or from half a frame of their fall, on."""
 
     material: Float[np.ndarray, "motions materials"]
     start: Float[np.ndarray, "states motions"]
-    """(8, M) states at the end of the push."""
+    """(8, M) states there."""
     moved: Float[np.ndarray, "frames motions 3"]
     """Ahead, height (m) and angle (rad) in the frames after it: half a frame later, and every frame from there on."""
     seen: Bools
@@ -56,7 +56,7 @@ class Motions:
     def landings(self, share: float) -> "Motions":
         """Up to that share of the frames from the first landing on only, and at least to the end of that landing."""
         landed = int((self.moved[..., 1] < CLEAR).any(axis=1).argmax())
-        count = landed + max(round(share * (len(self.moved) - landed)), LANDING)
+        count = landed + max(round(share * (len(self.moved) - landed)), round(LANDING / self.frame))
         return replace(self, moved=self.moved[:count], seen=self.seen[:count])
 
 

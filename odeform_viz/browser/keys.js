@@ -38,7 +38,7 @@ const release = () => setTimeout(() => document.activeElement && document.active
 
 document.addEventListener("click", (event) => {
   const byMouse = event.detail > 0;
-  if (byMouse && event.target.closest("button, input[type=checkbox], label, [role=option], [role=tab]")) release();
+  if (byMouse && event.target.closest(`${CONTROLS}, label, [role=option]`)) release();
 });
 
 document.addEventListener("keydown", (event) => {

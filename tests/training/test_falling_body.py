@@ -1,16 +1,20 @@
 """Training on a ball that falls straight, whose law of contact is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rolls import HEIGHT, RATE, falls
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.training_data import prepare
+from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
 from odeform.models.rolling.model import RollingODeform
+from odeform.training.request import TrainRequest
+from odeform.training.rolling import fit_rolling_body
 from odeform.training.train import train
-
-pytestmark = pytest.mark.slow
 
 SEEN = 36  # frames, to the second flight; the whole window has 61
 EVERY = 5
@@ -38,6 +42,7 @@ def seen(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Predicto
     return train(dataset, file, "odeform-rolling", steps=20, window=(0, SEEN), report=silent)
 
 
+@pytest.mark.slow
 def test_a_motion_begins_at_rest_and_falls_freely(sparse: Predictor) -> None:
     assert isinstance(sparse, RollingODeform)
     assert sparse.space.rolling is None
@@ -47,6 +52,7 @@ def test_a_motion_begins_at_rest_and_falls_freely(sparse: Predictor) -> None:
     assert np.allclose(fallen, 0.5 * 9.81 * times**2, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_what_happens_between_the_frames_follows_from_the_ode(
     sparse: Predictor, dataset: Dataset, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -56,6 +62,7 @@ def test_what_happens_between_the_frames_follows_from_the_ode(
     assert ours < 0.3 * other
 
 
+@pytest.mark.slow
 def test_landings_beyond_the_window_follow_from_the_ode(seen: Predictor, dataset: Dataset) -> None:
     assert seen.schema.window.stop == pytest.approx((SEEN - 1) / RATE)
     errors = evaluate(seen, dataset, "test", (SEEN, 61))["rmse_pooled_mm"]
@@ -63,6 +70,7 @@ def test_landings_beyond_the_window_follow_from_the_ode(seen: Predictor, dataset
     assert errors < 0.1 * 1e3 * np.sqrt(np.mean([np.square(moved).mean() for moved in held]))
 
 
+@pytest.mark.slow
 def test_a_corrected_motion_goes_on_without_a_jump(seen: Predictor) -> None:
     assert isinstance(seen, RollingODeform)
     evaluated, settings, stop = (
@@ -77,3 +85,13 @@ def test_a_corrected_motion_goes_on_without_a_jump(seen: Predictor) -> None:
         y = motion.reduced(times)
         assert np.abs(np.diff(y, axis=0)).max() < 2.0 * np.sqrt(2.0 * 9.81 * HEIGHT) * 0.0005
         assert all(np.allclose(motion.reduced(times[k : k + 1])[0], y[k], atol=1e-12) for k in (70, 20, 45))
+
+
+def test_what_does_not_fall_from_rest_is_refused(dataset: Dataset) -> None:
+    data, request = prepare(dataset, patterns=True), TrainRequest("odeform-rolling", steps=1)
+    thrown = data.reduced["train"].copy()
+    thrown[..., 2] += data.times
+    lying = replace(data.space, anchor=data.space.anchor - [0.0, 0.0, HEIGHT])
+    for other in (replace(data, reduced={**data.reduced, "train": thrown}), replace(data, space=lying)):
+        with pytest.raises(InputError, match="falls straight from rest"):
+            fit_rolling_body(other, request, silent)

@@ -55,7 +55,7 @@ class RollingODeform(IntegratedModel):
         learned = [parameter.name for parameter in self.schema.learned]
         self._materials = [learned.index(name) for name in config["material"]]
         self.begin = float(config["begin_s"])
-        """Seconds at which the push is over and the ODE begins."""
+        """Seconds at which the ODE begins: the push is over, or the body falls for half a frame."""
         self._clearance = float(config.get("clearance_m", 0.0))
         """m of the lowest point at rest above the floor, which states count their heights from."""
         self._axis = UNTURNED if self.space.rolling is None else self.space.rolling.axis
