@@ -1,5 +1,6 @@
-"""Kernel ridge regression (Matern 5/2), and the search for its length scales and ridge."""
+"""Kernel ridge regression (Matern), and the search for its length scales, its ridge and the order of its kernel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,13 +8,17 @@ from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve, get_lapack_funcs
 from scipy.optimize import minimize
 
-from odeform.models.contact.kernel import matern
+from odeform.models.matern import matern
 from odeform.types import Floats
 
-__all__ = ["Ridge", "search_ridge"]
+__all__ = ["ORDERS", "Ridge", "search_ridge"]
+
+ORDERS = (2, 6)
+"""Of the kernels to choose from: contacts make motions rough in the parameters, without them they are smooth."""
 
 STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
 RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0
+SMOOTHER = 0.85  # share of the error of the first order that another may have at most: a rough kernel risks less
 EVALUATIONS = 150  # of the error, from each start
 BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
 
@@ -28,6 +33,8 @@ class Ridge:
     """Length scales, in units of the normalised parameters."""
     ridge: float
     """Relative to the kernel's value at distance 0."""
+    order: int = ORDERS[0]
+    """Of the Matern kernel."""
     error: float = float("inf")
 
     def weights(self, theta: Parameters, outputs: Float[np.ndarray, "sequences outputs"]) -> Floats:
@@ -36,7 +43,7 @@ class Ridge:
 
     def predict(self, asked: Floats, theta: Parameters, outputs: Floats) -> Float[np.ndarray, "asked outputs"]:
         """Predictions at `asked` (A, P) from outputs at `theta` (S, P)."""
-        return matern(asked / self.scales, theta / self.scales) @ self.weights(theta, outputs)
+        return self._kernel(asked, theta) @ self.weights(theta, outputs)
 
     def rms(self, theta: Parameters, outputs: Floats, asked: Floats, expected: Floats) -> float:
         """RMS error, over sequences, of outputs (S, outputs) at `theta` (S, P), each predicted from all the others
@@ -47,41 +54,49 @@ class Ridge:
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weights = inverse @ outputs
         left_out = weights / np.diag(inverse)[:, None]
-        missed = matern(asked / self.scales, theta / self.scales) @ weights - expected
+        missed = self._kernel(asked, theta) @ weights - expected
         return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(theta) + len(asked)))
 
+    def _kernel(self, one: Floats, other: Floats) -> Floats:
+        return matern(one / self.scales, other / self.scales, self.order)
+
     def _factor(self, theta: Parameters) -> tuple[Floats, bool]:
-        scaled = theta / self.scales
-        return cho_factor(matern(scaled, scaled) + self.ridge * np.eye(len(theta)), lower=True)
+        return cho_factor(self._kernel(theta, theta) + self.ridge * np.eye(len(theta)), lower=True)
 
 
 def search_ridge(
-    known: Parameters, outputs: Floats, val: tuple[Floats, Floats] | None = None, start: Ridge | None = None
+    known: Parameters,
+    outputs: Floats,
+    val: tuple[Floats, Floats] | None = None,
+    start: Ridge | None = None,
+    orders: Sequence[int] = ORDERS[:1],
 ) -> tuple[Ridge, ...]:
     """The settings that Nelder-Mead finds from `start`, or else from each of several, the best first.
 
     They minimise the RMS error of predictions from training motions other than the one predicted: the leave-one-out
     error of training `outputs` (S, outputs) at `known` (S, P), together with the error of the motions `val`, which are
-    theta (V, P) and outputs (V, outputs). Few validation motions alone tell less.
+    theta (V, P) and outputs (V, outputs). Few validation motions alone tell less. Kernels of several `orders` are tried
+    without `start`; one that is not of the first comes before those that are where its error is clearly smaller.
     """
     asked, expected = (known[:0], outputs[:0]) if val is None else val
 
-    def ridge(settings: Floats) -> Ridge:
-        return Ridge(np.exp(settings[:-1]), float(np.exp(settings[-1])))
+    def ridge(settings: Floats, order: int) -> Ridge:
+        return Ridge(np.exp(settings[:-1]), float(np.exp(settings[-1])), order)
 
-    def objective(settings: Floats) -> float:
+    def objective(settings: Floats, order: int) -> float:
         try:
-            return ridge(settings).rms(known, outputs, asked, expected)
+            return ridge(settings, order).rms(known, outputs, asked, expected)
         except np.linalg.LinAlgError:
             return float("inf")  # the kernel matrix is singular to rounding
 
     length, noise = BOUNDS
     limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
-    starts = (start,) if start else [Ridge(np.full(known.shape[1], scale), RIDGE) for scale in STARTS]
+    same = [np.full(known.shape[1], scale) for scale in STARTS]
+    starts = (start,) if start else [Ridge(scales, RIDGE, order) for order in orders for scales in same]
     found = []
     for one in starts:
         begin = np.log([*one.scales, one.ridge])
         bounds = [*[length] * known.shape[1], noise]
-        trial = minimize(objective, begin, method="Nelder-Mead", bounds=bounds, options=limits)
-        found.append(replace(ridge(trial.x), error=float(trial.fun)))
-    return tuple(sorted(found, key=lambda trial: trial.error))
+        trial = minimize(objective, begin, (one.order,), method="Nelder-Mead", bounds=bounds, options=limits)
+        found.append(replace(ridge(trial.x, one.order), error=float(trial.fun)))
+    return tuple(sorted(found, key=lambda trial: trial.error / (1.0 if trial.order == orders[0] else SMOOTHER)))

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
-from odeform.models.kernel_search import search_ridge
+from odeform.models.kernel_search import ORDERS, search_ridge
 from odeform.models.odeform.correction import PARTS, CorrectedPart, Correction
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load_model
@@ -82,8 +82,8 @@ def _fitted(
 ) -> tuple[CorrectedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
-    Length scales and ridge are those of the first `searched` entries of the motions themselves: residuals on training
-    do not tell how smooth those of other parameters are. Unless `given`, the share has the smallest error on
+    Length scales, ridge and order are those of the first `searched` entries of the motions themselves: residuals on
+    training do not tell how smooth those of other parameters are. Unless `given`, the share has the smallest error on
     validation, relative in each sequence: in small sets one hard sequence would decide. It is zero where that gain may
     be chance, as with few validation motions it often is.
     """
@@ -93,7 +93,8 @@ def _fitted(
     both = (np.concatenate([truth["train"], truth["val"]]) - mean)[:, :searched]
     u, sizes, _ = np.linalg.svd(both, full_matrices=False)
     outputs, expected = np.split(u * sizes, [len(known)])
-    ridge = search_ridge(known, outputs)[0]  # without validation, where what it predicts is compared with the ODE
+    # without validation, where what it predicts is compared with the ODE
+    ridge = search_ridge(known, outputs, orders=ORDERS)[0]
 
     alone = mean + ridge.predict(asked, known, truth["train"] - mean) - truth["val"]
     added = motion["val"] - own - ridge.predict(asked, known, motion["train"] - own)
@@ -115,8 +116,8 @@ def _fitted(
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
     count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
     coefficients = ridge.weights(known, (u * sizes)[:, :count])
-    part = CorrectedPart(known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share)
-    return part, float(explained)
+    fitted = (known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share, ridge.order)
+    return CorrectedPart(*fitted), float(explained)
 
 
 def _chance(gained: Floats) -> float:

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.evaluation.scores import Scores
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.types import MotionSequence
 
 ALL = np.ones(3, dtype=bool)
@@ -119,6 +121,18 @@ def test_a_window_scores_its_frames(dataset: Dataset, predictors: dict[str, Pred
     assert len(squares) == 120
     assert part["mse_pooled_mm2"] == pytest.approx(squares[29:59].mean(), rel=1e-6)
     assert evaluate(predictors["pod-rbf"], dataset, "test", window=(0, 500))["mse_mm2"] == whole["mse_mm2"]
+
+
+def test_coverage_in_tenths_of_each_parameter(dataset: Dataset, predictors: dict[str, Predictor]) -> None:
+    bundled = open_dataset("mass-elastic")
+    few = replace(bundled, entries=tuple(bundled.select("test")[:12]))
+    found = evaluate(load("mass-elastic"), few, "test")
+    tenths = found["coverage_tenths"]
+    assert set(tenths) == {"mass", "bending"}
+    for shares in tenths.values():  # the first two tenths have two motions
+        assert np.average(shares, weights=[2, 2] + [1] * 8) == pytest.approx(found["coverage_90"])
+    assert min(tenths["mass"]) < max(tenths["mass"])
+    assert evaluate(predictors["pod-rbf"], dataset, "test")["coverage_tenths"] == {}  # without a band
 
 
 def test_parts_are_scored_in_passing(dataset: Dataset, predictors: dict[str, Predictor]) -> None:

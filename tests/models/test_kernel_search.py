@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from odeform.models.kernel_search import Ridge, search_ridge
+from odeform.models.kernel_search import ORDERS, Ridge, search_ridge
 from odeform.types import Floats
 
 
@@ -59,3 +59,17 @@ def test_settings_without_a_solution_are_passed_over() -> None:
     found = search_ridge(known, np.array([[1.0], [2.0]]), (np.array([[0.0]]), np.array([[1.5]])))[0]
     assert np.isfinite(found.error)
     assert 1.0 < found.predict(np.zeros((1, 1)), known, np.array([[1.0], [2.0]]))[0, 0] < 2.0
+
+
+def _kink(theta: Floats) -> Floats:
+    return np.abs(theta[:, :1] - 0.1) + 0.3 * theta[:, 1:]
+
+
+@pytest.mark.parametrize(("outputs", "order"), [(_surface, 6), (_kink, 2)])
+def test_smooth_motions_have_a_smooth_kernel_and_kinks_a_rough_one(theta: Floats, outputs: object, order: int) -> None:
+    assert callable(outputs)
+    found = search_ridge(theta, outputs(theta), orders=ORDERS)
+    assert found[0].order == order
+    assert {trial.order for trial in found} == set(ORDERS)
+    again = search_ridge(theta, outputs(theta), start=found[0])
+    assert [trial.order for trial in again] == [order]

@@ -1,8 +1,8 @@
 """Kernel ridge regression over the parameters: the posterior mean of a Gaussian process, and a strong rival.
 
-Matern 5/2 kernel with a length scale for each parameter (Rasmussen and Williams 2006, 4.2 and 2.2), on the POD
-coefficients of whole trajectories. Length scales and ridge minimise the error on validation and the leave-one-out error
-on training together. In scenes with a contact and a force it works in the contact's frame
+Matern kernel with a length scale for each parameter (Rasmussen and Williams 2006, 4.2 and 2.2), on the POD coefficients
+of whole trajectories. Length scales, ridge and order minimise the error on validation and the leave-one-out error on
+training together. In scenes with a contact and a force it works in the contact's frame
 (`odeform.models.contact.regression`).
 """
 
@@ -16,9 +16,9 @@ from odeform.models.baselines.fitted_model import FittedModel
 from odeform.models.baselines.frame_trajectory import FrameTrajectory
 from odeform.models.baselines.trajectory_pod import fit_trajectory_pod
 from odeform.models.contact.inputs import contact_inputs, has_contact
-from odeform.models.contact.kernel import matern
 from odeform.models.contact.regression import ContactRegression, fit_contact_regression
-from odeform.models.kernel_search import Ridge, search_ridge
+from odeform.models.kernel_search import ORDERS, Ridge, search_ridge
+from odeform.models.matern import matern
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
@@ -42,17 +42,21 @@ class GaussianProcess(FittedModel):
         self._scales = np.array(checkpoint.config["length_scales"], dtype=float)
         if not (np.isfinite(self._scales) & (self._scales > 0.0)).all():
             raise ValueError(f"length_scales: expected positive numbers, got {self._scales}")
+        self._order = checkpoint.config.get("order", ORDERS[0])
+        if self._order not in ORDERS:
+            raise ValueError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {self._order!r}")
         self._check_inputs(arrays["theta"])
         self._inputs, self._weights = arrays["theta"] / self._scales, arrays["gp.weights"]
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
-        """Length scales and ridge by Nelder-Mead, from several starts."""
+        """Length scales and ridge by Nelder-Mead, from several starts, and the order of the kernel."""
         if has_contact(data.schema):
             known, asked = (contact_inputs(data.schema, data.theta[split], data.space) for split in ("train", "val"))
             return fit_contact_regression(known, asked, data.times, data.reduced["train"], data.reduced["val"])
         pod, theta = fit_trajectory_pod(data), data.theta
-        found = search_ridge(theta["train"], pod.coefficients, (theta["val"], pod.project(data.reduced["val"])))
+        val = (theta["val"], pod.project(data.reduced["val"]))
+        found = search_ridge(theta["train"], pod.coefficients, val, orders=ORDERS)
         weights = found[0].weights(theta["train"], pod.coefficients)
         arrays = {"times": data.times, "theta": theta["train"], "gp.weights": weights, **pod.arrays()}
         trials = [{**_named(trial), "error": trial.error} for trial in found]
@@ -64,7 +68,7 @@ class GaussianProcess(FittedModel):
         def predict() -> Floats:
             if self._contact is not None:
                 return self._contact.predict(contact_inputs(self.schema, theta[None], self.space))[0]
-            coefficients = matern(theta[None] / self._scales, self._inputs)[0] @ self._weights
+            coefficients = matern(theta[None] / self._scales, self._inputs, self._order)[0] @ self._weights
             return (self._mean + coefficients @ self._modes).reshape(len(self._times), -1)
 
         return FrameTrajectory("kernel ridge regression", self._times, predict)
@@ -72,4 +76,4 @@ class GaussianProcess(FittedModel):
 
 def _named(ridge: Ridge) -> dict[str, Any]:
     """The settings as a checkpoint holds them."""
-    return {"length_scales": ridge.scales.tolist(), "ridge": ridge.ridge}
+    return {"length_scales": ridge.scales.tolist(), "ridge": ridge.ridge, "order": ridge.order}

@@ -12,9 +12,10 @@ from jaxtyping import Float
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from odeform.models.matern import matern, scaled_distance
 from odeform.types import Floats
 
-__all__ = ["Kernel", "fit_kernel", "matern"]
+__all__ = ["Kernel", "fit_kernel"]
 
 STARTS = (1.0, 3.0)  # length scales that the search starts from, in standard deviations of the inputs
 NOISE = 1e-2  # where it starts, relative to the signal
@@ -25,17 +26,6 @@ BOUNDS = {"scale": (-2.0, 6.0), "noise": (-14.0, 1.0), "linear": (-8.0, 8.0)}  #
 Inputs = Float[np.ndarray, "rows inputs"]
 Forces = Float[np.ndarray, "rows 3"]
 Outputs = Float[np.ndarray, "rows outputs"]
-
-
-def matern(one: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[np.ndarray, "rows columns"]:
-    """(1 + r + r^2 / 3) exp(-r), r = sqrt(5) times the distance of inputs that are divided by their length scales."""
-    r = _distance(one, other)
-    return (1.0 + r + r**2 / 3.0) * np.exp(-r)
-
-
-def _distance(one: Inputs, other: Floats) -> Floats:
-    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
-    return np.sqrt(5.0 * np.maximum(squares, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +113,6 @@ class _Objective:
     def _by_scales(logs: Floats, x: Inputs, slope: Floats) -> Floats:
         """(D,) derivatives by the logarithms of length scales, given those by the entries of the Matern matrix."""
         scaled = x / np.exp(logs)
-        r = _distance(scaled, scaled)
+        r = scaled_distance(scaled, scaled)
         pull = slope * (5.0 / 3.0) * (1.0 + r) * np.exp(-r)
         return 2.0 * (pull.sum(axis=1) @ scaled**2 - np.einsum("id,ij,jd->d", scaled, pull, scaled, optimize=True))

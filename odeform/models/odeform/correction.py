@@ -1,7 +1,7 @@
 """What the latent ODE leaves unexplained of the training motions, regressed on the parameters.
 
 y(t; theta) = share * ODE(t; theta) + rest(t; theta): the autoregressive scheme of Kennedy and O'Hagan (2000), with the
-latent ODE in place of the cheap simulation. The rest is a kernel ridge regression (Matern 5/2) of the training motions
+latent ODE in place of the cheap simulation. The rest is a kernel ridge regression (Matern) of the training motions
 less that share. Shift, rotation and deformation have a share and a kernel each.
 """
 
@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
-from odeform.models.contact.kernel import matern
+from odeform.models.kernel_search import ORDERS
+from odeform.models.matern import matern, matern_slope
 from odeform.motion.reduced_space import POSE
 from odeform.types import Arrays, Floats
 
@@ -37,18 +38,17 @@ class CorrectedPart:
     """Of the training residuals."""
     share: float
     """Of the ODE's own motion that is kept."""
+    order: int
+    """Of the Matern kernel."""
 
     def at(self, theta: Floats) -> Float[np.ndarray, "jet entries"]:
         """(1 + P, T columns): the residual at theta (P,) in [-1, 1], and its derivatives by each parameter."""
-        apart = theta / self.scales - self.theta
-        r = np.sqrt(5.0 * (apart**2).sum(axis=1))
-        # the derivative of matern by each scaled parameter
-        slopes = -(5.0 / 3.0) * (1.0 + r) * np.exp(-r) * (apart / self.scales).T
+        slopes = (matern_slope(theta / self.scales - self.theta, self.order) / self.scales).T
         return np.concatenate([self.value(theta)[None], slopes @ self.weights @ self.modes])
 
     def value(self, theta: Floats) -> Float[np.ndarray, " entries"]:
         """(T columns,): the residual alone."""
-        return matern((theta / self.scales)[None], self.theta)[0] @ self.weights @ self.modes + self.mean
+        return matern((theta / self.scales)[None], self.theta, self.order)[0] @ self.weights @ self.modes + self.mean
 
 
 class Correction:
@@ -102,6 +102,7 @@ class Correction:
                 "theta": part.theta,
                 "weights": part.weights,
                 "share": np.array([part.share]),
+                "order": np.array([part.order]),
             }
             values |= {"modes": part.modes.astype(np.float32), "mean": part.mean}
             out |= {f"{PREFIX}{name}.{key}": value for key, value in values.items()}
@@ -119,8 +120,8 @@ class Correction:
             of = {key.removeprefix(start): a.astype(float) for key, a in arrays.items() if key.startswith(start)}
             if of:
                 entries = len(times) * len(range(*columns.indices(coordinates)))
-                # files of before both were fitted have neither
-                of = {"mean": np.zeros(entries), "share": np.ones(1), **of}
+                # files of before these were fitted have none of them
+                of = {"mean": np.zeros(entries), "share": np.ones(1), "order": np.full(1, ORDERS[0]), **of}
                 parts[name] = _checked_part(of, parameters, entries)
         return cls(times, coordinates, parts)
 
@@ -128,6 +129,7 @@ class Correction:
 def _checked_part(arrays: Arrays, parameters: int, entries: int) -> CorrectedPart:
     known, modes = len(arrays["theta"]), len(arrays["modes"])
     shapes = {"theta": (known, parameters), "scales": (parameters,), "weights": (known, modes), "share": (1,)}
+    shapes |= {"order": (1,)}
     for key, shape in {**shapes, "modes": (modes, entries), "mean": (entries,)}.items():
         if arrays[key].shape != shape or not np.isfinite(arrays[key]).all():
             raise ValueError(f"{PREFIX}: expected finite arrays, one of shape {shape}, got {arrays[key].shape}")
@@ -136,4 +138,7 @@ def _checked_part(arrays: Arrays, parameters: int, entries: int) -> CorrectedPar
     share = float(arrays.pop("share")[0])
     if not 0.0 <= share <= 1.0:
         raise ValueError(f"{PREFIX}: expected a share from 0 to 1, got {share}")
-    return CorrectedPart(**arrays, share=share)
+    order = float(arrays.pop("order")[0])
+    if order not in ORDERS:
+        raise ValueError(f"{PREFIX}: expected a kernel of order {' or '.join(map(str, ORDERS))}, got {order}")
+    return CorrectedPart(**arrays, share=share, order=int(order))

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from odeform.arrays import finite_arrays
 from odeform.mechanics.rolling.dynamics import MOVING
-from odeform.models.contact.kernel import matern
+from odeform.models.matern import matern
 from odeform.schema import Schema
 from odeform.types import Arrays
 

@@ -6,24 +6,11 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.baselines.gp import GaussianProcess
-from odeform.models.contact.kernel import matern
 
 
 @pytest.fixture(scope="module")
 def data(dataset: Dataset) -> TrainingData:
     return prepare(dataset, modes=8)
-
-
-def test_kernel_values() -> None:
-    """k(r) = (1 + s + s^2 / 3) exp(-s), s = sqrt(5) r (Rasmussen and Williams 2006, eq. 4.17)."""
-    points = np.array([[0.0, 0.0], [0.6, 0.8]])
-    s = np.sqrt(5.0)
-    assert matern(points, points) == pytest.approx(np.array([[1.0, k := (1 + s + s**2 / 3) * np.exp(-s)], [k, 1.0]]))
-
-
-def test_kernel_matrices_are_positive_definite() -> None:
-    points = np.random.default_rng(0).uniform(-1.0, 1.0, (40, 3))
-    assert np.linalg.eigvalsh(matern(points, points)).min() > 0.0
 
 
 def test_chosen_setting_is_the_best_of_all_starts(data: TrainingData) -> None:

@@ -1,0 +1,46 @@
+"""Matern kernels of half-integer order (Rasmussen and Williams 2006, eq. 4.16), of inputs divided by length scales.
+
+The order p is the number of times that a function drawn from the Gaussian process can be differentiated: the kernel is
+Matern (p + 1/2), a polynomial of degree p times an exponential.
+"""
+
+from functools import cache
+from math import factorial
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.types import Floats
+
+__all__ = ["matern", "matern_slope", "scaled_distance"]
+
+Inputs = Float[np.ndarray, "rows inputs"]
+
+
+def matern(
+    one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2
+) -> Float[np.ndarray, "rows columns"]:
+    """Kernel values; of order 2, (1 + r + r^2 / 3) exp(-r), where r is the scaled distance."""
+    r = scaled_distance(one, other, order)
+    return np.polyval(_polynomial(order), r) * np.exp(-r)
+
+
+def matern_slope(apart: Inputs, order: int = 2) -> Inputs:
+    """(rows, inputs): the derivative of the kernel by the first input, at differences `apart` from the second."""
+    r = np.sqrt((2 * order + 1) * (apart**2).sum(axis=1))
+    pull = np.polyval(_polynomial(order - 1), r) * np.exp(-r)
+    return -(2 * order + 1) / (2 * order - 1) * pull[:, None] * apart
+
+
+def scaled_distance(one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2) -> Floats:
+    """(rows, columns): sqrt(2 p + 1) times the Euclidean distance."""
+    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
+    return np.sqrt((2.0 * order + 1.0) * np.maximum(squares, 0.0))
+
+
+@cache
+def _polynomial(order: int) -> tuple[float, ...]:
+    """Coefficients of the polynomial of degree `order`, of the highest power first."""
+    p = order
+    first = factorial(p) / factorial(2 * p)
+    return tuple(first * factorial(p + i) / (factorial(i) * factorial(p - i)) * 2.0 ** (p - i) for i in range(p + 1))
