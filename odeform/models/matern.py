@@ -10,8 +10,6 @@ from math import factorial
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Floats
-
 __all__ = ["matern", "matern_slope", "scaled_distance"]
 
 Inputs = Float[np.ndarray, "rows inputs"]
@@ -32,8 +30,10 @@ def matern_slope(apart: Inputs, order: int = 2) -> Inputs:
     return -(2 * order + 1) / (2 * order - 1) * pull[:, None] * apart
 
 
-def scaled_distance(one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2) -> Floats:
-    """(rows, columns): sqrt(2 p + 1) times the Euclidean distance."""
+def scaled_distance(
+    one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2
+) -> Float[np.ndarray, "rows columns"]:
+    """sqrt(2 p + 1) times the Euclidean distance."""
     squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
     return np.sqrt((2.0 * order + 1.0) * np.maximum(squares, 0.0))
 
