@@ -16,7 +16,7 @@ from odeform.types import Floats
 
 __all__ = ["ParameterFit", "fit_parameters", "normal_equations"]
 
-STARTS, REFINED, MOST_REFINED = 16, 2, 5
+STARTS, MOST_REFINED = 16, 5
 ROUNDS = 12
 CLOSE = 1e-2  # squared standard deviations: converged if an undamped step is shorter
 DAMPING = (1e-3, 0.2, 5.0)  # initially; factor after an accepted step; after a rejected one
@@ -27,11 +27,13 @@ COARSE = (16, 40)  # points and frames on which starts are compared
 @dataclass(frozen=True, eq=False)
 class ParameterFit:
     """`theta` (P,) in [-1, 1], its Fisher `information` (P, P), and `misfit`, the mean square of the residuals relative
-    to their expectation: at most 1 if model and noise explain the observation."""
+    to their expectation: at most 1 if model and noise explain the observation. `converged` if another step would have
+    changed hardly anything."""
 
     theta: Floats
     information: Floats
     misfit: float
+    converged: bool
 
 
 def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tuple[Floats, Floats, float]:
@@ -57,10 +59,10 @@ def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tupl
 def fit_parameters(
     comparison: Comparison, discrepancy: Discrepancy, progress: Callable[[Floats, float], None] = lambda *_: None
 ) -> ParameterFit:
-    """Compare starts over the box (Sobol points), refine the best ones, and return the best result.
+    """Compare starts over the box (Sobol points), and refine them, the best first, until one explains the observation.
 
-    More starts are refined while none explains the observation. `progress` gets theta (P,) and the misfit before each
-    step.
+    Landings can make the misfit rough, so that a search does not converge: then until two explain it. The best result
+    is returned. `progress` gets theta (P,) and the misfit before each step.
     """
     coarse = Comparison(comparison.predictor, comparison.observation.subsampled(*COARSE))
     size = len(comparison.predictor.schema.learned)
@@ -74,7 +76,8 @@ def fit_parameters(
 
     refined: list[ParameterFit] = []
     for start in sorted(spread, key=cost)[:MOST_REFINED]:
-        if len(refined) >= REFINED and min(one.misfit for one in refined) <= 1.0:
+        explained = [one for one in refined if one.misfit <= 1.0]
+        if len(explained) > 1 or any(one.converged for one in explained):
             break
         refined.append(_refined(comparison, discrepancy, start, progress))
     return min(refined, key=lambda one: one.misfit)
@@ -90,12 +93,13 @@ def _refined(
         linear = discrepancy.minus_mean(comparison.at(theta), theta, observation.times)
         return normal_equations(linear, variances, observation.noise_mm)
 
-    theta, damping = start, DAMPING[0]
+    theta, damping, converged = start, DAMPING[0], False
     information, score, cost = equations(theta)
     for _ in range(ROUNDS):
         progress(theta, cost / observation.positions.size)
         undamped = _bounded_step(information, score, theta, 0.0)
-        if undamped @ information @ undamped < CLOSE or damping > LARGEST:
+        converged = bool(undamped @ information @ undamped < CLOSE)
+        if converged or damping > LARGEST:
             break
         step = _bounded_step(information, score, theta, damping)
         trial = equations(theta + step)
@@ -103,7 +107,7 @@ def _refined(
             theta, (information, score, cost), damping = theta + step, trial, damping * DAMPING[1]
         else:
             damping *= DAMPING[2]
-    return ParameterFit(theta, information, cost / observation.positions.size)
+    return ParameterFit(theta, information, cost / observation.positions.size, converged)
 
 
 def _bounded_step(information: Floats, score: Floats, theta: Floats, damping: float) -> Floats:
