@@ -71,7 +71,7 @@ def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
     view = observed(predictor, theta, predictor.schema.window.times[1:60:2])
     found = identify(predictor, view, certain(predictor), steps.append)
     assert np.abs(units(found) - theta).max() < 1e-3
-    assert len(steps) > 2
+    assert len(steps) > 1
     inside = [p.inside(step[p.name]) for p in predictor.schema.learned for step in steps]
     assert all(inside)
 
