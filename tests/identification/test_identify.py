@@ -3,9 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from odeform.identification import fit
 from odeform.identification.discrepancy import Discrepancy
+from odeform.identification.fit import ParameterFit
 from odeform.identification.identify import Identification, identify
-from odeform.identification.linear import derivatives, parameters_of
+from odeform.identification.linear import Comparison, derivatives, parameters_of
 from odeform.identification.observation import Observation
 from odeform.models.base import Predictor
 from odeform.models.registry import load
@@ -74,6 +76,31 @@ def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
     assert len(steps) > 1
     inside = [p.inside(step[p.name]) for p in predictor.schema.learned for step in steps]
     assert all(inside)
+
+
+@pytest.mark.parametrize(
+    ("ends", "searches"),
+    [
+        ([(0.5, True)], 1),
+        ([(0.5, False), (0.4, False)], 2),
+        ([(3.0, True), (0.5, True)], 2),
+        ([(3.0, True)] * 5, 5),
+    ],
+)
+def test_searches_from_more_starts_where_the_best_does_not_converge_or_explain(
+    monkeypatch: pytest.MonkeyPatch, ends: list[tuple[float, bool]], searches: int
+) -> None:
+    predictor, left = load("mass-elastic"), list(ends)
+    view = observed(predictor, np.zeros(2), predictor.schema.window.times[1::20])
+    comparison = Comparison(predictor, view)
+
+    def refined(*_: object) -> ParameterFit:
+        return ParameterFit(np.zeros(2), np.eye(2), *left.pop(0))
+
+    monkeypatch.setattr(fit, "_refined", refined)
+    best = fit.fit_parameters(comparison, certain(predictor))
+    assert len(ends) - len(left) == searches
+    assert best.misfit == min(misfit for misfit, _ in ends)
 
 
 class Cancelled(Exception):
