@@ -62,7 +62,7 @@ def identify(
     progress: Callable[[dict[str, float]], None] = lambda _: None,
     misfits: Callable[[float], None] = lambda _: None,
 ) -> Identification:
-    """Estimate the parameters of an observed motion, all jointly, each with a 90 % interval. Takes about a second.
+    """Estimate the parameters of an observed motion, all jointly, each with a 90 % interval. Takes seconds.
 
     Least squares weigh the noise of the observation and the model's own error (Kennedy & O'Hagan 2001).
 
