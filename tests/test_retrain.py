@@ -58,7 +58,7 @@ def test_a_continuation_alone_is_fitted_again(tmp_path: Path, capsys: pytest.Cap
     [
         (["mass-elastic/direct"], "direct: expected a model of reduced coordinates"),
         (["contact-force"], "of one body, which is continued"),
-        (["kick", "--steps", "5"], "--steps: a continuation is fitted without steps"),
+        (["kick", "--steps", "5"], "--steps: only training takes steps"),
     ],
 )
 def test_what_is_not_continued_is_refused(
@@ -66,6 +66,14 @@ def test_what_is_not_continued_is_refused(
 ) -> None:
     assert main(["retrain", *arguments, "--only", "continuation", "--keep", str(tmp_path)]) == 2
     assert said in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_solver_settings_of_pushed_objects_are_measured_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["retrain", "kick", "--only", "qualities", "--keep", str(tmp_path)]) == 2
+    assert "odeform: expected a mechanical model" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -10,16 +10,15 @@ from odeform.benchmark.timing import milliseconds, quantiles
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.scores import Scores
+from odeform.models.mechanical.model import EXACT
 from odeform.models.per_object import PerObject
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import get_scene
-from odeform.solver.integrate import SolverSettings
 from odeform.types import MotionSequence
 
 __all__ = ["bench_objects"]
 
 SEQUENCES = 12  # of the test split of each object
-EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
 
 
 def bench_objects(predictor: PerObject, dataset: Dataset | None) -> dict[str, Any]:

@@ -13,10 +13,12 @@ from odeform.errors import InputError
 
 if TYPE_CHECKING:
     from odeform.checkpoint import Checkpoint
+    from odeform.models.base import Predictor
 
 __all__ = ["HELP", "add_options", "run"]
 
 HELP = "Train bundled checkpoints again by their recorded commands, and compare the scores"
+AGAIN = ("continuation", "qualities")  # what `--only` makes again
 SCORES = ("rmse_pooled_mm", "deformation_relative")
 
 
@@ -30,8 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--only",
-        choices=("continuation",),
-        help="keep the models, and fit again only what continues their motions beyond the trained window",
+        choices=AGAIN,
+        help="keep the models, and fit again what continues their motions beyond the trained window, or measure again "
+        "the solver settings of pushed objects",
     )
     add_json(parser)
 
@@ -39,12 +42,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     from odeform.checkpoint import bundled_checkpoints
     from odeform.models.registry import load
-    from odeform.training.continuation import is_continued
 
     if args.steps is not None:
         positive("--steps", args.steps)
         if args.only:
-            raise InputError(f"--steps: a {args.only} is fitted without steps")
+            raise InputError("--steps: only training takes steps")
     bundled = list(bundled_checkpoints())
     names = [name if "/" in name else f"{name}/odeform" for name in args.checkpoints] or bundled
     if unknown := [name for name in names if name not in bundled]:
@@ -53,14 +55,14 @@ def run(args: argparse.Namespace) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     found: dict[str, Any] = {}
     if args.only and not args.checkpoints:
-        names = [name for name in bundled if is_continued(load(name))]
+        names = [name for name in bundled if _has(args.only, load(name))]
     for name in names:
         out = folder / f"{name.replace('/', '_')}.safetensors"
         recorded = load(name).checkpoint
         if args.only:
             shown = f"odeform retrain {name} --only {args.only}"
             if not out.exists():
-                _refit(name, recorded, out, shown)
+                _make_again(args.only, name, recorded, out, shown)
         else:
             command = _command(name, recorded.provenance, out, args.steps)
             if not out.exists():
@@ -88,14 +90,29 @@ def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None
     return tokens
 
 
-def _refit(name: str, recorded: "Checkpoint", out: Path, command: str) -> None:
-    """Write the bundled checkpoint of this name with another continuation."""
+def _has(what: str, model: "Predictor") -> bool:
+    """Whether a bundled model has what `--only` makes again."""
+    from odeform.training.continuation import is_continued
+
+    return is_continued(model) if what == "continuation" else model.model == "odeform-mechanical"
+
+
+def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command: str) -> None:
+    """Write the bundled checkpoint of this name with another of `AGAIN`."""
     from odeform.checkpoint import write_checkpoint
     from odeform.dataset.store import open_dataset
+    from odeform.models.registry import load_model
     from odeform.training.continuation import refitted
+    from odeform.training.mechanical import with_measured_qualities
+    from odeform.training.train import write_scored
 
-    known = {**recorded.provenance, "continuation": {"command": command, "versions": {"odeform": version("odeform")}}}
-    write_checkpoint(out, refitted(replace(recorded, provenance=known), open_dataset(name.split("/")[0])))
+    known = {**recorded.provenance, what: {"command": command, "versions": {"odeform": version("odeform")}}}
+    checkpoint, dataset = replace(recorded, provenance=known), open_dataset(name.split("/")[0])
+    if what == "continuation":
+        write_checkpoint(out, refitted(checkpoint, dataset))
+    else:
+        # other steps make other errors
+        write_scored(with_measured_qualities(load_model(checkpoint), dataset), out, dataset)
 
 
 def _scores(scores: dict[str, Any] | None) -> dict[str, float]:

@@ -137,7 +137,7 @@ class Predictor(ABC):
         end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
         complete = self.complete(parameters)
         shape = self.rest_of(complete) if geometry is None else geometry
-        return self._solve(shape, complete, self._settings(quality), end, observed)
+        return self._solve(shape, complete, self._settings(quality, complete), end, observed)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """All parameters, checked, with defaults for those not given (`Schema.complete`).
@@ -201,10 +201,19 @@ class Predictor(ABC):
         if observed is None and self.schema.needs_observations:
             raise InputError(f"{self.model}: interpolates between observed frames, and none were given")
 
-    def _settings(self, quality: str | SolverSettings) -> SolverSettings | None:
+    def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
+        """`frontier`, for the body in `parameters`, which are complete."""
+        return self.frontier
+
+    def _qualities_of(self, parameters: Parameters) -> Mapping[str, SolverSettings]:
+        """`qualities`, for the body in `parameters`."""
+        return self.qualities
+
+    def _settings(self, quality: str | SolverSettings, parameters: Parameters) -> SolverSettings | None:
         """None for a model without qualities that is given one by name."""
-        if not self.qualities or isinstance(quality, SolverSettings):
+        known = self._qualities_of(parameters)
+        if not known or isinstance(quality, SolverSettings):
             return quality if isinstance(quality, SolverSettings) else None
-        if quality not in self.qualities:
-            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(self.qualities)}")
-        return self.qualities[quality]
+        if quality not in known:
+            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known)}")
+        return known[quality]

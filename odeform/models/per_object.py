@@ -12,6 +12,7 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint, arrays_of_object
 from odeform.models.base import Predictor
+from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.solver.integrate import SolverSettings
@@ -81,6 +82,12 @@ class PerObject(Predictor):
         observed: MotionSequence | None,
     ) -> Motion:
         return self.parts[parameters[OBJECT]]._solve(geometry, parameters, settings, until, observed)
+
+    def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
+        return self.parts[parameters[OBJECT]].frontier
+
+    def _qualities_of(self, parameters: Parameters) -> Mapping[str, SolverSettings]:
+        return self.parts[parameters[OBJECT]].qualities
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         return self.parts[self.schema.complete(parameters)[OBJECT]].to_body_frame(geometry, parameters)

@@ -20,9 +20,6 @@ __all__ = ["SolverSettings", "integrate"]
 
 MAX_STEPS = 20_000
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-NOW, BEFORE = 0.7, 0.4
-"""Exponents of the errors of this step and the last one, times the order (Gustafsson 1991, ACM TOMS 17(4)). Without the
-last one, a third of the steps into a landing were rejected."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +147,7 @@ def _controlled(
     before_step: Callable[[], None],
 ) -> None:
     """Proportional-integral step control on the embedded error estimate."""
-    first, second = NOW / method.order, BEFORE / method.order
+    first, second = (gain / method.order for gain in method.gains)
     if not solution.next_step:
         begin, state, slope = solution.end, solution.states[0], solution.slopes[0]
         solution.next_step = _first_step(method.order, field, begin, state, slope, tolerance)

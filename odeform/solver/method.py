@@ -50,6 +50,12 @@ class Method(Protocol):
         ...
 
     @property
+    def gains(self) -> tuple[float, float]:
+        """Of step control by the errors of this step and the last one: exponents times the order (Gustafsson 1991, ACM
+        TOMS 17(4)); only asked of methods that control their step."""
+        ...
+
+    @property
     def knows_middle(self) -> bool:
         """Whether `Stepper.middle` is there, which makes the interpolant quartic."""
         ...

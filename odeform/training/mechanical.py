@@ -11,32 +11,35 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.mechanics.law import MechanicalLaw
+from odeform.models.base import Predictor
 from odeform.models.mechanical.elastic_body import elastic_body
-from odeform.models.mechanical.model import MechanicalODeform
-from odeform.models.per_object import joined
+from odeform.models.mechanical.model import EXACT, QUALITIES, MechanicalODeform
+from odeform.models.per_object import PerObject, joined
 from odeform.motion.reduced_space import POSE
 from odeform.parallel import as_completed
 from odeform.progress import Progress
+from odeform.schema import Schema
 from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.solver.integrate import SolverSettings
 from odeform.training import mechanical_law
 from odeform.training.mechanical_correction import fit_correction
 from odeform.training.mechanical_law import STEP, described, fit_law, relative_errors
 from odeform.training.pushes import Pushes, read_pushes
+from odeform.training.qualities import Validation, with_qualities
 from odeform.training.saved_laws import SHARED, SavedLaws
-from odeform.types import Arrays
+from odeform.types import Arrays, Floats
 
-__all__ = ["fit_mechanical"]
+__all__ = ["fit_mechanical", "with_measured_qualities"]
 
 SEQUENCES = 8  # of each body, to which the law that all share is fitted; it has ten numbers
 OWN_SEQUENCES = 32  # to which that of one body is
 FIXED = {"pulse_s", "projectile_radius_m", "projectile_mass_kg"}
 MODES, LEFT_OUT = (120, 200), 0.2  # the second number of modes where the first leaves out more of the deformation
 Checkpointed = tuple[Arrays, dict[str, Any]]
-QUALITIES = {
-    "draft": {"method": "limex", "tolerance": 1e-3, "dtype": "float64"},
-    "balanced": {"method": "limex", "tolerance": 2.5e-4, "dtype": "float64"},
-    "reference": {"method": "limex", "step": 2.5e-4, "dtype": "float64"},
-}
+TOLERANCES = (7e-4, 6e-4, 5e-4, 4e-4, 3.5e-4, 3e-4, 2.5e-4, 2e-4, 1.8e-4, 1.5e-4, 1.2e-4, 1e-4, 8e-5, 6e-5, 4e-5)
+"""m, tried for each body."""
+SOLVER_SHARES = {"draft": (1.0, 1.0), "balanced": (0.15, 0.3)}
+"""Of the model's errors, as `odeform.training.qualities.SHARES`: this adds one per cent to the total error."""
 
 
 def fit_mechanical(
@@ -67,42 +70,47 @@ def fit_mechanical(
         some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
         shared = fit_law(some, pulse, MechanicalLaw(), report=report)
         laws.add(SHARED, shared)
-    evaluations = mechanical_law.EVALUATIONS
     bodies = [
         _Body(
+            dataset.of(name).schema,
+            {split: _inputs(dataset.of(name), split) for split in ("train", "val")},
             pushes,
             read_pushes(dataset.of(name), "val", pushes.body),
             shared,
             laws.get(name),
             pulse,
             seed,
-            evaluations,
+            mechanical_law.EVALUATIONS,
             correct,
         )
         for name, pushes in each.items()
     ]
-    found: dict[str, tuple[MechanicalLaw, Checkpointed | None]] = {}
+    found: dict[str, Checkpoint] = {}
     spent, names = time.process_time() - begin, list(each)
     progress = Progress("bodies", len(bodies))
-    for index, (law, correction, seconds) in as_completed(_fitted, bodies):
+    for index, (law, part, seconds) in as_completed(_fitted, bodies):
         name, spent = names[index], spent + seconds
         laws.add(name, law)
-        found[name] = law, correction
+        found[name] = part
         report(f"{name}: {described(law)}")
         progress.advance(note=name)
     progress.close()
-    parts = {
-        name: _checkpoint(dataset.of(name), pushes, found[name][0], pulse, found[name][1])
-        for name, pushes in each.items()
-    }
-    whole = joined(dataset.schema, parts)
+    whole = joined(dataset.schema, {name: found[name] for name in names})
     return replace(whole, config={**whole.config, "val": {"seconds": spent}})
+
+
+def _inputs(dataset: Dataset, split: str) -> Floats:
+    """(S, P) in [-1, 1]."""
+    return np.array([dataset.schema.vector(entry.parameters) for entry in dataset.select(split)])
 
 
 @dataclass(frozen=True, eq=False)
 class _Body:
     """What the fit of one body needs."""
 
+    schema: Schema
+    theta: dict[str, Floats]
+    """(S, P) inputs by split."""
     train: Pushes
     val: Pushes
     shared: MechanicalLaw
@@ -114,12 +122,51 @@ class _Body:
     correct: bool
 
 
-def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpointed | None, float]:
-    """Its law, its correction, and the seconds of processor time that they took."""
+def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpoint, float]:
+    """Its law, its checkpoint, and the seconds of processor time that they took."""
     begin = time.process_time()
     law = _law(body) if body.own is None else body.own
     correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
-    return law, correction, time.process_time() - begin
+    checkpoint = _with_qualities(_checkpoint(body, law, correction), body.theta["val"], body.val)
+    return law, checkpoint, time.process_time() - begin
+
+
+def _with_qualities(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
+    """With solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
+
+    Each body has its own: what a solver error does to a motion depends on it. Where the correction alone makes the
+    motion, none has an error, and the finest is that of all bodies.
+    """
+    known = Validation(theta, val.times, val.reduced, np.ones(val.reduced.shape[:2], dtype=bool))
+    candidates = [SolverSettings("limex", tolerance=tolerance, dtype="float64") for tolerance in TOLERANCES]
+    finest = QUALITIES["reference"]
+    chosen = with_qualities(checkpoint, known, EXACT, [*candidates, finest], SOLVER_SHARES)
+    qualities = {**chosen.config["qualities"], "reference": finest.to_json()}
+    return replace(chosen, config={**chosen.config, "qualities": qualities})
+
+
+def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:
+    """The checkpoint of a trained mechanical model, with solver settings that are chosen again on validation motions.
+
+    The model stays as it is. `InputError` for other models.
+    """
+    parts = model.parts.items() if isinstance(model, PerObject) else ()
+    asked = [
+        (part.checkpoint, _inputs(dataset.of(name), "val"), read_pushes(dataset.of(name), "val", part.body))
+        for name, part in parts
+        if isinstance(part, MechanicalODeform)
+    ]
+    if not asked:
+        raise InputError(f"{model.model}: expected a mechanical model, of pushed objects")
+    objects = dict(model.checkpoint.config["objects"])
+    for index, found in as_completed(_measured, asked):
+        name = model.schema.objects[index]
+        objects[name] = {**found.config, "schema": objects[name]["schema"]}
+    return replace(model.checkpoint, config={**model.checkpoint.config, "objects": objects})
+
+
+def _measured(asked: tuple[Checkpoint, Floats, Pushes]) -> Checkpoint:
+    return _with_qualities(*asked)
 
 
 def _law(body: _Body) -> MechanicalLaw:
@@ -145,30 +192,24 @@ def _training_pushes(dataset: Dataset, name: str) -> Pushes:
     return read_pushes(dataset.of(name), "train", elastic_body(get_object(name), many))
 
 
-def _checkpoint(
-    dataset: Dataset, pushes: Pushes, law: MechanicalLaw, pulse: float, correction: Checkpointed | None = None
-) -> Checkpoint:
-    """That of one body."""
-    body = pushes.body
+def _checkpoint(body: _Body, law: MechanicalLaw, correction: Checkpointed | None) -> Checkpoint:
+    pushes, elastic = body.train, body.train.body
     largest = [np.linalg.norm(pushes.reduced[..., part], axis=-1).max() for part in (slice(0, 3), slice(POSE, None))]
-    schema = dataset.schema
-    theta = [schema.vector(entry.parameters) for entry in dataset.select("train")]
     return Checkpoint(
         model=MechanicalODeform.model,
-        schema=schema,
+        schema=body.schema,
         config={
             "largest": [float(size) for size in largest],
-            "body": body.to_json(),
+            "body": elastic.to_json(),
             "law": asdict(law),
-            "pulse_s": pulse,
+            "pulse_s": body.pulse,
             **({"correction": correction[1]} if correction else {}),
             "projectile": asdict(pushes.projectile),
-            "qualities": QUALITIES,
         },
         arrays={
             **(correction[0] if correction else {}),
-            **body.arrays(),
-            **body.shown(),
-            "training.theta": np.array(theta, dtype=np.float32),
+            **elastic.arrays(),
+            **elastic.shown(),
+            "training.theta": body.theta["train"].astype(np.float32),
         },
     )

@@ -31,7 +31,7 @@ from odeform.training.odeform import fit_odeform
 from odeform.training.point_data import prepare_points
 from odeform.training.points import Budget, fit_points
 from odeform.training.pruning import without_modes
-from odeform.training.qualities import with_qualities
+from odeform.training.qualities import Validation, with_qualities
 from odeform.training.request import TrainRequest
 from odeform.training.rolling import fit_rolling_body, later_errors
 from odeform.training.saved_laws import SavedLaws
@@ -145,7 +145,7 @@ def _train_odeform(run: Run) -> Checkpoint:
         checkpoint = with_correction(checkpoint, data)
     checkpoint, data = without_modes(checkpoint, data)
     run.report(f"{data.space.basis.modes} of {modes} modes are needed")
-    checkpoint = with_qualities(checkpoint, data)
+    checkpoint = with_qualities(checkpoint, Validation.of(data))
     return with_continuation(ODeform(checkpoint), data)
 
 
@@ -159,7 +159,7 @@ def _train_rolling(run: Run) -> Checkpoint:
         free = data.first_free
         fading = (free + WHOLE, min(free + RINGING, len(data.times) - 1)) if free else None
         checkpoint = with_correction(checkpoint, data, fading)
-    checkpoint = with_qualities(checkpoint, data, WITH_KINKS)
+    checkpoint = with_qualities(checkpoint, Validation.of(data), WITH_KINKS)
     if (later := later_errors(RollingODeform(checkpoint), data)) is None:
         return checkpoint
     return replace(checkpoint, arrays={**checkpoint.arrays, LATER_ERRORS: later.astype(np.float32)})

@@ -25,7 +25,7 @@ from odeform.training.methods import Run, is_resumable, train_model
 from odeform.training.request import TrainRequest
 from odeform.types import Arrays
 
-__all__ = ["print_line", "train"]
+__all__ = ["print_line", "train", "write_scored"]
 
 
 def print_line(line: str) -> None:
@@ -99,7 +99,7 @@ def train(
     # the processor time of all sittings of a resumed training
     seconds = trained.config.get("val", {}).get("seconds", time.process_time() - begin)
     provenance = {**_provenance(dataset, request, seconds), **trained.provenance}
-    scores = _write_scored(replace(trained, provenance=provenance), out, dataset, parts)
+    scores = write_scored(replace(trained, provenance=provenance), out, dataset, parts)
     part.unlink(missing_ok=True)
     report(f"test: pooled RMSE {scores['rmse_pooled_mm']:.3f} mm; written to {out}")
     return load(out)
@@ -118,8 +118,8 @@ def _first(dataset: Dataset, count: int) -> Dataset:
     return replace(dataset, entries=tuple(entry for entry in dataset.entries if entry.name not in left_out))
 
 
-def _write_scored(
-    checkpoint: Checkpoint, out: str | Path, dataset: Dataset, parts: Iterable[tuple[int, int]]
+def write_scored(
+    checkpoint: Checkpoint, out: str | Path, dataset: Dataset, parts: Iterable[tuple[int, int]] = ()
 ) -> dict[str, Any]:
     """Write the checkpoint with its residuals on validation and its scores on the test split; return the scores."""
     # errors are those of motions that are watched over

@@ -4,7 +4,7 @@ import json
 
 from odeform.errors import InputError
 from odeform.models.base import Predictor
-from odeform.models.frontier import cheapest_within_error, finest_within_budget
+from odeform.models.frontier import FrontierPoint, cheapest_within_error, finest_within_budget
 from odeform_viz.browser.limits import set_limits
 from odeform_viz.page import Page, Panel
 from odeform_viz.state import PageState
@@ -36,7 +36,7 @@ class QualityPanel(Panel):
     def __init__(self, page: Page) -> None:
         predictor = _integrated(page)
         assert predictor is not None
-        self._predictor, self._wake = predictor, page.wake
+        self._predictor, self._page, self._wake = predictor, page, page.wake
         self._names = quality_names(predictor)
         self._ms_per_evaluation: float | None = None
         gui = page.server.gui
@@ -62,24 +62,28 @@ class QualityPanel(Panel):
         low, high = LIMITS[choice]
         if not low <= budget <= high:
             raise InputError(f"quality: expected a budget from {low:g} to {high:g}, got {budget:g}")
-        frontier = self._predictor.frontier
         if choice == TIME_BUDGET:
-            point = finest_within_budget(frontier, budget, self._measured_pace())
+            point = finest_within_budget(self._frontier, budget, self._measured_pace())
         else:
-            point = cheapest_within_error(frontier, budget)
+            point = cheapest_within_error(self._frontier, budget)
         return json.dumps(point.quality.to_json())
 
     def set(self, quality: str) -> None:
         """Choose what `quality` once returned; nothing changes if this predictor does not have it."""
         if quality in self._predictor.qualities:
             self._choice.value = quality
-        for point in self._predictor.frontier:
+        for point in self._frontier:
             if json.dumps(point.quality.to_json()) == quality:
                 self._choice.value, self._budget_mm.value = ERROR_BUDGET, point.solver_error_mm
                 self._changed()
 
     def restore(self, state: PageState) -> None:
         self.set(state.quality)
+
+    @property
+    def _frontier(self) -> tuple[FrontierPoint, ...]:
+        """That of the body that the parameters select."""
+        return self._predictor.frontier_of(self._predictor.complete(self._page.controls.parameters()))
 
     def _changed(self) -> None:
         self._budget_ms.visible = self._choice.value == TIME_BUDGET

@@ -91,6 +91,10 @@ def test_a_trained_checkpoint_predicts_pushes(
     assert set(predictor.qualities) == {"draft", "balanced", "reference"}
     truth = next(dataset.sequences("test"))
     motion = predictor.solve(None, truth.parameters)
+    frontier = predictor.frontier_of(motion.parameters)
+    assert {predictor.parts["donut"].qualities[name] for name in ("draft", "balanced")} <= {p.quality for p in frontier}
+    errors = [point.solver_error_mm for point in frontier]
+    assert errors == sorted(errors, reverse=True)
     assert np.array_equal(motion.vertices(0.0), predictor.rest_of(truth.parameters).points)
     moved = motion.vertices(truth.times)
     assert np.isfinite(moved).all()

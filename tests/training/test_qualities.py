@@ -12,7 +12,7 @@ from odeform.models.frontier import FrontierPoint
 from odeform.models.odeform.model import ODeform
 from odeform.solver.integrate import SolverSettings
 from odeform.training import qualities
-from odeform.training.qualities import USELESS, choose_qualities, measure_frontier
+from odeform.training.qualities import USELESS, Validation, choose_qualities, measure_frontier
 
 Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
 
@@ -20,7 +20,7 @@ Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
 @pytest.fixture(scope="module")
 def measured(dataset: Dataset, predictors: dict[str, Predictor]) -> Measured:
     model = cast(ODeform, predictors["odeform"])
-    return measure_frontier(model, prepare(dataset, modes=model.space.basis.modes))
+    return measure_frontier(model, Validation.of(prepare(dataset, modes=model.space.basis.modes)))
 
 
 def test_a_frontier_trades_work_for_accuracy(measured: Measured, predictors: dict[str, Predictor]) -> None:
@@ -74,7 +74,6 @@ def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
 ) -> None:
     model = cast(ODeform, predictors["odeform"])
     monkeypatch.setattr(qualities, "_candidates", lambda _: [SolverSettings("rk4", step=0.01)])
-    data = prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True))
-    unknown = ~data.observed["val"][..., None]
-    wrong = replace(data, reduced={**data.reduced, "val": data.reduced["val"] + 9.0 * unknown})
-    assert measure_frontier(model, wrong) == measure_frontier(model, data)
+    known = Validation.of(prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True)))
+    wrong = replace(known, reduced=known.reduced + 9.0 * ~known.observed[..., None])
+    assert measure_frontier(model, wrong) == measure_frontier(model, known)

@@ -11,6 +11,7 @@ from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
+from odeform.models.frontier import FrontierPoint
 from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.mechanical.correction import Correction, coordinate_shares
 from odeform.models.mechanical.elastic_body import ElasticBody
@@ -24,13 +25,20 @@ from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats
 
-__all__ = ["MechanicalODeform"]
+__all__ = ["EXACT", "QUALITIES", "MechanicalODeform"]
 
 HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
+QUALITIES = {
+    "draft": SolverSettings("limex", tolerance=5e-4, dtype="float64"),
+    "balanced": SolverSettings("limex", tolerance=1.5e-4, dtype="float64"),
+    "reference": SolverSettings("limex", step=2.5e-4, dtype="float64"),
+}
+"""Of bodies whose solver errors were not measured."""
 FALLBACK = SolverSettings("limex", step=2.5e-3, dtype="float64")
-FINER = {SolverSettings("limex", step=1.25e-4, dtype="float64"): 0.0}  # what solver errors are measured against
+EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
+"""The reference for solver errors."""
 
 
 class MechanicalODeform(ReducedModel):
@@ -46,7 +54,9 @@ class MechanicalODeform(ReducedModel):
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest = float(shift), float(deformation)
-        self.qualities = {name: SolverSettings(**values) for name, values in config["qualities"].items()}
+        chosen = {name: SolverSettings(**values) for name, values in config.get("qualities", {}).items()}
+        self.qualities = chosen or QUALITIES
+        self.frontier = tuple(FrontierPoint.from_json(row) for row in config.get("frontier", ()))
         self.correction = Correction(checkpoint.arrays, config["correction"]) if "correction" in config else None
 
     # these take a moment, and not every object of a checkpoint is looked at
@@ -88,7 +98,15 @@ class MechanicalODeform(ReducedModel):
 
         radius = self.space.gyration_radius
         solved: Trajectory = LatentTrajectory(
-            pushed, decode, pushed.start, settings, FALLBACK, until, radius, lambda: (pushed, pushed.start), FINER
+            pushed,
+            decode,
+            pushed.start,
+            settings,
+            FALLBACK,
+            until,
+            radius,
+            lambda: (pushed, pushed.start),
+            {EXACT: 0.0},
         )
         if self.correction is not None:
             known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])

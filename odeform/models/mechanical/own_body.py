@@ -141,8 +141,10 @@ class OwnBodyPredictor(MechanicalODeform):
         self.trained, self.own = trained, own
         body, checkpoint = own.body, part.checkpoint
         self.distance = shape_distance(Mesh(body.points.astype(np.float32), body.faces), part.rest)
-        # a correction is that of the trained body: what similar shapes get of it is added below
-        kept = {key: value for key, value in checkpoint.config.items() if key != "correction"}
+        # a correction is that of the trained body: what similar shapes get of it is added below; and so are solver
+        # errors, which were not measured on this one
+        of_trained = ("correction", "qualities", "frontier")
+        kept = {key: value for key, value in checkpoint.config.items() if key not in of_trained}
         super().__init__(
             replace(
                 checkpoint,
