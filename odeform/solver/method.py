@@ -32,7 +32,10 @@ class Stepper(Protocol):
 
 @runtime_checkable
 class Method(Protocol):
-    """A one-step method. Between its nodes a solution is the cubic Hermite interpolant of states and slopes."""
+    """A one-step method. Between its nodes a solution is the cubic Hermite interpolant of states and slopes.
+
+    One that controls its step may have `gains` of its own, in place of `odeform.solver.integrate.GAINS`.
+    """
 
     @property
     def name(self) -> str:
@@ -47,12 +50,6 @@ class Method(Protocol):
     @property
     def controls_step(self) -> bool:
         """Whether `Stepper.error` is there, so that a tolerance can choose the steps."""
-        ...
-
-    @property
-    def gains(self) -> tuple[float, float]:
-        """Of step control by the errors of this step and the last one: exponents times the order (Gustafsson 1991, ACM
-        TOMS 17(4)); only asked of methods that control their step."""
         ...
 
     @property

@@ -118,11 +118,6 @@ class ExplicitRungeKutta:
         return self.tableau.embedded is not None
 
     @property
-    def gains(self) -> tuple[float, float]:
-        """Without the last error, a third of the steps into a landing were rejected."""
-        return 0.7, 0.4
-
-    @property
     def knows_middle(self) -> bool:
         """Whether the interpolant is quartic."""
         return self.tableau.middle is not None

@@ -127,7 +127,8 @@ def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpoint, float]:
     begin = time.process_time()
     law = _law(body) if body.own is None else body.own
     correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
-    checkpoint = _with_qualities(_checkpoint(body, law, correction), body.theta["val"], body.val)
+    checkpoint = _checkpoint(body.schema, body.theta["train"], body.train, law, body.pulse, correction)
+    checkpoint = _with_qualities(checkpoint, body.theta["val"], body.val)
     return law, checkpoint, time.process_time() - begin
 
 
@@ -192,24 +193,32 @@ def _training_pushes(dataset: Dataset, name: str) -> Pushes:
     return read_pushes(dataset.of(name), "train", elastic_body(get_object(name), many))
 
 
-def _checkpoint(body: _Body, law: MechanicalLaw, correction: Checkpointed | None) -> Checkpoint:
-    pushes, elastic = body.train, body.train.body
+def _checkpoint(
+    schema: Schema,
+    theta: Floats,
+    pushes: Pushes,
+    law: MechanicalLaw,
+    pulse: float,
+    correction: Checkpointed | None = None,
+) -> Checkpoint:
+    """That of one body, trained on `pushes` with inputs `theta` (S, P)."""
+    body = pushes.body
     largest = [np.linalg.norm(pushes.reduced[..., part], axis=-1).max() for part in (slice(0, 3), slice(POSE, None))]
     return Checkpoint(
         model=MechanicalODeform.model,
-        schema=body.schema,
+        schema=schema,
         config={
             "largest": [float(size) for size in largest],
-            "body": elastic.to_json(),
+            "body": body.to_json(),
             "law": asdict(law),
-            "pulse_s": body.pulse,
+            "pulse_s": pulse,
             **({"correction": correction[1]} if correction else {}),
             "projectile": asdict(pushes.projectile),
         },
         arrays={
             **(correction[0] if correction else {}),
-            **elastic.arrays(),
-            **elastic.shown(),
-            "training.theta": body.theta["train"].astype(np.float32),
+            **body.arrays(),
+            **body.shown(),
+            "training.theta": theta.astype(np.float32),
         },
     )

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from odeform.models.base import Predictor
+from odeform.models.frontier import cheapest_within_error
 from odeform.models.registry import load
 from odeform_viz.app import App
 from odeform_viz.benchmark.client import LoopbackClient
@@ -58,6 +59,20 @@ def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: 
     client.set("at most (mm)", -1.0)
     client.set("quality", ERROR_BUDGET)
     assert client.until(lambda: "expected a budget from 1e-06 to 100, got -1" in client.text())
+
+
+def test_a_budget_is_that_of_the_object_at_hand(serve) -> None:
+    model = load("contact-force")
+    app, client = serve(Column("odeform", model, model.rest, origin="contact-force"))
+    client.set("quality", ERROR_BUDGET)
+    client.set("at most (mm)", 0.3)
+    settings = []
+    for name in ("bottle", "dog"):
+        frontier = model.frontier_of({"object": name})
+        settings.append(cheapest_within_error(frontier, 0.3).quality.to_json())
+        client.set("object", name)
+        assert client.until(lambda: chosen(app) == settings[-1])
+    assert settings[0] != settings[1]
 
 
 def test_what_a_model_lacks_is_not_there(serve, kick: Predictor) -> None:
