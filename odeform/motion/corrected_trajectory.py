@@ -13,20 +13,20 @@ __all__ = ["CorrectedTrajectory"]
 
 
 class CorrectedTrajectory(ChangedTrajectory):
-    """Within the trained window y = share * own + rest. Beyond it, what that adds to the own motion stays as it is
+    """Within the trained window y = kept * own + rest. Beyond it, what that adds to the own motion stays as it is
     at the end: the motion there is its own."""
 
     def __init__(
         self,
         own: Trajectory,
-        shares: Float[np.ndarray, " y"],
+        kept: Float[np.ndarray, " y"],
         rest: Callable[[Floats], Float[np.ndarray, "times y"]],
         stop: float,
     ) -> None:
-        """`own` is what is solved for, `shares` and `rest` are those of its correction, which ends at `stop`
-        seconds."""
+        """`own` is what is solved for, of which the factors `kept` (6 + K,) and `rest` are those of its correction,
+        which ends at `stop` seconds."""
         super().__init__(own)
-        self._taken, self._rest, self._stop = 1.0 - shares, rest, stop
+        self._taken, self._rest, self._stop = 1.0 - kept, rest, stop
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K), zero at time 0."""

@@ -34,7 +34,7 @@ __all__ = ["fit_mechanical", "with_measured_qualities"]
 SEQUENCES = 8  # of each body, to which the law that all share is fitted; it has ten numbers
 OWN_SEQUENCES = 32  # to which that of one body is
 FIXED = {"pulse_s", "projectile_radius_m", "projectile_mass_kg"}
-MODES, LEFT_OUT = (120, 200), 0.2  # the second number of modes where the first leaves out more of the deformation
+MODES, LEFT_OUT = (120, 400), 0.15  # the second number of modes where the first leaves out more of the deformation
 Checkpointed = tuple[Arrays, dict[str, Any]]
 TOLERANCES = (7e-4, 6e-4, 5e-4, 4e-4, 3.5e-4, 3e-4, 2.5e-4, 2e-4, 1.8e-4, 1.5e-4, 1.2e-4, 1e-4, 8e-5, 6e-5, 4e-5)
 """m, tried for each body."""

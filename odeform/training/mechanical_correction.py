@@ -3,28 +3,37 @@ what that leaves."""
 
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from odeform.mechanics.law import MechanicalLaw
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.contact.regression import PARTS, fit_contact_regression
-from odeform.training.mechanical_law import STEP
+from odeform.motion.reduced_space import POSE
 from odeform.training.pushes import Pushes
-from odeform.types import Arrays
+from odeform.types import Arrays, Floats
 
 __all__ = ["SHARES", "fit_correction"]
 
+STEP = 1e-3  # s, of the integration: errors of longer ones are not what the model will predict
 ENERGY = 0.99  # of the deformations that are left to the correction, in the modes of their trajectories
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)
+SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
 """Of the mechanics' motion, tried for each part. Without any, a part is the regression of whole motions."""
+PRIOR = 0.1  # weight of a gain of one, relative to that of the motions
 
 
 def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and settings of the correction of one body: see `odeform.models.mechanical.correction`.
 
-    Shift, rotation and deformation have the share with the smallest squared error on training motions, each predicted
-    from all others, and validation motions together.
+    Each coefficient of the deformation has the gain of least squares. Shift, rotation and deformation have the share
+    with the smallest squared error on training motions, each predicted from all others, and validation motions
+    together.
     """
     known, asked = (ContactInputs(p.contacts, p.normals, p.forces) for p in (train, val))
     own, own_val = (p.predicted(law, pulse, STEP) for p in (train, val))
+    gains = _gains(own[..., POSE:], train.reduced[..., POSE:])
+    own[..., POSE:] *= gains
+    own_val[..., POSE:] *= gains
     trials = {
         share: fit_contact_regression(
             known, asked, train.times, train.reduced - share * own, val.reduced - share * own_val, ENERGY
@@ -32,7 +41,8 @@ def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float)
         for share in SHARES
     }
     best = {part: min(SHARES, key=lambda share: trials[share][1]["errors"][part]) for part in PARTS}
-    arrays = {key: value for key, value in trials[best["deformation"]][0].items() if not _part_of(key)}
+    arrays: Arrays = {"gains": gains.astype(np.float32)}
+    arrays |= {key: value for key, value in trials[best["deformation"]][0].items() if not _part_of(key)}
     settings: dict[str, Any] = {"shares": best, "blend": {}, "trials": []}
     for part, share in best.items():
         found, chosen = trials[share]
@@ -42,6 +52,13 @@ def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float)
             {"part": part, "share": tried, "error": result["errors"][part]} for tried, (_, result) in trials.items()
         ]
     return arrays, settings
+
+
+def _gains(own: Floats, truth: Floats) -> Float[np.ndarray, " coefficients"]:
+    """(K,) of least squares between deformations (S, T, K) by mechanics and in truth, drawn towards one."""
+    power = (own**2).sum(axis=(0, 1))
+    prior = PRIOR * power + 1e-4 * power.max() + 1e-30
+    return ((own * truth).sum(axis=(0, 1)) + prior) / (power + prior)
 
 
 def _part_of(key: str) -> str | None:

@@ -16,6 +16,7 @@ from odeform.training.pushes import Pushes, _projection
 from odeform.types import Floats
 
 COUNT, FRAMES, MODES = 40, 5, 3
+GAINS = np.array([1.0, 1.0, 2.0])  # by which deformations are larger than mechanics says
 
 
 class Predicted(Pushes):
@@ -42,7 +43,7 @@ def pushes(seed: int) -> Predicted:
     )  # fmt: skip
     own = np.zeros_like(reduced)
     own[..., :3] = times[:, None] * rng.normal(size=(COUNT, 1, 3))
-    own[..., POSE:] = times[:, None] * rough
+    own[..., POSE:] = times[:, None] * rough / GAINS
     object.__setattr__(made, "own", own)
     return made
 
@@ -53,6 +54,10 @@ def test_each_part_is_predicted_by_what_knows_it() -> None:
     assert settings["shares"]["shift"] == 0.0
     assert settings["shares"]["deformation"] == 1.0
     correction = Correction({"times": train.times, **arrays}, settings)
+    np.testing.assert_allclose(correction.gains, GAINS, rtol=0.15)
+    assert correction.gains[2] > 1.7
+    np.testing.assert_array_equal(correction.kept[:POSE], np.repeat([0.0, settings["shares"]["rotation"]], 3))
+    np.testing.assert_array_equal(correction.kept[POSE:], correction.gains)
     push = ContactInputs(val.contacts[:1], val.normals[:1], val.forces[:1])
     rest = correction.over_time(push)(val.times)
     error = rest[:, :3] - val.reduced[0, :, :3]
@@ -66,8 +71,9 @@ def test_a_share_that_is_none_is_refused() -> None:
     arrays, settings = fit_correction(pushes(0), pushes(1), MechanicalLaw(), 0.04)
     with pytest.raises(ValueError, match="expected shares from 0 to 1"):
         Correction(arrays, {**settings, "shares": {**settings["shares"], "shift": 1.5}})
-    # files of before shares were fitted have none
-    assert set(Correction(arrays, {"blend": settings["blend"]}).shares.values()) == {1.0}
+    # files of before shares and gains were fitted have none
+    old = {key: array for key, array in arrays.items() if key != "gains"}
+    np.testing.assert_array_equal(Correction(old, {"blend": settings["blend"]}).kept, np.ones(POSE + MODES))
 
 
 def test_vertices_without_weight_do_not_count() -> None:

@@ -12,8 +12,9 @@ from odeform.cli import main
 from odeform.errors import InputError
 from odeform.geometry.contact import nearest_on
 from odeform.mechanics.law import MechanicalLaw
+from odeform.models.contact.regression import PARTS
 from odeform.models.error_band import NOMINAL
-from odeform.models.mechanical.carried_correction import shape_distance, share_at
+from odeform.models.mechanical.carried_correction import CarriedCorrection, shape_distance, share_at
 from odeform.models.mechanical.elastic_body import elastic_body
 from odeform.models.mechanical.model import MechanicalODeform
 from odeform.models.mechanical.own_body import OwnBodyPredictor, resting_body
@@ -22,7 +23,7 @@ from odeform.simulation.contacts import vector_of
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.generate import generate
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
-from odeform.types import Mesh, MotionSequence
+from odeform.types import Floats, Mesh, MotionSequence
 from odeform.unseen.left_out import without
 from odeform.unseen.measure import measure
 from odeform.unseen.predictions import nearest_motion
@@ -114,6 +115,30 @@ def test_distance_does_not_depend_on_where_a_shape_stands_and_less_is_carried_ov
     taller = Mesh(body.points * np.float32([1.0, 1.0, 1.5]), body.faces)
     assert shape_distance(aside, body) < 1e-3 < shape_distance(taller, body)
     assert 1.0 >= share_at(0.0) > share_at(0.1) > 0.0
+
+
+def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: OwnBodyPredictor) -> None:
+    """The same body gets its own gains, as much as is carried over; one with stiffer modes those of stiffer modes."""
+    gains, times = np.linspace(1.0, 2.0, 12), np.arange(3) / 100.0
+    part = PerObject(_corrected(checkpoint, gains, times), MechanicalODeform).parts["donut"]
+    assert isinstance(part, MechanicalODeform)
+    body = donut.own.body
+    same = CarriedCorrection(part, body, 0.5)
+    np.testing.assert_allclose(same.kept[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
+    np.testing.assert_allclose(same.kept[18:], 1.5)  # its other modes are stiffer than all of the trained body
+    stiffer = CarriedCorrection(part, replace(body, squares=1e9 * body.squares), 0.5)
+    np.testing.assert_allclose(stiffer.kept[6:], 1.5)
+
+
+def _corrected(checkpoint: Checkpoint, gains: Floats, times: Floats) -> Checkpoint:
+    """With a correction of the donut that has gains, and adds nothing."""
+    settings = {"shares": dict.fromkeys(PARTS, 1.0), "blend": {part: [] for part in PARTS}}
+    known = {f"gp.{name}": np.ones((1, 3)) for name in ("contact", "normal", "force")}
+    arrays = {"times": times, "gains": gains, "gp.modes": np.zeros((1, len(times) * len(gains))), **known}
+    objects = {**checkpoint.config["objects"]}
+    objects["donut"] = {**objects["donut"], "correction": settings}
+    added = {f"donut/{key}": array for key, array in arrays.items()}
+    return replace(checkpoint, config={**checkpoint.config, "objects": objects}, arrays={**checkpoint.arrays, **added})
 
 
 def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, donut: OwnBodyPredictor) -> None:

@@ -9,6 +9,7 @@ from odeform.geometry.contact import nearest_on
 from odeform.geometry.likeness import compare_shapes
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.mechanical.coordinates import coordinates_of
+from odeform.models.mechanical.correction import kept_of
 from odeform.models.mechanical.elastic_body import ElasticBody
 from odeform.models.mechanical.model import MechanicalODeform
 from odeform.motion.reduced_space import POSE
@@ -47,11 +48,16 @@ class CarriedCorrection:
     """Part of what the trained body's mechanics leaves unexplained, at the nearest point of its surface."""
 
     def __init__(self, part: MechanicalODeform, body: ElasticBody, share: float) -> None:
-        """`share` is the part of the correction of `part`, which has one, that is carried over to `body`."""
+        """`share` is the part of the correction of `part`, which has one, that is carried over to `body`.
+
+        `kept` (6 + K,) and `stop` are as those of `Correction`.
+        """
         shape = Mesh(body.points.astype(np.float32), body.faces)
         assert part.correction is not None
         self._part, self._correction, self._share = part, part.correction, share
-        self.shares = {name: 1.0 - share * (1.0 - kept) for name, kept in part.correction.shares.items()}
+        # a gain belongs to a stiffness, and modes of the same number need not be as stiff in both bodies
+        gains = np.interp(np.log(body.squares), np.log(part.body.squares), part.correction.gains)
+        self.kept = 1.0 - share * (1.0 - kept_of(part.correction.shares, gains))
         self.stop = part.correction.stop
         self._offset = standing_offset(shape, part.rest) + body.anchor
         there = Mesh(shape.points + standing_offset(shape, part.rest).astype(np.float32), shape.faces)

@@ -9,16 +9,17 @@ from scipy.interpolate import CubicSpline
 
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.contact.regression import PARTS, ContactRegression
+from odeform.motion.reduced_space import POSE
 from odeform.types import Arrays, Floats
 
-__all__ = ["Correction", "coordinate_shares"]
+__all__ = ["Correction", "kept_of"]
 
 
-def coordinate_shares(shares: Mapping[str, float], coordinates: int) -> Float[np.ndarray, " y"]:
-    """(6 + K,) shares of the mechanics' motion for each coordinate, from those of shift, rotation and deformation."""
-    out = np.ones(coordinates)
+def kept_of(shares: Mapping[str, float], gains: Float[np.ndarray, " coefficients"]) -> Float[np.ndarray, " y"]:
+    """(6 + K,) factors of the mechanics' motion, from shares of shift, rotation and deformation and gains (K,)."""
+    out = np.concatenate([np.ones(POSE), gains])
     for part, columns in PARTS.items():
-        out[columns] = shares[part]
+        out[columns] *= shares[part]
     return out
 
 
@@ -26,6 +27,11 @@ class Correction:
     """Kernel regression in the contact's frame of reduced motions of one body, less a share of the mechanics' motion.
 
     The baseline `gp` is the same regression of whole motions. At rest it is zero.
+
+    Attributes:
+        shares: Of the mechanics' shift, rotation and deformation.
+        gains: (K,) by which coefficients of the deformation are larger than the mechanics says: soft matter that is
+            compressed gives way more than its linear stiffness does, the more so in its stiff modes.
     """
 
     def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
@@ -38,6 +44,13 @@ class Correction:
         self.shares = {part: float(settings.get("shares", {}).get(part, 1.0)) for part in PARTS}
         if not all(0.0 <= share <= 1.0 for share in self.shares.values()):
             raise ValueError(f"correction: expected shares from 0 to 1, got {self.shares}")
+        coefficients = arrays["gp.modes"].shape[1] // len(self._times)
+        self.gains = arrays.get("gains", np.ones(coefficients)).astype(float)
+
+    @property
+    def kept(self) -> Float[np.ndarray, " y"]:
+        """(6 + K,): the factor of each coordinate of the mechanics' motion, to which the regression is added."""
+        return kept_of(self.shares, self.gains)
 
     @property
     def stop(self) -> float:

@@ -13,7 +13,7 @@ from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.frontier import FrontierPoint
 from odeform.models.mechanical.coordinates import Coordinates, coordinates_of, space_of
-from odeform.models.mechanical.correction import Correction, coordinate_shares
+from odeform.models.mechanical.correction import Correction
 from odeform.models.mechanical.elastic_body import ElasticBody
 from odeform.models.odeform.latent_trajectory import LatentTrajectory
 from odeform.models.reduced_model import ReducedModel
@@ -21,7 +21,7 @@ from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.lifted_trajectory import LiftedTrajectory
 from odeform.motion.reduced_motion import Trajectory
-from odeform.motion.reduced_space import POSE, ReducedSpace
+from odeform.motion.reduced_space import ReducedSpace
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats
 
@@ -110,9 +110,8 @@ class MechanicalODeform(ReducedModel):
         )
         if self.correction is not None:
             known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])
-            shares = coordinate_shares(self.correction.shares, POSE + self.space.basis.modes)
             rest = self.correction.over_time(known)
-            solved = CorrectedTrajectory(solved, shares, rest, self.correction.stop)
+            solved = CorrectedTrajectory(solved, self.correction.kept, rest, self.correction.stop)
         body, window = self.watched_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
         return LiftedTrajectory(solved, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from odeform.models.mechanical.correction import coordinate_shares
+from odeform.models.mechanical.correction import kept_of
 from odeform.motion.base import SolveStats
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory
@@ -13,7 +13,7 @@ from odeform.types import Floats
 
 STOP = 0.2  # s
 SPEED = np.array([1.0, 2.0, -3.0, 0.1, 0.2, 0.3, 0.01, 0.02])
-SHARES = coordinate_shares({"shift": 0.5, "rotation": 1.0, "deformation": 0.0}, len(SPEED))
+KEPT = kept_of({"shift": 0.5, "rotation": 1.0, "deformation": 0.8}, np.array([1.0, 2.5]))
 
 
 STATS = SolveStats("none", 0, 0, 0, "ok", 0.0, lambda: None)
@@ -31,13 +31,13 @@ class Steady:
 
 
 def corrected() -> CorrectedTrajectory:
-    return CorrectedTrajectory(Steady(), SHARES, lambda times: 1.0 + 0.0 * times[:, None] * SPEED, STOP)
+    return CorrectedTrajectory(Steady(), KEPT, lambda times: 1.0 + 0.0 * times[:, None] * SPEED, STOP)
 
 
-def test_a_part_has_its_share_of_the_mechanics() -> None:
-    np.testing.assert_array_equal(SHARES, [0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 0.0, 0.0])
+def test_a_part_has_its_share_of_the_mechanics_and_each_coefficient_its_gain() -> None:
+    np.testing.assert_array_equal(KEPT, [0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 0.8, 2.0])
     times = np.array([0.05, 0.15])
-    np.testing.assert_allclose(corrected().reduced(times), SHARES * times[:, None] * SPEED + 1.0)
+    np.testing.assert_allclose(corrected().reduced(times), KEPT * times[:, None] * SPEED + 1.0)
     assert not corrected().reduced(np.zeros(1)).any()
 
 
