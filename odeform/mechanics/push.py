@@ -12,8 +12,8 @@ from odeform.types import Floats, Ints, Vectors
 __all__ = ["WIDTHS", "Push", "make_push"]
 
 NEAR = 300  # samples around the contact that the projectile may touch
-LOADED = 1000  # samples around the contact that patches of load may reach
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
+LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +90,11 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1)
     stiff, batch = body.squares[soft:], len(around)
     loads = np.empty((batch, len(stiff), 3, len(WIDTHS)))
-    for load, patch, loaded in zip(loads, patches, around, strict=True):
+    # from near to far; the nearest one is loaded wherever it is
+    counts = np.maximum((away <= (REACH * max(WIDTHS)) ** 2).sum(axis=1), 1)
+    for load, patch, loaded, count in zip(loads, patches, around, counts, strict=True):
         for axis in range(3):
-            load[:, axis] = (patch @ body.surface.rows[axis].take(loaded, axis=0))[:, soft:].T
+            load[:, axis] = (patch[:, :count] @ body.surface.rows[axis].take(loaded[:count], axis=0))[:, soft:].T
     loads = loads.reshape(batch, len(stiff), -1)
     local = np.linalg.qr(loads / stiff[:, None])[0]
     squares, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))

@@ -92,9 +92,8 @@ class PushedBody:
         return np.concatenate([velocity[:3], turn, velocity[6 : now.body], speed, acceleration, missing])
 
     def body_motion(self, states: Float[np.ndarray, "times state"]) -> tuple[Vectors, Rotations, Floats, Vectors]:
-        """Shifts (T, 3) m, rotations (T, 3, 3), amplitudes of the body's modes (T, M) and centres of the projectile
-        (T, 3) m of states (T, 20 + 2 K). Interpolated rotations are made orthonormal."""
+        """Shifts (T, 3) m, rotations (T, 3, 3), amplitudes of the directions of deformation (T, K) and centres of the
+        projectile (T, 3) m of states (T, 20 + 2 K). Interpolated rotations are made orthonormal."""
         shift, turn, amplitudes, way, _ = (states[:, part] for part in self._parts)
         left, _, right = np.linalg.svd(turn.reshape(-1, 3, 3))
-        modes = amplitudes @ self.push.modes[0].T
-        return shift, left @ right, modes, self.push.centres + way * self.push.guides
+        return shift, left @ right, amplitudes, self.push.centres + way * self.push.guides

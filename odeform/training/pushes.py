@@ -71,9 +71,8 @@ class Pushes:
         every = round(float(self.times[1] - self.times[0]) / step)
         coordinates, _ = coordinates_of(self.body)
         kept = slice(0, every * (len(self.times) - 1) + 1, every)
-        modes = nodes.amplitudes[:, kept] @ push.modes.transpose(0, 2, 1)
-        parts = zip(nodes.shifts[:, kept], nodes.rotations[:, kept], modes, strict=True)
-        return np.stack([coordinates.reduced(*part) for part in parts])
+        parts = zip(push.modes, nodes.shifts[:, kept], nodes.rotations[:, kept], nodes.amplitudes[:, kept], strict=True)
+        return np.stack([coordinates.along(modes).reduced(*motion) for modes, *motion in parts])
 
 
 def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:

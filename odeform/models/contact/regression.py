@@ -113,7 +113,7 @@ class ContactRegression:
         """From what `fit_contact_regression` returns. `KeyError` where something is missing."""
         self._known = ContactInputs(*(arrays[f"gp.{name}"].astype(float) for name in INPUTS))
         self._frames = len(arrays["times"])
-        self._modes = arrays["gp.modes"].astype(float)
+        self._modes = arrays["gp.modes"].astype(np.float32)  # read whole for each push, and stored with less
         blend = settings["blend"]
         self._experts = {
             part: [(share, self._expert(arrays, part, index)) for index, share in enumerate(blend[part]) if share]
@@ -138,7 +138,7 @@ class ContactRegression:
             values = np.zeros((len(inputs.contact), 3 * self._frames if turned else len(self._modes)))
             for share, expert in experts:
                 values += share * expert.predict(inputs, turned)
-            flat = values if turned else values @ self._modes
+            flat = values if turned else (values.astype(np.float32) @ self._modes).astype(float)
             parts.append(flat.reshape(len(values), self._frames, -1))
         return np.concatenate(parts, axis=2)
 

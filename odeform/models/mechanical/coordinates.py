@@ -33,6 +33,11 @@ class Coordinates:
     pairs: tuple[Ints, Ints]
     """(P,) i and j."""
 
+    def along(self, directions: Float[np.ndarray, "modes directions"]) -> "Coordinates":
+        """The same maps from amplitudes of directions of deformation, whose first K are modes themselves."""
+        maps = {name: getattr(self, name) @ directions for name in ("shifts", "turns", "coefficients")}
+        return replace(self, **maps)
+
     def reduced(self, shift: Vectors, rotation: Rotations, modes: Floats) -> Float[np.ndarray, "times y"]:
         """(T, 6 + B): the body's motion as shift, rotation vector and coefficients, in m and radians."""
         one, other = self.pairs

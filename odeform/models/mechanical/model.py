@@ -92,9 +92,10 @@ class MechanicalODeform(ReducedModel):
             self.mechanics.body, self.body.dynamic, point.point[None] - anchor, centre[None] - anchor, force[None]
         )
         pushed = PushedBody(self.mechanics, push, self.pulse)
+        coordinates = self.coordinates.along(push.modes[0])
 
         def decode(times: Floats, states: Floats) -> Floats:
-            return self.coordinates.reduced(*pushed.body_motion(states)[:3])
+            return coordinates.reduced(*pushed.body_motion(states)[:3])
 
         radius = self.space.gyration_radius
         solved: Trajectory = LatentTrajectory(
