@@ -71,6 +71,8 @@ def test_a_share_that_is_none_is_refused() -> None:
     arrays, settings = fit_correction(pushes(0), pushes(1), MechanicalLaw(), 0.04)
     with pytest.raises(ValueError, match="expected shares from 0 to 1"):
         Correction(arrays, {**settings, "shares": {**settings["shares"], "shift": 1.5}})
+    with pytest.raises(ValueError, match="expected 3 gains"):
+        Correction({**arrays, "gains": np.ones(2)}, settings)
     # files of before shares and gains were fitted have none
     old = {key: array for key, array in arrays.items() if key != "gains"}
     np.testing.assert_array_equal(Correction(old, {"blend": settings["blend"]}).kept, np.ones(POSE + MODES))

@@ -36,16 +36,18 @@ class Correction:
 
     def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
         """From what `odeform.training.mechanical_correction` returns. `KeyError` where something is missing,
-        `ValueError` for a share that is none."""
+        `ValueError` for a share that is none, or for another number of gains than of coefficients."""
         # weaker pushes were not trained, and without one nothing moves
         self._weakest = float(np.linalg.norm(arrays["gp.force"], axis=1).min())
         self._regression, self._times = ContactRegression(arrays, settings), arrays["times"].astype(float)
-        # files of before shares were fitted have none
+        # files of before shares or gains were fitted have none
         self.shares = {part: float(settings.get("shares", {}).get(part, 1.0)) for part in PARTS}
         if not all(0.0 <= share <= 1.0 for share in self.shares.values()):
             raise ValueError(f"correction: expected shares from 0 to 1, got {self.shares}")
         coefficients = arrays["gp.modes"].shape[1] // len(self._times)
         self.gains = arrays.get("gains", np.ones(coefficients)).astype(float)
+        if self.gains.shape != (coefficients,):
+            raise ValueError(f"correction: expected {coefficients} gains, got shape {self.gains.shape}")
 
     @property
     def kept(self) -> Float[np.ndarray, " y"]:
