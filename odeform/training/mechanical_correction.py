@@ -10,12 +10,12 @@ from odeform.mechanics.law import MechanicalLaw
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.contact.regression import PARTS, fit_contact_regression
 from odeform.motion.reduced_space import POSE
+from odeform.training.mechanical_law import FINE
 from odeform.training.pushes import Pushes
 from odeform.types import Arrays, Floats
 
 __all__ = ["SHARES", "fit_correction"]
 
-STEP = 1e-3  # s, of the integration: errors of longer ones are not what the model will predict
 ENERGY = 0.99  # of the deformations that are left to the correction, in the modes of their trajectories
 SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
 """Of the mechanics' motion, tried for each part. Without any, a part is the regression of whole motions."""
@@ -30,7 +30,7 @@ def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float)
     together.
     """
     known, asked = (ContactInputs(p.contacts, p.normals, p.forces) for p in (train, val))
-    own, own_val = (p.predicted(law, pulse, STEP) for p in (train, val))
+    own, own_val = (p.predicted(law, pulse, FINE) for p in (train, val))
     gains = _gains(own[..., POSE:], train.reduced[..., POSE:])
     own[..., POSE:] *= gains
     own_val[..., POSE:] *= gains

@@ -11,9 +11,9 @@ from odeform.motion.reduced_space import POSE
 from odeform.training.pushes import Pushes
 from odeform.types import Floats
 
-__all__ = ["described", "fit_law", "relative_errors"]
+__all__ = ["FINE", "described", "fit_law", "relative_errors"]
 
-STEP = 2.5e-3  # s, of the integration while the law is fitted: a third of a per cent of the motion
+STEP, FINE = 2.5e-3, 1e-3  # s, of the integration while a law is fitted, and of motions by the one that is found
 RANGE = 30.0  # factor by which a number may differ from where it starts
 EVALUATIONS = 5  # of the errors and their derivatives
 NAMES = tuple(asdict(MechanicalLaw()))
