@@ -91,7 +91,9 @@ def test_what_is_shown_does_not_depend_on_what_was_asked_before(predictor: Predi
     times = np.array([0.3, 0.02, 0.7, 0.11])
     together = predictor.solve().vertices(times)
     motion = predictor.solve()
-    assert all(np.array_equal(motion.vertices(float(t)), v) for t, v in zip(times[::-1], together[::-1], strict=True))
+    # on some machines products over one row and over several round differently, in single precision
+    for time, vertices in zip(times[::-1], together[::-1], strict=True):
+        np.testing.assert_allclose(motion.vertices(float(time)), vertices, rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.slow
