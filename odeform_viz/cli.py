@@ -15,7 +15,7 @@ from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
-from odeform_viz.own_shapes import describe_own_body, read_own_body, takes_own_bodies, with_own_body
+from odeform_viz.own_shapes import describe_own_body, read_own_body, takes_user_bodies, with_own_body
 from odeform_viz.recording.replay import TOLERANCE, replay
 from odeform_viz.runtime.access import is_loopback
 
@@ -31,7 +31,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     `InputError` for checkpoints and shapes that cannot be read.
     """
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
-    if geometry is not None and takes_own_bodies(models[checkpoint]):
+    if geometry is not None and takes_user_bodies(models[checkpoint]):
         print(f"{geometry}: making a soft body of it...", flush=True)
         own = read_own_body(geometry)
         print(describe_own_body(own))

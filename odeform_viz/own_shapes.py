@@ -7,30 +7,30 @@ from pathlib import Path
 import numpy as np
 
 from odeform.models.base import Predictor
-from odeform.models.mechanical.own_body import OwnBody, OwnBodyPredictor, own_body, takes_own_bodies
+from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
 from odeform_viz.columns import Column
 from odeform_viz.fitting import readable_shape
 
 __all__ = [
-    "OwnBody",
-    "OwnBodyPredictor",
+    "UserBody",
+    "UserBodyPredictor",
     "describe_own_body",
     "own_of",
     "read_own_body",
-    "takes_own_bodies",
+    "takes_user_bodies",
     "with_own_body",
     "without_own_body",
 ]
 
 
-def read_own_body(name: str | Path) -> OwnBody:
-    """The body of a file; see `odeform.models.mechanical.own_body.own_body`. `InputError` for a file without one."""
+def read_own_body(name: str | Path) -> UserBody:
+    """The body of a file; see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
     geometry, _ = readable_shape(name)
-    own = own_body(geometry, Path(name).name)
+    own = user_body(geometry, Path(name).name)
     return replace(own, fit=replace(own.fit, origin=str(name)))
 
 
-def describe_own_body(own: OwnBody) -> str:
+def describe_own_body(own: UserBody) -> str:
     """One line: points, size and material."""
     size = 1e3 * float(np.ptp(own.item.settled, axis=0).max())
     points = len(own.fit.geometry.points)
@@ -40,23 +40,23 @@ def describe_own_body(own: OwnBody) -> str:
     )
 
 
-def own_of(predictor: Predictor | None) -> OwnBody | None:
+def own_of(predictor: Predictor | None) -> UserBody | None:
     """The user's own body that a model moves; None for trained bodies."""
-    return predictor.own if isinstance(predictor, OwnBodyPredictor) else None
+    return predictor.own if isinstance(predictor, UserBodyPredictor) else None
 
 
-def with_own_body(columns: Sequence[Column], own: OwnBody) -> list[Column]:
+def with_own_body(columns: Sequence[Column], own: UserBody) -> list[Column]:
     """The columns with another body: those of models that know only trained bodies are hidden, as are truths."""
     return [_moved(column, own) for column in columns]
 
 
-def _moved(column: Column, own: OwnBody) -> Column:
+def _moved(column: Column, own: UserBody) -> Column:
     predictor = column.predictor
     if predictor is None or column.pinned is not None:
         return replace(column, visible=column.visible and predictor is not None)
-    if not takes_own_bodies(predictor):
+    if not takes_user_bodies(predictor):
         return replace(column, visible=False)
-    return replace(column, source=OwnBodyPredictor(predictor, own), geometry=own.fit.geometry, fit=own.fit)
+    return replace(column, source=UserBodyPredictor(predictor, own), geometry=own.fit.geometry, fit=own.fit)
 
 
 def without_own_body(columns: Sequence[Column]) -> list[Column]:
@@ -66,6 +66,6 @@ def without_own_body(columns: Sequence[Column]) -> list[Column]:
 
 def _trained(column: Column) -> Column:
     predictor = column.predictor
-    if not isinstance(predictor, OwnBodyPredictor):
+    if not isinstance(predictor, UserBodyPredictor):
         return replace(column, visible=column.visible and predictor is not None)
     return replace(column, source=predictor.trained, geometry=predictor.trained.rest, fit=None)

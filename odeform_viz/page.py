@@ -11,7 +11,7 @@ from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import fit_from_json
 from odeform_viz.layout import Layout
-from odeform_viz.own_shapes import read_own_body, takes_own_bodies, with_own_body
+from odeform_viz.own_shapes import read_own_body, takes_user_bodies, with_own_body
 from odeform_viz.pushing import ShownPush
 from odeform_viz.recording.control import RecordingControl
 from odeform_viz.runtime.clock import Clock
@@ -175,7 +175,7 @@ class Page:
         """
         state = self.workspace.confined(state_from_json(data, self.schema.scene))
         columns = columns_of(state, self.schema)
-        if state.shape and any(takes_own_bodies(c.predictor) for c in columns if c.predictor):
+        if state.shape and any(takes_user_bodies(c.predictor) for c in columns if c.predictor):
             columns = with_own_body(columns, read_own_body(state.shape["origin"]))
         elif state.shape:
             fit = fit_from_json(state.shape, self.body)

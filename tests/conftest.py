@@ -17,16 +17,16 @@ from filelock import FileLock
 from joblib import parallel_config
 from threadpoolctl import threadpool_limits
 
-import odeform.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
+import odeform.models.latent.training.loop  # noqa: F401  (declares types of the real settings, before they are patched)
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
-from odeform.models.baselines.point_model import PointModel
-from odeform.models.baselines.point_network import Trial
+from odeform.models.latent.training import config
+from odeform.models.points.point_model import PointModel
+from odeform.models.points.point_network import Trial
 from odeform.models.registry import load, models_of
 from odeform.simulation import runner
 from odeform.simulation.scenes import kick as kick_scene
-from odeform.training import config
 from odeform.training.train import train
 
 RANGES = {"mass": (0.5, 1.0), "bending": (0.3, 2.0), "force": (100.0, 150.0), "elevation": (0.5, math.pi / 4)}

@@ -15,6 +15,7 @@ import torch
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint, write_checkpoint
 from odeform.errors import InputError
 from odeform.models.base import Predictor
+from odeform.models.names import ALIASES
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
 
@@ -72,7 +73,7 @@ def test_a_reloaded_model_predicts_the_same(
     write_checkpoint(tmp_path / "copy.safetensors", read_checkpoint(trained[model]))
     again = load(tmp_path / "copy.safetensors")
     assert isinstance(again, Predictor)
-    assert again.model == model
+    assert again.model == ALIASES.get(model, model)
     times = np.linspace(0.0, 1.2, 7)
     assert np.array_equal(again.solve().vertices(times), predictors[model].solve().vertices(times))
 

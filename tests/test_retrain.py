@@ -73,7 +73,7 @@ def test_only_solver_settings_of_pushed_objects_are_measured_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["retrain", "kick", "--only", "qualities", "--keep", str(tmp_path)]) == 2
-    assert "odeform-rolling: expected a mechanical model" in capsys.readouterr().err
+    assert "rolling: expected a mechanical model" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -14,9 +14,9 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
-from odeform.models.baselines.odeform_per_point import OdeformPerPoint
 from odeform.models.frontier import EXACT
 from odeform.models.integrated_model import IntegratedModel
+from odeform.models.points.odeform_per_point import OdeformPerPoint
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load
 from odeform.motion.reduced_space import motion_rmse

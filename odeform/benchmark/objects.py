@@ -10,7 +10,7 @@ from odeform.benchmark.timing import milliseconds, quantiles
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.scores import Scores
-from odeform.models.mechanical.model import EXACT
+from odeform.models.modal.model import EXACT
 from odeform.models.per_object import PerObject
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import get_scene

@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> None:
     from odeform.formats.writing import motion_files, write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import Similarity
-    from odeform.models.mechanical.own_body import OwnBodyPredictor, own_body, takes_own_bodies
+    from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
     from odeform.models.registry import load, observations
     from odeform.motion.caveats import caveats
     from odeform.types import GaussianSplats
@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> None:
     truth, settings = _read_truth(args, predictor, settings) if args.truth else (None, settings)
     if args.geometry is None and not predictor.rescales_input:
         _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
-    elif args.geometry is not None and takes_own_bodies(predictor):
-        predictor = OwnBodyPredictor(predictor, own_body(read_shape(args.geometry)[0], Path(args.geometry).name))
+    elif args.geometry is not None and takes_user_bodies(predictor):
+        predictor = UserBodyPredictor(predictor, user_body(read_shape(args.geometry)[0], Path(args.geometry).name))
         fit, settings = predictor.own.fit, {**predictor.parameters_like(), **settings}
         _note(f"{args.geometry}: its material and forces are those of the {predictor.own.like}")
     elif args.geometry is not None:

@@ -92,18 +92,18 @@ def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None
 
 def _has(what: str, model: "Predictor") -> bool:
     """Whether a bundled model has what `--only` makes again."""
-    from odeform.training.continuation import is_continued
+    from odeform.models.training.continuation import is_continued
 
-    return is_continued(model) if what == "continuation" else model.model == "odeform-mechanical"
+    return is_continued(model) if what == "continuation" else model.model == "modal"
 
 
 def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command: str) -> None:
     """Write the bundled checkpoint of this name with another of `AGAIN`."""
     from odeform.checkpoint import write_checkpoint
     from odeform.dataset.store import open_dataset
+    from odeform.models.modal.training.fit import with_measured_qualities
     from odeform.models.registry import load_model
-    from odeform.training.continuation import refitted
-    from odeform.training.mechanical import with_measured_qualities
+    from odeform.models.training.continuation import refitted
     from odeform.training.train import write_scored
 
     known = {**recorded.provenance, what: {"command": command, "versions": {"odeform": version("odeform")}}}

@@ -10,12 +10,11 @@ HELP = "Train a model on a data set and score it on the test split"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    from odeform.models.registry import MODELS
-    from odeform.training.request import ABLATIONS
+    from odeform.models.names import TRAINABLE
 
     parser.add_argument("dataset", metavar="DATASET", help=DATA)
     parser.add_argument("--out", required=True, metavar="FILE", help="checkpoint to write")
-    models = f"one of {', '.join(name for name in MODELS if name != 'released')} (default: odeform)"
+    models = f"one of {', '.join(TRAINABLE)} (default: odeform)"
     parser.add_argument("--model", default="odeform", metavar="NAME", help=models)
     add_window(parser, "train on")
     parser.add_argument("--every", type=int, default=1, metavar="K", help="train on every K-th frame (default: 1)")
@@ -37,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--sequences", type=int, metavar="N", help="train on the first N training sequences (default: all)"
     )
     parser.add_argument(
-        "--without", default="", metavar="PART,...", help=f"leave out parts of the model, of {', '.join(ABLATIONS)}"
+        "--without", default="", metavar="PART,...", help="leave out parts of the model, as docs/cli.md lists them"
     )
     parser.add_argument(
         "--object", nargs="+", default=[], metavar="NAME", help="train on these objects only, of a scene with several"

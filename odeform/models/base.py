@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from odeform.schema import OBJECT, Parameters
 from odeform.simulation.scenes.registry import find_scene
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
+
+if TYPE_CHECKING:
+    from odeform.models.training.run import Run
 
 __all__ = ["Predictor", "check_finite"]
 
@@ -59,8 +62,7 @@ class Predictor(ABC):
         >>> band.shape
         (121, 2)
 
-    A subclass sets `model`, reads its arrays in `_read` and predicts in `_solve`; how it is trained stands with it
-    too (`odeform.models.registry`).
+    A subclass sets `model`, reads its arrays in `_read`, predicts in `_solve`, and is trained by `train`.
     """
 
     model: str
@@ -77,6 +79,23 @@ class Predictor(ABC):
     """Whether motions continue beyond the trained window; otherwise only the window can be scored."""
     final_only: bool = False
     """Whether only the state at the end of the window is predicted; nothing else is scored then."""
+
+    knows_objects: bool = False
+    """Whether one training covers all objects of a scene; otherwise there is one for each object."""
+    closed_form: bool = False
+    """Whether it is solved for, so that a training has no budget."""
+    resumable: bool = False
+    """Whether an interrupted training can be continued."""
+    ablations: ClassVar[Mapping[str, str]] = {}
+    """Parts that a training may leave out, and what that means."""
+
+    @classmethod
+    def train(cls, run: "Run") -> Checkpoint:
+        """Train on the data of `run`, and return what a checkpoint keeps, without its scores.
+
+        Raises `InputError` for data that the model cannot be trained on; so do models that are only read.
+        """
+        raise InputError(f"{cls.model}: is only read, and cannot be trained")
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         try:

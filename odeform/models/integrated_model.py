@@ -4,7 +4,7 @@ from abc import abstractmethod
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.frontier import FrontierPoint
-from odeform.models.odeform.inference import Decoder
+from odeform.models.latent.inference import Decoder
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.reduced_motion import Trajectory

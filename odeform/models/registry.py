@@ -8,7 +8,7 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
-from odeform.models.names import MODELS, TRAINABLE
+from odeform.models.names import ALIASES, MODELS, TRAINABLE
 from odeform.models.per_object import PerObject, is_per_object
 from odeform.models.reduced_model import ReducedModel
 from odeform.schema import Schema
@@ -31,10 +31,11 @@ Kind = TypeVar("Kind", bound=Predictor)
 
 
 def model_class(name: str) -> type[Predictor]:
-    """The class of a registered model; `InputError` for any other name."""
-    if name not in MODELS:
+    """The class of a registered model, or of an alias of one; `InputError` for any other name."""
+    known = ALIASES.get(name, name)
+    if known not in MODELS:
         raise InputError(f"unknown model {name!r}: expected one of {', '.join(MODELS)}")
-    module, _, attribute = MODELS[name].partition(":")
+    module, _, attribute = MODELS[known].partition(":")
     return getattr(importlib.import_module(module), attribute)
 
 
@@ -66,7 +67,7 @@ def load(name: str | Path) -> Predictor:
     Examples:
         >>> import odeform
         >>> odeform.load("kick").model
-        'odeform-rolling'
+        'rolling'
         >>> odeform.load("mass-elastic/pod-rbf").model
         'pod-rbf'
     """

@@ -6,8 +6,8 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.models.integrated_model import IntegratedModel
-from odeform.models.odeform.inference import Field, make_field
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.inference import Field, make_field
+from odeform.models.latent.model import LatentModel
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Method
 from odeform.solver.registry import METHODS
@@ -49,7 +49,7 @@ def _order(field: Field, start: Floats, method: Method, span: float) -> float:
     return observed_order([part / (NODES * times) for times in refined], errors)
 
 
-def check_orders(model: ODeform, seed: int = 0) -> Checks:
+def check_orders(model: LatentModel, seed: int = 0) -> Checks:
     """`order_METHOD_deviation`: difference between the observed order and the method's own, on the model's field."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     fields = {dtype: make_field(model.weights, model.config, dtype) for dtype in (np.float64, np.longdouble)}

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.stats import rankdata
 
 from odeform.models.integrated_model import IntegratedModel
-from odeform.models.odeform.inference import Field
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.inference import Field
+from odeform.models.latent.model import LatentModel
 from odeform.motion.reduced_motion import as_reduced
 from odeform.motion.reduced_space import POSE, motion_rmse, small_motion
 from odeform.schema import LATER
@@ -111,7 +111,7 @@ def _rank_correlation(one: Floats, other: Floats) -> float:
     return float(np.corrcoef(rankdata(one), rankdata(other))[0, 1])
 
 
-def check_sensitivities(model: ODeform, seed: int = 0) -> Checks:
+def check_sensitivities(model: LatentModel, seed: int = 0) -> Checks:
     """`sensitivity_relative`: derivatives by the parameters, from the ODE, against central differences over a slider
     step; relative to the largest in the window, for the worst parameter, pose and deformation together."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema

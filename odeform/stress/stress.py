@@ -13,7 +13,7 @@ from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.integrated_model import IntegratedModel
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load_reduced
 from odeform.motion.base import Motion
 from odeform.parallel import parallel_map
@@ -103,7 +103,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAW
     checks |= check_consistency(predictor, seed) | check_physics(predictor, seed)
     watched, inside = check_shown(checkpoint, draws, seed)
     checks |= watched
-    if isinstance(predictor, ODeform):  # others have contacts, at whose begin no method keeps its order
+    if isinstance(predictor, LatentModel):  # others have contacts, at whose begin no method keeps its order
         checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
     if isinstance(predictor, IntegratedModel):
         checks |= check_field(predictor, seed) | check_calibration(predictor, seed)

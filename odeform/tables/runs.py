@@ -20,9 +20,9 @@ from odeform.io import atomic_write
 from odeform.models.continuation import without_continuation
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load
+from odeform.models.training.request import TrainRequest
 from odeform.parallel import as_completed
 from odeform.progress import Progress
-from odeform.training.request import TrainRequest
 from odeform.training.train import train
 
 __all__ = ["ALONE", "KEPT", "Result", "Run", "complete_runs", "kept_scores"]

@@ -15,11 +15,11 @@ from odeform.evaluation.simple import SimplePredictor, ballistic, continued, eva
 from odeform.identification.table import identify_split
 from odeform.io import atomic_write
 from odeform.models.registry import load
+from odeform.models.training.continuation import fit_dynamics
 from odeform.simulation.scenes.registry import get_scene
 from odeform.tables.page import page
 from odeform.tables.plan import AHEAD, BALLS, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
 from odeform.tables.runs import KEPT, complete_runs, kept_scores
-from odeform.training.continuation import fit_dynamics
 
 __all__ = ["tables"]
 

@@ -18,11 +18,12 @@ from odeform.identification.discrepancy import LEAST, calibrate
 from odeform.io import require_writable
 from odeform.models.base import Predictor
 from odeform.models.integrated_model import IntegratedModel
-from odeform.models.registry import load
+from odeform.models.names import ALIASES
+from odeform.models.registry import load, model_class
+from odeform.models.training.body import body_arrays
+from odeform.models.training.request import TrainRequest
+from odeform.models.training.run import Run, train_model
 from odeform.schema import OBJECT
-from odeform.training.body import body_arrays
-from odeform.training.methods import Run, is_resumable, train_model
-from odeform.training.request import TrainRequest
 from odeform.types import Arrays
 
 __all__ = ["print_line", "train", "write_scored"]
@@ -55,8 +56,8 @@ def train(
 
     Args:
         dataset: What `open_dataset` or `simulate` returned.
-        out: The checkpoint to write. While `odeform` trains, its state is kept in `OUT.part`.
-        model: One of `odeform.models.registry.TRAINABLE`: `odeform`, or a baseline by its name.
+        out: The checkpoint to write. The state of a training that can be resumed is kept in `OUT.part`.
+        model: One of `odeform.models.registry.TRAINABLE`: a family of ODeform, or a baseline, by its name.
         minutes: Budget of processor time, trials included, unless `steps` is given.
         steps: Number of training steps, in place of `minutes`: repeatable on any machine.
         seed: Seeds initial weights and batches.
@@ -65,7 +66,7 @@ def train(
         stagger: Start every n-th frame at a different frame in each sequence, so that the sequences interleave.
         resume: Continue the interrupted training of which `OUT.part` is the state.
         sequences: Train on the first n training sequences, of each object if there are several; default: all.
-        without: Parts of the model to leave out: names of `odeform.training.request.ABLATIONS`.
+        without: Parts of the model to leave out: names of its class's `ablations`.
         objects: The objects to train on and to score, of a scene with several; default: all.
         parts: Half-open ranges of frames to score separately as well.
         report: Called with each line of progress; default: prints it to standard error.
@@ -84,13 +85,14 @@ def train(
         >>> predictor.model, predictor.checkpoint.scores["sequences"]
         ('nearest', 4)
     """
+    model = "modal" if model == "odeform" and dataset.schema.objects else ALIASES.get(model, model)
     request = TrainRequest(
         model, seed, minutes, steps, window, every, stagger, resume, sequences, tuple(without), tuple(objects)
     )
     part = Path(f"{out}.part")
     require_writable(Path(out))
-    if resume and not (is_resumable(model) and part.exists()):
-        raise InputError(f"resume: expected {part}, which an interrupted training of odeform leaves")
+    if resume and not (model_class(model).resumable and part.exists()):
+        raise InputError(f"resume: expected {part}, which an interrupted training leaves")
     begin = time.process_time()
     if names := request.objects or dataset.objects:
         dataset = dataset.of(*names)

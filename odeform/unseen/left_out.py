@@ -8,14 +8,14 @@ import numpy as np
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.mechanics.law import MechanicalLaw
-from odeform.models.mechanical.model import MechanicalODeform
+from odeform.models.modal.model import ModalModel
+from odeform.models.modal.training.contact_fit import fit_law
+from odeform.models.modal.training.fit import SEQUENCES
+from odeform.models.modal.training.pushes import read_pushes
 from odeform.models.per_object import PerObject
 from odeform.schema import OBJECT
 from odeform.simulation.objects.canonical import distances_to
 from odeform.simulation.objects.catalog import get_object
-from odeform.training.mechanical import SEQUENCES
-from odeform.training.mechanical_law import fit_law
-from odeform.training.pushes import read_pushes
 from odeform.types import MotionSequence
 from odeform.unseen.shapes import LEFT_OUT, UnseenShape
 
@@ -32,7 +32,7 @@ def law_without(trained: PerObject, dataset: Dataset, name: str, report: Callabl
     """
     bodies, laws = [], []
     for other, part in trained.parts.items():
-        if other != name and isinstance(part, MechanicalODeform):
+        if other != name and isinstance(part, ModalModel):
             laws.append(list(asdict(part.law).values()))
             entries = dataset.select("train", other)
             kept = np.random.default_rng(0).permutation(len(entries))[:SEQUENCES]
@@ -50,7 +50,7 @@ def without(trained: PerObject, name: str, law: MechanicalLaw) -> PerObject:
     parts = {other: part for other, part in checkpoint.config["objects"].items() if other != name}
     config = {**checkpoint.config, "objects": {other: {**part, "law": asdict(law)} for other, part in parts.items()}}
     schema = replace(checkpoint.schema, objects=tuple(other for other in checkpoint.schema.objects if other != name))
-    return PerObject(replace(checkpoint, schema=schema, config=config), MechanicalODeform)
+    return PerObject(replace(checkpoint, schema=schema, config=config), ModalModel)
 
 
 def left_out_shape(dataset: Dataset, name: str, trained: PerObject) -> UnseenShape:

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from odeform.geometry.rigid import best_rigid
 from odeform.models.base import Predictor
-from odeform.models.mechanical.own_body import OwnBodyPredictor
+from odeform.models.modal.user_body import UserBodyPredictor
 from odeform.types import Floats, Frames, Perpoint, Points
 from odeform.unseen.predictions import Predictions, predictions
 from odeform.unseen.shapes import UnseenShape
@@ -23,7 +23,7 @@ class Measured:
 
     shape: UnseenShape
     distance: float
-    """From what was trained, see `OwnBodyPredictor.distance`."""
+    """From what was trained, see `UserBodyPredictor.distance`."""
     errors: Float[np.ndarray, "pushes times"]
     """mm, RMSE of the model."""
     predicted: Float[np.ndarray, "pushes times"]
@@ -51,7 +51,7 @@ class Measured:
         }
 
 
-def measure(predictor: OwnBodyPredictor, nearest: Predictor, shape: UnseenShape) -> Measured:
+def measure(predictor: UserBodyPredictor, nearest: Predictor, shape: UnseenShape) -> Measured:
     """All pushes of a shape. `nearest` has the trained object that is carried over."""
     found = [predictions(predictor, nearest, motion) for motion in shape.motions]
     rest, weights = predictor.rest.points.astype(float), shape.item.weights

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 
 from odeform.geometry.contact import CONE, surface_point, touching_centre
 from odeform.models.base import Predictor
-from odeform.models.mechanical.own_body import OwnBodyPredictor
+from odeform.models.modal.user_body import UserBodyPredictor
 from odeform.motion.base import Motion
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.contacts import CONTACT, FORCE, vector_of
@@ -30,7 +30,7 @@ class Predictions:
     """Those of the nearest trained object under the same push."""
 
 
-def predictions(predictor: OwnBodyPredictor, nearest: Predictor, truth: MotionSequence) -> Predictions:
+def predictions(predictor: UserBodyPredictor, nearest: Predictor, truth: MotionSequence) -> Predictions:
     """All of one push. `nearest` is the trained model whose own object is carried over to the shape."""
     like = predictor.own.like
     given = {**truth.parameters, **predictor.parameters_like()}

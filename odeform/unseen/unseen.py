@@ -15,8 +15,8 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.io import atomic_write
 from odeform.mechanics.law import MechanicalLaw
-from odeform.models.mechanical.own_band import OWN_BAND, OwnErrors, coverage, fit_own_band
-from odeform.models.mechanical.own_body import OwnBodyPredictor, resting_body, takes_own_bodies
+from odeform.models.modal.shape_band import SHAPE_BAND, ShapeErrors, coverage, fit_shape_band
+from odeform.models.modal.user_body import UserBodyPredictor, resting_body, takes_user_bodies
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load
 from odeform.unseen.instances import factors_of
@@ -56,7 +56,7 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
         InputError: A model that knows trained bodies only, or a scan that is no solid.
     """
     trained = load(checkpoint)
-    if not isinstance(trained, PerObject) or not takes_own_bodies(trained):
+    if not isinstance(trained, PerObject) or not takes_user_bodies(trained):
         raise InputError(f"checkpoint {checkpoint}: expected a mechanical model of several objects")
     seen = trained.checkpoint.scores["per_object"]
     found, failed = [], {}
@@ -68,7 +68,7 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
     if not found:
         raise InputError(f"{plan.keep}: expected finished shapes with motions, found none")
     rows = {one.shape.name: one.to_json(seen[_class_of(one.shape)]) for one in found}
-    errors = [OwnErrors(one.distance, np.sqrt((one.predicted**2).mean(axis=1)), one.errors) for one in found]
+    errors = [ShapeErrors(one.distance, np.sqrt((one.predicted**2).mean(axis=1)), one.errors) for one in found]
     times = trained.schema.window.times[1:]
     return {
         "checkpoint": trained.checkpoint.sha256,
@@ -78,7 +78,7 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
         "not_simulated": failed,
         "kinds": {kind: _mean([row for row in rows.values() if row["kind"] == kind]) for kind in BARS},
         "coverage_90": _held_out_coverage(errors, times),
-        OWN_BAND: fit_own_band(errors, times).to_json(),
+        SHAPE_BAND: fit_shape_band(errors, times).to_json(),
     }
 
 
@@ -86,7 +86,7 @@ def attach_band(checkpoint: str | Path, result: dict[str, Any]) -> None:
     """Store the error band of a result of `unseen` in the checkpoint, which is written anew."""
     path = resolve_checkpoint(str(checkpoint))
     found = read_checkpoint(path)
-    write_checkpoint(path, replace(found, config={**found.config, OWN_BAND: result[OWN_BAND]}))
+    write_checkpoint(path, replace(found, config={**found.config, SHAPE_BAND: result[SHAPE_BAND]}))
 
 
 def _shapes(trained: PerObject, plan: Plan) -> Iterator[tuple[UnseenShape, PerObject]]:
@@ -127,7 +127,7 @@ def _law(trained: PerObject, dataset: Dataset, name: str, path: Path) -> Mechani
 
 
 def _measured(model: PerObject, shape: UnseenShape) -> Measured:
-    return measure(OwnBodyPredictor(model, resting_body(shape.item, shape.like)), model, shape)
+    return measure(UserBodyPredictor(model, resting_body(shape.item, shape.like)), model, shape)
 
 
 def _class_of(shape: UnseenShape) -> str:
@@ -151,7 +151,7 @@ def _mean(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def _held_out_coverage(errors: Sequence[OwnErrors], times: np.ndarray) -> dict[str, float] | None:
+def _held_out_coverage(errors: Sequence[ShapeErrors], times: np.ndarray) -> dict[str, float] | None:
     """Coverage of bands that are fitted on a random half of the shapes, on the other half; None for few shapes."""
     if len(errors) < 4:
         return None
@@ -159,6 +159,6 @@ def _held_out_coverage(errors: Sequence[OwnErrors], times: np.ndarray) -> dict[s
     for _ in range(HALVES):
         order = rng.permutation(len(errors))
         one, other = ([errors[at] for at in part] for part in np.array_split(order, 2))
-        found.append(coverage(fit_own_band(one, times), other))
+        found.append(coverage(fit_shape_band(one, times), other))
     low, high = np.quantile(found, [0.1, 0.9])
     return {"mean": float(np.mean(found)), "p10": float(low), "p90": float(high)}

@@ -8,10 +8,10 @@ import viser
 from odeform.errors import InputError
 from odeform_viz.fitting import MOST_POINTS, readable_shape
 from odeform_viz.own_shapes import (
-    OwnBody,
+    UserBody,
     describe_own_body,
     own_of,
-    takes_own_bodies,
+    takes_user_bodies,
     with_own_body,
     without_own_body,
 )
@@ -48,7 +48,7 @@ class OwnShapePanel(Panel):
     @classmethod
     def needed(cls, page: Page) -> bool:
         predictor = page.model.predictor
-        return predictor is not None and takes_own_bodies(predictor)
+        return predictor is not None and takes_user_bodies(predictor)
 
     def restore(self, state: PageState) -> None:
         self._show()
@@ -74,7 +74,7 @@ class OwnShapePanel(Panel):
         except (InputError, OSError) as error:
             self._failed(str(error))
 
-    def _made(self, own: OwnBody, origin: str) -> None:
+    def _made(self, own: UserBody, origin: str) -> None:
         with LOCK:
             made = replace(own, fit=replace(own.fit, origin=origin))
             self._page.columns.change(lambda columns: with_own_body(columns, made))

@@ -14,7 +14,7 @@ from odeform.geometry.shape import FittedShape, fit_to
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.fitting import MOST_POINTS, describe_fit, shape_from
-from odeform_viz.own_shapes import takes_own_bodies
+from odeform_viz.own_shapes import takes_user_bodies
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.alignment import Alignment
 from odeform_viz.panels.callbacks import LOCK, serialized
@@ -58,7 +58,7 @@ class ShapePanel(Panel):
     @classmethod
     def needed(cls, page: Page) -> bool:
         predictor = page.model.predictor
-        return predictor is None or not takes_own_bodies(predictor)
+        return predictor is None or not takes_user_bodies(predictor)
 
     def set(self, fit: FittedShape | None) -> None:
         """Another shape, or the same in another part or transform; None for the trained body."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from odeform.geometry.likeness import Likeness
-from odeform_viz.own_shapes import OwnBodyPredictor
+from odeform_viz.own_shapes import UserBodyPredictor
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.view import Description
@@ -13,7 +13,7 @@ __all__ = ["ShapeWarningPanel", "shape_warning"]
 STYLE = "margin:0.4em 0.8em;padding:0.5em 0.8em;border-radius:0.4em;background:#b54708;color:#fff;font-size:0.85em"
 
 
-def shape_warning(likenesses: Iterable[Likeness | None], own: OwnBodyPredictor | None = None) -> str:
+def shape_warning(likenesses: Iterable[Likeness | None], own: UserBodyPredictor | None = None) -> str:
     """HTML; empty if all shapes were trained, or nothing is known of the trained ones.
 
     `own` is a mechanical model that has made a body of the shape.
@@ -28,7 +28,7 @@ def shape_warning(likenesses: Iterable[Likeness | None], own: OwnBodyPredictor |
     )
 
 
-def _motion(own: OwnBodyPredictor | None) -> str:
+def _motion(own: UserBodyPredictor | None) -> str:
     if own is None:
         return "It moves as the trained body would; no error is known"
     motion = own.describe_motion().capitalize()
@@ -57,9 +57,9 @@ class ShapeWarningPanel(Panel):
         self._show(shape_warning(likenesses, self._own))
 
     @property
-    def _own(self) -> OwnBodyPredictor | None:
+    def _own(self) -> UserBodyPredictor | None:
         predictor = self._page.model.predictor
-        return predictor if isinstance(predictor, OwnBodyPredictor) else None
+        return predictor if isinstance(predictor, UserBodyPredictor) else None
 
     def _show(self, text: str) -> None:
         set_content(self._box, text)

@@ -7,7 +7,7 @@ from typing import Any
 
 from odeform.checkpoint import bundled_checkpoints, resolve_checkpoint
 from odeform.dataset.folder import INDEX
-from odeform.models.mechanical.own_body import OwnBodyPredictor
+from odeform.models.modal.user_body import UserBodyPredictor
 from odeform.motion.base import Motion
 from odeform.types import GaussianSplats, Geometry, Mesh
 from odeform_viz.columns import Column
@@ -35,7 +35,7 @@ def provenance_of(column: Column) -> dict[str, Any]:
     trained body, and left out for other shapes.
     """
     truth = column.truth
-    own = column.predictor if isinstance(column.predictor, OwnBodyPredictor) else None
+    own = column.predictor if isinstance(column.predictor, UserBodyPredictor) else None
     common = {
         "label": column.label,
         "origin": origin_of(column),

@@ -151,10 +151,10 @@ def simulate_own_body(report: Report, item: Any, parameters: dict[str, Any], rat
 
 
 def own_body_of(_: Report, geometry: Geometry, name: str) -> Any:
-    """A shape as a soft body (`OwnBody`)."""
-    from odeform.models.mechanical.own_body import own_body
+    """A shape as a soft body (`UserBody`)."""
+    from odeform.models.modal.user_body import user_body
 
-    return own_body(geometry, name)
+    return user_body(geometry, name)
 
 
 def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoint, seen: Observation) -> Identification:

@@ -6,18 +6,18 @@ import pytest
 from odeform.benchmark import equal_error
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.simulation.scenes.registry import get_scene
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def model(predictors: dict[str, Predictor]) -> ODeform:
-    return cast(ODeform, predictors["odeform"])
+def model(predictors: dict[str, Predictor]) -> LatentModel:
+    return cast(LatentModel, predictors["odeform"])
 
 
-def test_a_motion_transferred_to_its_own_mesh_is_unchanged(dataset: Dataset, model: ODeform) -> None:
+def test_a_motion_transferred_to_its_own_mesh_is_unchanged(dataset: Dataset, model: LatentModel) -> None:
     sequence = next(dataset.sequences("val")).until(0.3)
     azimuth = model.schema.azimuth(sequence.parameters)
     carried = equal_error.carried_over(sequence, sequence, model.space.anchor, azimuth)
@@ -27,7 +27,7 @@ def test_a_motion_transferred_to_its_own_mesh_is_unchanged(dataset: Dataset, mod
 
 @pytest.mark.usefixtures("coarse")
 def test_a_coarser_simulation_has_a_larger_error(
-    dataset: Dataset, model: ODeform, monkeypatch: pytest.MonkeyPatch
+    dataset: Dataset, model: LatentModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The fixture's scene has 4 segments and steps of 2 ms; its data set is the truth of that setting."""
     scene = get_scene("kick")
@@ -44,5 +44,5 @@ def test_a_coarser_simulation_has_a_larger_error(
     assert row["pays_off_after"] * (row["ms"] - row["ours_ms"]) >= spent
 
 
-def test_a_missing_data_set_is_the_reason_for_skipping(model: ODeform) -> None:
+def test_a_missing_data_set_is_the_reason_for_skipping(model: LatentModel) -> None:
     assert "--data" in equal_error.simulator(model, None)["skipped"]

@@ -8,21 +8,21 @@ from odeform.benchmark.probes import nearest_sequences
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.solver.integrate import SolverSettings
 
 
 @pytest.fixture(scope="module")
-def model(predictors: dict[str, Predictor]) -> ODeform:
-    return cast(ODeform, predictors["odeform"])
+def model(predictors: dict[str, Predictor]) -> LatentModel:
+    return cast(LatentModel, predictors["odeform"])
 
 
 @pytest.fixture(scope="module")
-def points(model: ODeform, dataset: Dataset) -> list[OperatingPoint]:
+def points(model: LatentModel, dataset: Dataset) -> list[OperatingPoint]:
     return operating_points(model, dataset)
 
 
-def test_operating_points_are_the_default_and_a_corner(points: list[OperatingPoint], model: ODeform) -> None:
+def test_operating_points_are_the_default_and_a_corner(points: list[OperatingPoint], model: LatentModel) -> None:
     default, corner = points
     assert default.parameters == model.schema.complete(None)
     assert np.allclose(np.abs(model.schema.vector(corner.parameters)), 1.0)
@@ -33,7 +33,7 @@ def test_operating_points_are_the_default_and_a_corner(points: list[OperatingPoi
 
 
 def test_the_model_error_is_that_of_the_converged_solution(
-    points: list[OperatingPoint], model: ODeform, dataset: Dataset
+    points: list[OperatingPoint], model: LatentModel, dataset: Dataset
 ) -> None:
     near = nearest_sequences(dataset, points[0].parameters, len(points[0].sequences))
     assert [entry.name for entry in near.entries] == list(points[0].sequences)
@@ -42,7 +42,7 @@ def test_the_model_error_is_that_of_the_converged_solution(
     assert all(point.model_error_mm is None for point in operating_points(model, None))
 
 
-def test_finer_settings_cost_more_and_err_less(points: list[OperatingPoint], model: ODeform) -> None:
+def test_finer_settings_cost_more_and_err_less(points: list[OperatingPoint], model: LatentModel) -> None:
     for method in ("euler", "midpoint", "rk4", "bosh3", "dopri5"):
         settings = [quality for quality in ladder(1.0 / 120.0) if quality.method == method]
         coarse, fine = (measure(model, points[1], setting, repeats=1) for setting in (settings[0], settings[-1]))
@@ -53,7 +53,7 @@ def test_finer_settings_cost_more_and_err_less(points: list[OperatingPoint], mod
 
 
 def test_double_precision_reaches_errors_that_single_precision_cannot(
-    points: list[OperatingPoint], model: ODeform
+    points: list[OperatingPoint], model: LatentModel
 ) -> None:
     single, double = (
         measure(model, points[0], SolverSettings("dopri5", tolerance=1e-9, dtype=dtype), repeats=1)["solver_error_mm"]

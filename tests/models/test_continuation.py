@@ -9,11 +9,11 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
 from odeform.models.base import Predictor
 from odeform.models.continuation import PREFIX, ContinuedTrajectory, Dynamics
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load
+from odeform.models.training.continuation import fit_dynamics
 from odeform.motion.base import SolveStats
 from odeform.schema import REACH, Schema, Window
-from odeform.training.continuation import fit_dynamics
 from odeform.types import Floats
 
 RATE, GRAVITY = 60.0, np.array([0.3, 0.0, -5.0])
@@ -50,10 +50,10 @@ def flying() -> Dynamics:
 
 
 @pytest.fixture(scope="module")
-def pair(dataset: Dataset, predictors: dict[str, Predictor]) -> tuple[ODeform, ODeform]:
+def pair(dataset: Dataset, predictors: dict[str, Predictor]) -> tuple[LatentModel, LatentModel]:
     """The trained model as older checkpoints have it, and continued."""
     model = predictors["odeform"]
-    assert isinstance(model, ODeform)
+    assert isinstance(model, LatentModel)
     checkpoint = model.checkpoint
     data = prepare(dataset, model.space.basis.modes)
     dynamics = fit_dynamics(data.theta["train"], data.reduced["train"], data.space.gyration_radius)
@@ -63,8 +63,8 @@ def pair(dataset: Dataset, predictors: dict[str, Predictor]) -> tuple[ODeform, O
         return replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=reach))
 
     return (
-        ODeform(replace(checkpoint, arrays=without, schema=at(0.0))),
-        ODeform(replace(checkpoint, arrays={**without, **dynamics.arrays()}, schema=at(REACH))),
+        LatentModel(replace(checkpoint, arrays=without, schema=at(0.0))),
+        LatentModel(replace(checkpoint, arrays={**without, **dynamics.arrays()}, schema=at(REACH))),
     )
 
 
@@ -81,7 +81,7 @@ def test_a_motion_that_failed_stays(flying: Dynamics) -> None:
     assert np.array_equal(motion.reduced(np.array([0.45, 0.7, 1.0])), flight(np.full(3, 0.4)))
 
 
-def test_the_window_is_as_it_was(pair: tuple[ODeform, ODeform]) -> None:
+def test_the_window_is_as_it_was(pair: tuple[LatentModel, LatentModel]) -> None:
     stopped, continued = (model.solve(None, {"mass": 0.6}) for model in pair)
     window = pair[0].schema.window
     inside = np.linspace(0.0, window.stop, 333)
@@ -92,14 +92,14 @@ def test_the_window_is_as_it_was(pair: tuple[ODeform, ODeform]) -> None:
     assert np.abs(continued.vertices(later)[-2:] - stopped.vertices(later)[-2:]).max() > 1e-5
 
 
-def test_it_goes_on_without_a_jump(pair: tuple[ODeform, ODeform]) -> None:
+def test_it_goes_on_without_a_jump(pair: tuple[LatentModel, LatentModel]) -> None:
     motion, window = pair[1].solve(None, {"force": 140.0}), pair[1].schema.window
     for end in (window.stop, window.stop + 3.0 / window.rate, window.stop + REACH * window.stop):
         around = motion.vertices(end + np.array([-1e-7, 0.0, 1e-7]))
         assert np.abs(np.diff(around, axis=0)).max() < 1e-5
 
 
-def test_what_else_is_asked_changes_nothing(pair: tuple[ODeform, ODeform]) -> None:
+def test_what_else_is_asked_changes_nothing(pair: tuple[LatentModel, LatentModel]) -> None:
     late = pair[1].schema.window.stop * np.linspace(1.001, 2.0, 40)
     motion = pair[1].solve(None, {"mass": 0.9}).trajectory
     first = motion.reduced(late[5:6])
@@ -111,7 +111,7 @@ def test_what_else_is_asked_changes_nothing(pair: tuple[ODeform, ODeform]) -> No
 
 
 @pytest.mark.parametrize("reach", [1.0, 10.0])
-def test_it_is_bounded_at_any_time(pair: tuple[ODeform, ODeform], reach: float) -> None:
+def test_it_is_bounded_at_any_time(pair: tuple[LatentModel, LatentModel], reach: float) -> None:
     model = pair[1]
     window, (shift, deformation) = model.schema.window, model.space.largest
     for parameters in model.schema.corners(reach):
@@ -126,7 +126,7 @@ def test_it_is_bounded_at_any_time(pair: tuple[ODeform, ODeform], reach: float) 
         assert np.array_equal(y[1], y[2])  # the clock has stopped
 
 
-def test_contacts_alone_change_a_flight(pair: tuple[ODeform, ODeform]) -> None:
+def test_contacts_alone_change_a_flight(pair: tuple[LatentModel, LatentModel]) -> None:
     dynamics = pair[1].dynamics
     assert dynamics is not None
     motion, window, theta = pair[1].solve(None, {"mass": 0.6}), pair[1].schema.window, np.zeros((1, 4))
@@ -146,7 +146,7 @@ def drop() -> Predictor:
 def test_a_continuation_of_an_earlier_version_is_left_out(drop: Predictor) -> None:
     known, later = drop.checkpoint, drop.schema.window.stop * np.array([1.0, 1.4, 1e9])
     arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
-    older = ODeform(replace(known, arrays={**arrays, f"{PREFIX}centers": np.zeros((3, 2), np.float32)}))
+    older = LatentModel(replace(known, arrays={**arrays, f"{PREFIX}centers": np.zeros((3, 2), np.float32)}))
     assert older.dynamics is None
     assert older.schema.window.reach == 0.0
     assert older.schema.window.soft_clamped(later[2:])[0] == pytest.approx(1.05 * drop.schema.window.stop)
@@ -156,7 +156,7 @@ def test_a_continuation_of_an_earlier_version_is_left_out(drop: Predictor) -> No
 def test_older_checkpoints_have_none(drop: Predictor) -> None:
     known, window = drop.checkpoint, drop.schema.window
     arrays = {name: array for name, array in known.arrays.items() if not name.startswith(PREFIX)}
-    older = ODeform(replace(known, arrays=arrays, schema=replace(known.schema, window=replace(window, reach=0.0))))
+    older = LatentModel(replace(known, arrays=arrays, schema=replace(known.schema, window=replace(window, reach=0.0))))
     assert older.dynamics is None
     assert older.schema.window.soft_clamped(np.array([1e9]))[0] == pytest.approx(1.05 * drop.schema.window.stop)
     assert np.array_equal(older.solve().vertices(window.times), drop.solve().vertices(window.times))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from odeform.models.odeform.latent_trajectory import LatentTrajectory
+from odeform.models.latent.latent_trajectory import LatentTrajectory
 from odeform.solver import integrate as solver
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Status

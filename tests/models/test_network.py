@@ -6,11 +6,11 @@ import torch
 import trimesh
 
 from odeform.geometry.shape import surface_weights
-from odeform.models.odeform.config import ModelConfig
-from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
-from odeform.models.odeform.network import ODeformNet, ShapeEncoder
+from odeform.models.latent.config import ModelConfig
+from odeform.models.latent.inference import make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.latent.network import ODeformNet, ShapeEncoder
+from odeform.models.latent.training.loop import network_weights
 from odeform.solver.integrate import SolverSettings, integrate
-from odeform.training.loop import network_weights
 from odeform.types import Mesh
 
 Shape = tuple[torch.Tensor, torch.Tensor]

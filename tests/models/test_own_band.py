@@ -3,30 +3,30 @@
 import numpy as np
 import pytest
 
-from odeform.models.mechanical.own_band import OwnBand, OwnErrors, coverage, fit_own_band
+from odeform.models.modal.shape_band import ShapeBand, ShapeErrors, coverage, fit_shape_band
 
 TIMES = np.arange(1, 20) / 100.0
 
 
-def shapes(count: int, seed: int, by_size: float = 0.5, by_distance: float = 0.8) -> list[OwnErrors]:
+def shapes(count: int, seed: int, by_size: float = 0.5, by_distance: float = 0.8) -> list[ShapeErrors]:
     """Errors that grow with the motion and the distance, with a log-normal rest."""
     rng, found = np.random.default_rng(seed), []
     for _ in range(count):
         distance, sizes = float(rng.uniform(0.0, 0.2)), rng.uniform(2.0, 20.0, 12)
         scale = 0.1 * sizes**by_size * (1.0 + distance / 0.02) ** by_distance * np.exp(0.3 * rng.standard_normal(12))
-        found.append(OwnErrors(distance, sizes, scale[:, None] * np.linspace(0.2, 1.0, len(TIMES))))
+        found.append(ShapeErrors(distance, sizes, scale[:, None] * np.linspace(0.2, 1.0, len(TIMES))))
     return found
 
 
 def test_the_band_finds_how_errors_grow_and_covers_nine_in_ten_of_other_shapes() -> None:
-    band = fit_own_band(shapes(40, 0), TIMES)
+    band = fit_shape_band(shapes(40, 0), TIMES)
     assert band.by_size == pytest.approx(0.5, abs=0.15)
     assert band.by_distance == pytest.approx(0.8, abs=0.15)
     assert 0.8 < coverage(band, shapes(40, 1)) < 0.97
 
 
 def test_the_band_widens_with_distance_and_time_and_begins_at_zero() -> None:
-    band = fit_own_band(shapes(20, 0), TIMES)
+    band = fit_shape_band(shapes(20, 0), TIMES)
     near, far = (band.at(10.0, distance, np.array([0.0, 0.1, 0.19, 0.38])) for distance in (0.0, 0.2))
     assert (near[0] == 0.0).all()
     assert (far[1:] > near[1:]).all()
@@ -35,13 +35,13 @@ def test_the_band_widens_with_distance_and_time_and_begins_at_zero() -> None:
 
 
 def test_errors_that_shrink_with_distance_do_not_narrow_the_band() -> None:
-    band = fit_own_band(shapes(20, 0, by_distance=-0.5), TIMES)
+    band = fit_shape_band(shapes(20, 0, by_distance=-0.5), TIMES)
     assert band.by_distance == 0.0
     assert band.by_size > 0.0
 
 
 def test_a_band_returns_from_json() -> None:
-    band = fit_own_band(shapes(4, 0), TIMES)
-    assert OwnBand.from_json(band.to_json()) == band
+    band = fit_shape_band(shapes(4, 0), TIMES)
+    assert ShapeBand.from_json(band.to_json()) == band
     with pytest.raises(KeyError):
-        OwnBand.from_json({})
+        ShapeBand.from_json({})

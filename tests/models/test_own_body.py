@@ -12,15 +12,15 @@ from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.step import Projectile
-from odeform.models.mechanical.elastic_body import elastic_body
-from odeform.models.mechanical.own_body import OwnBody, OwnBodyPredictor, own_body, takes_own_bodies
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.training.fit import _checkpoint
+from odeform.models.modal.training.pushes import Pushes
+from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
 from odeform.models.per_object import PerObject, joined
 from odeform.models.registry import load, model_class
 from odeform.simulation.contacts import vector_of
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
-from odeform.training.mechanical import _checkpoint
-from odeform.training.pushes import Pushes
 from odeform.types import Mesh
 
 SPHERE = Projectile(0.02, 0.02)
@@ -43,19 +43,19 @@ def trained() -> PerObject:
 
 
 @pytest.fixture(scope="module")
-def bottle() -> OwnBody:
+def bottle() -> UserBody:
     """The bottle, as if a user had brought it, twice as fine."""
     item = get_object("bottle")
     rest = item.rest_mesh()
     fine = trimesh.Trimesh(rest.points, rest.faces, process=False).subdivide()
     shape = Mesh(np.asarray(fine.vertices, dtype=np.float32), np.asarray(fine.faces, dtype=np.int32))
-    return OwnBody(item, elastic_body(item, 12, 8), "bottle", FittedShape(shape, None, Similarity(), shape, None, 0.0))
+    return UserBody(item, elastic_body(item, 12, 8), "bottle", FittedShape(shape, None, Similarity(), shape, None, 0.0))
 
 
-def test_another_body_is_pushed_where_and_as_hard_as_suits_it(trained: PerObject, bottle: OwnBody) -> None:
-    assert takes_own_bodies(trained)
-    assert not takes_own_bodies(load("kick"))
-    predictor = OwnBodyPredictor(trained, bottle)
+def test_another_body_is_pushed_where_and_as_hard_as_suits_it(trained: PerObject, bottle: UserBody) -> None:
+    assert takes_user_bodies(trained)
+    assert not takes_user_bodies(load("kick"))
+    predictor = UserBodyPredictor(trained, bottle)
     given = predictor.complete(predictor.parameters_like())
     assert nearest_on(predictor.rest, vector_of(given, "contact")).distance < 1e-6
     weakest, strongest = bottle.item.forces
@@ -70,9 +70,9 @@ def test_another_body_is_pushed_where_and_as_hard_as_suits_it(trained: PerObject
     assert predictor.error_band(given, np.zeros(1)) is None
 
 
-def test_a_model_of_trained_bodies_only_is_refused(bottle: OwnBody) -> None:
+def test_a_model_of_trained_bodies_only_is_refused(bottle: UserBody) -> None:
     with pytest.raises(InputError, match="knows its trained bodies only"):
-        OwnBodyPredictor(load("kick"), bottle)
+        UserBodyPredictor(load("kick"), bottle)
 
 
 @pytest.mark.slow
@@ -80,8 +80,8 @@ def test_a_scan_in_millimetres_that_lies_on_its_side_becomes_a_body(trained: Per
     ellipsoid = trimesh.creation.icosphere(3, 1.0)
     ellipsoid.apply_scale([40.0, 90.0, 50.0])
     scan = Mesh(np.asarray(ellipsoid.vertices, dtype=np.float32), np.asarray(ellipsoid.faces, dtype=np.int32))
-    own = own_body(scan, "egg.obj", up="+z")
-    predictor = OwnBodyPredictor(trained, own)
+    own = user_body(scan, "egg.obj", up="+z")
+    predictor = UserBodyPredictor(trained, own)
     shape = own.fit.geometry.points
     assert np.ptp(shape, axis=0).max() == pytest.approx(0.18, rel=0.05)
     assert shape[:, 2].min() == pytest.approx(0.0, abs=5e-3)
@@ -97,4 +97,4 @@ def test_an_open_sheet_is_refused_with_the_reason() -> None:
     quads = np.array([[i, i + 1, i + 20, i + 21] for r in range(19) for i in range(20 * r, 20 * r + 19)])
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [1, 3, 2]]]).astype(np.int32)
     with pytest.raises(InputError, match=r"sheet\.obj: the mesh encloses no volume: it is open"):
-        own_body(Mesh(np.asarray(sheet.vertices, dtype=np.float32), faces), "sheet.obj")
+        user_body(Mesh(np.asarray(sheet.vertices, dtype=np.float32), faces), "sheet.obj")

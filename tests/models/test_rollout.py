@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from odeform.models.odeform.rollout import Branch, roll_out
+from odeform.models.latent.rollout import Branch, roll_out
 
 STEPS = [0.1, 0.3, 0.05]
 

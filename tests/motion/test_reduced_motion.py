@@ -13,7 +13,7 @@ from odeform.geometry.rigid import rotation_z
 from odeform.geometry.shape import surface_weights
 from odeform.models.base import Predictor
 from odeform.models.continuation import without_continuation
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load, load_model
 from odeform.motion.basis import DisplacementBasis
 from odeform.motion.local_frames import BOUND
@@ -129,12 +129,12 @@ def test_shape_and_heading_turn_the_motion(predictors: dict[str, Predictor], mod
     assert np.abs(unturned - two).max() > 1e-3
 
 
-def shape_sensitive(predictors: dict[str, Predictor]) -> ODeform:
+def shape_sensitive(predictors: dict[str, Predictor]) -> LatentModel:
     """As if several shapes had been trained on: the scene has one, and its model therefore ignores shape."""
     checkpoint = predictors["odeform"].checkpoint
     gains = {name: np.ones_like(array) for name, array in checkpoint.arrays.items() if name.endswith("pooled_gain")}
     assert len(gains) == 2
-    return ODeform(replace(checkpoint, arrays={**checkpoint.arrays, **gains}))
+    return LatentModel(replace(checkpoint, arrays={**checkpoint.arrays, **gains}))
 
 
 def test_each_shape_keeps_its_own_motion(predictors: dict[str, Predictor]) -> None:

@@ -17,8 +17,8 @@ from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.models.base import Predictor
 from odeform.models.continuation import without_continuation
-from odeform.models.odeform.latent_trajectory import LatentTrajectory
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.simulation.physics import energy_gained
@@ -36,9 +36,9 @@ REFINED, FINER = (12, 16, 48), (3, 4, 6)  # within the asymptotic range of all m
 
 
 @pytest.fixture
-def model(predictors: dict[str, Predictor]) -> ODeform:
+def model(predictors: dict[str, Predictor]) -> LatentModel:
     model = predictors["odeform"]
-    assert isinstance(model, ODeform)
+    assert isinstance(model, LatentModel)
     return model
 
 
@@ -54,7 +54,7 @@ def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "FINER", FINER)
 
 
-def test_cases_are_distinct_reproducible_and_reach_every_extreme(model: ODeform) -> None:
+def test_cases_are_distinct_reproducible_and_reach_every_extreme(model: LatentModel) -> None:
     some = extreme_cases(model.schema, methods_of(model), 3000, seed=0)
     assert len(set(some)) == len(some) == 3000
     assert repr(extreme_cases(model.schema, methods_of(model), 3000, seed=0)) == repr(some)
@@ -108,7 +108,7 @@ def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: 
 
 
 @pytest.mark.slow
-def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_coefficient_lowers_the_order(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "SAMPLES", 1)
     monkeypatch.setattr(convergence, "REFINED", REFINED)
     monkeypatch.setattr(convergence, "methods_of", lambda _: ("midpoint", "rk4"))
@@ -118,11 +118,11 @@ def test_a_wrong_coefficient_lowers_the_order(model: ODeform, monkeypatch: pytes
     assert [name for name, check in checks.items() if not check.holds] == ["order_rk4_deviation"]
 
 
-def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_derivatives_are_found(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solvers, "SAMPLES", 1)
     assert solvers.check_sensitivities(model)["sensitivity_relative"].holds
-    sound = ODeform.sensitivities
-    monkeypatch.setattr(ODeform, "sensitivities", lambda *asked: 1.1 * sound(*asked))
+    sound = LatentModel.sensitivities
+    monkeypatch.setattr(LatentModel, "sensitivities", lambda *asked: 1.1 * sound(*asked))
     assert not solvers.check_sensitivities(model)["sensitivity_relative"].holds
 
 
@@ -130,32 +130,32 @@ def test_wrong_derivatives_are_found(model: ODeform, monkeypatch: pytest.MonkeyP
 def test_refining_that_increases_the_error_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(convergence, "methods_of", lambda _: ("rk4",))
     model, dataset = load("mass-elastic"), open_dataset("mass-elastic")
-    assert isinstance(model, ODeform)
+    assert isinstance(model, LatentModel)
     assert convergence.check_refining(model, dataset)["refining_error_ratio"].holds
-    sound = ODeform.solve
+    sound = LatentModel.solve
 
-    def drifting(self: ODeform, shape: Any, parameters: Any, quality: Any) -> ReducedMotion:
+    def drifting(self: LatentModel, shape: Any, parameters: Any, quality: Any) -> ReducedMotion:
         heavier = {**parameters, "mass": parameters["mass"] * (1.0 + 1e-5 / quality.step)}
         return sound(self, shape, heavier, quality)
 
-    monkeypatch.setattr(ODeform, "solve", drifting)
+    monkeypatch.setattr(LatentModel, "solve", drifting)
     assert not convergence.check_refining(model, dataset)["refining_error_ratio"].holds
 
 
-def _outcomes(model: ODeform, cases: Iterable[Case]) -> list[stress.Outcome]:
+def _outcomes(model: LatentModel, cases: Iterable[Case]) -> list[stress.Outcome]:
     geometries = shapes(model.rest)
     return [stress.run_case(model, case, geometries) for case in cases]
 
 
-def _some_cases(model: ODeform) -> list[Case]:
+def _some_cases(model: LatentModel) -> list[Case]:
     return extreme_cases(model.schema, methods_of(model), 3000, seed=0)[-20:]
 
 
 @pytest.mark.slow
 def test_non_finite_frames_are_not_shown_but_counted_without_the_watch(
-    model: ODeform, monkeypatch: pytest.MonkeyPatch
+    model: LatentModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = ODeform(without_continuation(model.checkpoint))  # the network itself, at all times
+    model = LatentModel(without_continuation(model.checkpoint))  # the network itself, at all times
     outcomes = _outcomes(model, _some_cases(model))
     assert all(outcome.non_finite == 0 for outcome in outcomes)
     # motions that nothing else stops before
@@ -174,15 +174,15 @@ def test_non_finite_frames_are_not_shown_but_counted_without_the_watch(
     assert [outcome.non_finite for outcome in _outcomes(model, cases)] == [3] * len(cases)
 
 
-def test_faults_are_outcomes(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_faults_are_outcomes(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(ODeform, "trajectory", broken)
+    monkeypatch.setattr(LatentModel, "trajectory", broken)
     assert {outcome.status for outcome in _outcomes(model, _some_cases(model))} == {"fault: ZeroDivisionError"}
 
 
-def test_results_that_depend_on_the_query_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_that_depend_on_the_query_are_found(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(consistency, "SAMPLES", 1)
     sound, asked = ReducedMotion.vertices, itertools.count()
 
@@ -194,11 +194,11 @@ def test_results_that_depend_on_the_query_are_found(model: ODeform, monkeypatch:
     assert failed >= {"grid_invariance_m", "scrub_order_m", "determinism_m", "batch_invariance_m"}
 
 
-def test_exaggerated_deformations_are_found(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exaggerated_deformations_are_found(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(physics, "SAMPLES", 1)
     arrays = model.checkpoint.arrays
     weights = {"basis.weights": 50.0 * arrays["basis.weights"]}
-    wild = ODeform(replace(model.checkpoint, arrays={**arrays, **weights}))
+    wild = LatentModel(replace(model.checkpoint, arrays={**arrays, **weights}))
     failed = [{n for n, c in physics.check_physics(m).items() if not c.holds} for m in (model, wild)]
     assert failed[1] - failed[0] >= {"inverted_faces", "edge_strain", "volume_drift"}
 
@@ -229,7 +229,7 @@ def test_spin_is_energy() -> None:
     assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
 
 
-def test_the_plot_shows_where_and_when_a_model_is_unstable(model: ODeform, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     plot = stability_map(model, ("force", "mass"), reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")
     assert plot.values.shape == plot.sound.shape == (3, 3, 3)

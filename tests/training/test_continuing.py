@@ -13,12 +13,12 @@ from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.continuation import Dynamics, Regression, without_continuation
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load, load_model
+from odeform.models.training import continuation
+from odeform.models.training.continuation import fit_dynamics, predicted_errors, refitted, with_continuation
 from odeform.simulation.scenes.kick import PULSE
-from odeform.training import continuation
-from odeform.training.continuation import fit_dynamics, predicted_errors, refitted, with_continuation
 from odeform.types import Floats
 
 RATE, GRAVITY, HEIGHT = 60.0, -10.0, 0.2
@@ -63,13 +63,13 @@ def test_a_second_landing_follows_from_the_first() -> None:
 
 @pytest.fixture(scope="module")
 def data(dataset: Dataset, predictors: dict[str, Predictor]) -> TrainingData:
-    return prepare(dataset, cast(ODeform, predictors["odeform"]).space.basis.modes)
+    return prepare(dataset, cast(LatentModel, predictors["odeform"]).space.basis.modes)
 
 
 def test_what_does_not_foretell_is_not_kept(
     data: TrainingData, predictors: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = cast(ODeform, predictors["odeform"])
+    model = cast(LatentModel, predictors["odeform"])
     counts = []
 
     def falling(theta: Floats, reduced: Floats, gyration_radius: float) -> Dynamics:

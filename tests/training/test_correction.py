@@ -9,32 +9,32 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.base import Predictor
-from odeform.models.odeform.correction import Correction
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.correction import Correction
+from odeform.models.latent.model import LatentModel
+from odeform.models.training.pruning import FINE
+from odeform.models.training.residual_fit import with_correction
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
-from odeform.training.correction import with_correction
-from odeform.training.pruning import FINE
 from odeform.types import Floats
 
 EXACT = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
 
 
 @pytest.fixture(scope="module")
-def bare(predictors: dict[str, Predictor]) -> ODeform:
-    model = cast(ODeform, predictors["odeform"])
+def bare(predictors: dict[str, Predictor]) -> LatentModel:
+    model = cast(LatentModel, predictors["odeform"])
     arrays = {name: a for name, a in model.checkpoint.arrays.items() if not name.startswith("correction.")}
-    return ODeform(replace(model.checkpoint, arrays=arrays))
+    return LatentModel(replace(model.checkpoint, arrays=arrays))
 
 
 @pytest.fixture(scope="module")
-def data(dataset: Dataset, bare: ODeform) -> TrainingData:
+def data(dataset: Dataset, bare: LatentModel) -> TrainingData:
     """The model's own motions plus 2 mm of heave and of the first mode that vary smoothly with the parameters."""
     data = prepare(dataset, bare.space.basis.modes)
     return replace(data, reduced={split: _own(bare, data, split) + _smooth(data, split) for split in data.reduced})
 
 
-def _own(model: ODeform, data: TrainingData, split: str) -> Floats:
+def _own(model: LatentModel, data: TrainingData, split: str) -> Floats:
     evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(data.times[-1])
     return np.stack([model.integrate(t, evaluated, FINE, stop).reduced(data.times) for t in data.theta[split]])
 
@@ -47,23 +47,23 @@ def _smooth(data: TrainingData, split: str) -> Floats:
 
 
 @pytest.fixture(scope="module")
-def corrected(bare: ODeform, data: TrainingData) -> ODeform:
-    return ODeform(with_correction(bare.checkpoint, data))
+def corrected(bare: LatentModel, data: TrainingData) -> LatentModel:
+    return LatentModel(with_correction(bare.checkpoint, data))
 
 
-def test_a_smooth_residual_is_corrected(bare: ODeform, corrected: ODeform, data: TrainingData) -> None:
+def test_a_smooth_residual_is_corrected(bare: LatentModel, corrected: LatentModel, data: TrainingData) -> None:
     assert corrected.correction is not None
     assert set(corrected.correction.parts) == {"shift", "deformation"}  # rotations had no residual
 
-    def missed(model: ODeform) -> float:
+    def missed(model: LatentModel) -> float:
         return float(np.square(_own(model, data, "val") - data.reduced["val"]).mean())
 
     assert missed(corrected) < 0.25 * missed(bare)
 
 
-def test_an_ode_that_misleads_gives_way_to_the_regression(bare: ODeform, data: TrainingData) -> None:
+def test_an_ode_that_misleads_gives_way_to_the_regression(bare: LatentModel, data: TrainingData) -> None:
     truth = {split: 10.0 * _smooth(data, split) for split in data.reduced}
-    model = ODeform(with_correction(bare.checkpoint, replace(data, reduced=truth)))
+    model = LatentModel(with_correction(bare.checkpoint, replace(data, reduced=truth)))
     assert model.correction is not None
     assert model.correction.parts["shift"].share < 0.1
     assert model.checkpoint.config["correction"]["share_of_ode"]["shift"] < 0.1
@@ -71,7 +71,7 @@ def test_an_ode_that_misleads_gives_way_to_the_regression(bare: ODeform, data: T
     assert np.square(missed).sum() < 0.02 * np.square(truth["val"]).sum()
 
 
-def test_a_share_that_may_be_chance_is_zero(bare: ODeform, data: TrainingData) -> None:
+def test_a_share_that_may_be_chance_is_zero(bare: LatentModel, data: TrainingData) -> None:
     shares = []
     for seed in range(6):
         rng = np.random.default_rng(seed)
@@ -82,20 +82,20 @@ def test_a_share_that_may_be_chance_is_zero(bare: ODeform, data: TrainingData) -
     assert sum(share > 0.0 for share in shares) <= 0.15 * len(shares)  # 0.05 are expected
 
 
-def test_noise_is_not_corrected(bare: ODeform, data: TrainingData) -> None:
+def test_noise_is_not_corrected(bare: LatentModel, data: TrainingData) -> None:
     rng = np.random.default_rng(0)
     noisy = {split: _own(bare, data, split) for split in data.reduced}
     noisy = {split: y + 1e-3 * rng.standard_normal(y.shape) for split, y in noisy.items()}
     assert with_correction(bare.checkpoint, replace(data, reduced=noisy)) is bare.checkpoint
 
 
-def test_filled_frames_are_no_truth(bare: ODeform, data: TrainingData) -> None:
+def test_filled_frames_are_no_truth(bare: LatentModel, data: TrainingData) -> None:
     observed = {split: frames.copy() for split, frames in data.observed.items()}
     observed["train"][:, 1::2] = False
     assert with_correction(bare.checkpoint, replace(data, observed=observed)) is bare.checkpoint
 
 
-def test_it_rests_at_the_start_and_keeps_its_last_value(corrected: ODeform) -> None:
+def test_it_rests_at_the_start_and_keeps_its_last_value(corrected: LatentModel) -> None:
     correction, stop = corrected.correction, corrected.schema.window.stop
     assert correction is not None
     values = correction.over_time(np.full(corrected.config.parameters, 0.4))(np.array([0.0, stop, 2.0 * stop]))
@@ -104,14 +104,14 @@ def test_it_rests_at_the_start_and_keeps_its_last_value(corrected: ODeform) -> N
     assert np.array_equal(values[1], values[2])
 
 
-def test_fewer_modes_are_corrected_as_before(corrected: ODeform) -> None:
+def test_fewer_modes_are_corrected_as_before(corrected: LatentModel) -> None:
     assert corrected.correction is not None
     theta, times = np.full(corrected.config.parameters, 0.4), np.linspace(0.0, 1.0, 5)
     fewer = corrected.correction.first(3).over_time(theta)(times)
     np.testing.assert_allclose(fewer, corrected.correction.over_time(theta)(times)[:, : POSE + 3], atol=1e-15)
 
 
-def test_files_without_share_mean_and_order_are_read(corrected: ODeform) -> None:
+def test_files_without_share_mean_and_order_are_read(corrected: LatentModel) -> None:
     known = corrected.correction
     assert known is not None
     arrays = {name: a for name, a in known.arrays().items() if not name.endswith((".share", ".mean", ".order"))}
@@ -122,7 +122,7 @@ def test_files_without_share_mean_and_order_are_read(corrected: ODeform) -> None
     assert read.parts["shift"].order == 2
 
 
-def test_derivatives_are_those_of_the_motion(corrected: ODeform) -> None:
+def test_derivatives_are_those_of_the_motion(corrected: LatentModel) -> None:
     theta, times = np.linspace(-0.5, 0.6, corrected.config.parameters), np.linspace(0.05, 0.9, 7)
     jet = corrected.sensitivities(theta, times, EXACT)
     evaluated, step = corrected.evaluate_basis(corrected.rest, 0.0), 1e-4
@@ -136,7 +136,7 @@ def test_derivatives_are_those_of_the_motion(corrected: ODeform) -> None:
         np.testing.assert_allclose(jet[1 + index], central, atol=2e-5 * np.abs(jet[1 + index]).max())
 
 
-def test_it_is_read_as_it_was_written(corrected: ODeform) -> None:
+def test_it_is_read_as_it_was_written(corrected: LatentModel) -> None:
     known = corrected.correction
     assert known is not None
     size = len(known.over_time(np.zeros(corrected.config.parameters))(np.zeros(1))[0])

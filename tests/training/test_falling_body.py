@@ -11,9 +11,9 @@ from odeform.dataset.training_data import prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
-from odeform.models.rolling.model import RollingODeform
-from odeform.training.request import TrainRequest
-from odeform.training.rolling import fit_rolling_body
+from odeform.models.rolling.model import RollingModel
+from odeform.models.rolling.training.fit import fit_rolling_body
+from odeform.models.training.request import TrainRequest
 from odeform.training.train import train
 
 SEEN = 36  # frames, to the second flight; the whole window has 61
@@ -44,7 +44,7 @@ def seen(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Predicto
 
 @pytest.mark.slow
 def test_a_motion_begins_at_rest_and_falls_freely(sparse: Predictor) -> None:
-    assert isinstance(sparse, RollingODeform)
+    assert isinstance(sparse, RollingModel)
     assert sparse.space.rolling is None
     motion, times = sparse.solve(quality="reference"), np.linspace(0.0, 0.1, 21)
     assert np.array_equal(motion.vertices(0.0), sparse.rest.points)
@@ -72,7 +72,7 @@ def test_landings_beyond_the_window_follow_from_the_ode(seen: Predictor, dataset
 
 @pytest.mark.slow
 def test_a_corrected_motion_goes_on_without_a_jump(seen: Predictor) -> None:
-    assert isinstance(seen, RollingODeform)
+    assert isinstance(seen, RollingModel)
     evaluated, settings, stop = (
         seen.evaluate_basis(seen.rest, 0.0),
         seen.qualities["reference"],

@@ -12,16 +12,19 @@ from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
-from odeform.models.odeform.inference import make_decoder, make_encoder, make_field, pool_shape
-from odeform.models.odeform.network import ODeformNet
+from odeform.models.latent.inference import make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.latent.network import ODeformNet
+from odeform.models.latent.training import fit as odeform_training
+from odeform.models.latent.training.config import TrainConfig
+from odeform.models.latent.training.fit import train_latent
+from odeform.models.latent.training.loop import network_weights, train_network
+from odeform.models.latent.training.start import build_network
+from odeform.models.latent.training.trainer import Trainer
+from odeform.models.training.body import body_arrays
+from odeform.models.training.request import TrainRequest
+from odeform.models.training.run import Run
 from odeform.solver.integrate import SolverSettings, integrate
-from odeform.training import odeform as odeform_training
-from odeform.training.config import TrainConfig
-from odeform.training.loop import network_weights, train_network
-from odeform.training.request import TrainRequest
-from odeform.training.start import build_network
 from odeform.training.train import train
-from odeform.training.trainer import Trainer
 
 
 @pytest.fixture(scope="module")
@@ -203,8 +206,8 @@ def test_a_checkpoint_records_the_settings_that_were_used(
         return train_network(net, data, replace(config, random_features=0), silent)
 
     monkeypatch.setattr(odeform_training, "train_network", spy)
-    data = prepare(dataset, modes=2)
-    _, settings = odeform_training.fit_odeform(data, TrainRequest(steps=1, seed=4), silent, tmp_path / "a.part")
+    request = TrainRequest(steps=1, seed=4)
+    settings = train_latent(Run(dataset, request, body_arrays(dataset), tmp_path / "a.part", silent)).config
     assert settings["training"] == asdict(used[0])
     assert (settings["training"]["steps"], settings["training"]["seed"]) == (1, 4)
     assert settings["val"]["batch"] == used[0].batch

@@ -5,8 +5,8 @@ import torch
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.geometry.rigid import rotation_from_vector
+from odeform.models.latent.training.losses import Metric, balanced
 from odeform.motion.reduced_space import POSE
-from odeform.training.losses import Metric, balanced
 
 
 @pytest.fixture(scope="module")

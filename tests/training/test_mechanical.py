@@ -13,17 +13,18 @@ from odeform.geometry.contact import RADIUS
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.step import Projectile
-from odeform.models.mechanical.coordinates import coordinates_of
-from odeform.models.mechanical.elastic_body import elastic_body
-from odeform.models.mechanical.model import MechanicalODeform
+from odeform.models.modal.coordinates import coordinates_of
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.model import ModalModel
+from odeform.models.modal.training import contact_fit as mechanical_law
+from odeform.models.modal.training import fit as mechanical
+from odeform.models.modal.training.contact_fit import fit_law, relative_errors
+from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
+from odeform.models.modal.training.pushes import Pushes
 from odeform.models.per_object import PerObject
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
-from odeform.training import mechanical, mechanical_law, methods
-from odeform.training.mechanical_law import fit_law, relative_errors
-from odeform.training.pushes import Pushes
-from odeform.training.saved_laws import SHARED, SavedLaws
 from odeform.training.train import train
 from odeform.types import MotionSequence
 
@@ -122,7 +123,7 @@ def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, mo
     predictor = train(dataset, out, without=["correction"], resume=True, report=lambda _: None)
     assert isinstance(predictor, PerObject)
     part = predictor.parts["donut"]
-    assert isinstance(part, MechanicalODeform)
+    assert isinstance(part, ModalModel)
     assert part.law == LAW
     assert part.correction is None
     assert not laws.path.exists(), "it is of no use any more"
@@ -152,7 +153,7 @@ def test_frames_after_the_window_are_not_trained_on(
         seen.append((given.schema.window.stop, seed, correct))
         raise InputError("enough")
 
-    monkeypatch.setattr(methods, "fit_mechanical", fit)
+    monkeypatch.setattr(mechanical, "fit_mechanical", fit)
     asked: tuple[dict[str, Any], ...] = ({"window": (0, 11)}, {}, {"without": ["correction"]})
     for options in asked:
         with pytest.raises(InputError, match="enough"):
@@ -161,5 +162,5 @@ def test_frames_after_the_window_are_not_trained_on(
     assert seen == [(0.1, 0, True), (whole, 0, True), (whole, 0, False)]
     refused: tuple[dict[str, Any], ...] = ({"every": 2}, {"steps": 10}, {"without": ["ode"]})
     for options in refused:
-        with pytest.raises(InputError, match="expected no --every"):
+        with pytest.raises(InputError, match="expected no --every|modal has correction"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)

@@ -7,12 +7,12 @@ from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.step import Projectile
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.contact.regression import PARTS
-from odeform.models.mechanical.correction import Correction
-from odeform.models.mechanical.elastic_body import elastic_body
+from odeform.models.modal.correction import Correction
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.training.pushes import Pushes, _projection
+from odeform.models.modal.training.residual_fit import fit_correction
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
-from odeform.training.mechanical_correction import fit_correction
-from odeform.training.pushes import Pushes, _projection
 from odeform.types import Floats
 
 COUNT, FRAMES, MODES = 40, 5, 3

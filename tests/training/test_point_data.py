@@ -6,7 +6,7 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
-from odeform.training.point_data import prepare_points
+from odeform.models.points.training.point_data import prepare_points
 
 
 def test_displacements_come_back_from_mean_and_scale(dataset: Dataset) -> None:

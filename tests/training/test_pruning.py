@@ -8,27 +8,27 @@ import pytest
 
 from odeform.dataset.store import open_dataset
 from odeform.dataset.training_data import TrainingData, prepare
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load
+from odeform.models.training import pruning
+from odeform.models.training.pruning import FINE, LARGE, needed_modes, without_modes
 from odeform.motion.reduced_space import POSE
-from odeform.training import pruning
-from odeform.training.pruning import FINE, LARGE, needed_modes, without_modes
 from odeform.types import Floats
 
 
 @pytest.fixture(scope="module")
-def model() -> ODeform:
-    return cast(ODeform, load("mass-elastic"))
+def model() -> LatentModel:
+    return cast(LatentModel, load("mass-elastic"))
 
 
 @pytest.fixture(scope="module")
-def data(model: ODeform) -> TrainingData:
+def data(model: LatentModel) -> TrainingData:
     whole = prepare(open_dataset("mass-elastic"), modes=model.space.basis.modes)
     few = {name: {**(of := getattr(whole, name)), "val": of["val"][:4]} for name in ("theta", "reduced", "observed")}
     return replace(whole, **few)
 
 
-def _motions(model: ODeform, data: TrainingData) -> Floats:
+def _motions(model: LatentModel, data: TrainingData) -> Floats:
     evaluated = model.evaluate_basis(model.rest, 0.0)
     solved = (model.integrate(theta, evaluated, FINE, float(data.times[-1])) for theta in data.theta["val"])
     return np.stack([motion.reduced(data.times) for motion in solved])
@@ -36,7 +36,7 @@ def _motions(model: ODeform, data: TrainingData) -> Floats:
 
 @pytest.mark.parametrize("worse", [1.0, 1.01, 1.2, 10.0])
 def test_as_few_as_miss_hardly_more(
-    model: ODeform, data: TrainingData, worse: float, monkeypatch: pytest.MonkeyPatch
+    model: LatentModel, data: TrainingData, worse: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pruning, "WORSE", worse)
     motions, truth = _motions(model, data), data.reduced["val"]
@@ -54,11 +54,11 @@ def test_as_few_as_miss_hardly_more(
     assert worse < 1.2 or count < modes
 
 
-def test_what_is_left_moves_as_before(model: ODeform, data: TrainingData, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_left_moves_as_before(model: LatentModel, data: TrainingData, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pruning, "needed_modes", lambda *_: 3)
     bare = {k: v for k, v in model.checkpoint.arrays.items() if not k.startswith("continuation.")}
     checkpoint, fewer = without_modes(replace(model.checkpoint, arrays=bare), data)
-    pruned = ODeform(checkpoint)
+    pruned = LatentModel(checkpoint)
     assert pruned.space.basis.modes == fewer.space.basis.modes == pruned.config.modes == 3
     assert fewer.reduced["train"].shape[-1] == POSE + 3
     assert np.allclose(_motions(pruned, fewer), _motions(model, data)[..., : POSE + 3], rtol=0.0, atol=1e-12)

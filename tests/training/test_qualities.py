@@ -9,17 +9,17 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import prepare
 from odeform.models.base import Predictor
 from odeform.models.frontier import FrontierPoint
-from odeform.models.odeform.model import ODeform
+from odeform.models.latent.model import LatentModel
+from odeform.models.training import qualities
+from odeform.models.training.qualities import USELESS, Validation, choose_qualities, measure_frontier
 from odeform.solver.integrate import SolverSettings
-from odeform.training import qualities
-from odeform.training.qualities import USELESS, Validation, choose_qualities, measure_frontier
 
 Measured = tuple[tuple[FrontierPoint, ...], tuple[float, float]]
 
 
 @pytest.fixture(scope="module")
 def measured(dataset: Dataset, predictors: dict[str, Predictor]) -> Measured:
-    model = cast(ODeform, predictors["odeform"])
+    model = cast(LatentModel, predictors["odeform"])
     return measure_frontier(model, Validation.of(prepare(dataset, modes=model.space.basis.modes)))
 
 
@@ -72,7 +72,7 @@ def test_a_checkpoint_brings_its_frontier(predictors: dict[str, Predictor]) -> N
 def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
     dataset: Dataset, predictors: dict[str, Predictor], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = cast(ODeform, predictors["odeform"])
+    model = cast(LatentModel, predictors["odeform"])
     monkeypatch.setattr(qualities, "_candidates", lambda _: [SolverSettings("rk4", step=0.01)])
     known = Validation.of(prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True)))
     wrong = replace(known, reduced=known.reduced + 9.0 * ~known.observed[..., None])

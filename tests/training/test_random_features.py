@@ -7,10 +7,10 @@ from scipy.interpolate import CubicSpline
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
-from odeform.training.config import TrainConfig
-from odeform.training.random_features import widen
-from odeform.training.start import build_network
-from odeform.training.trainer import Trainer
+from odeform.models.latent.training.config import TrainConfig
+from odeform.models.latent.training.random_features import widen
+from odeform.models.latent.training.start import build_network
+from odeform.models.latent.training.trainer import Trainer
 
 
 @pytest.fixture(autouse=True)

@@ -13,12 +13,12 @@ from odeform.errors import InputError
 from odeform.mechanics.rolling.law import first_law
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.base import Predictor
-from odeform.models.rolling.model import RollingODeform
+from odeform.models.rolling.model import RollingModel
 from odeform.models.rolling.start import push_inputs
+from odeform.models.rolling.training.contact_fit import fit_law, law_error_mm
+from odeform.models.rolling.training.fit import fit_rolling_body, motions_of
+from odeform.models.training.request import TrainRequest
 from odeform.motion.reduced_space import POSE, motion_rmse
-from odeform.training.request import TrainRequest
-from odeform.training.rolling import fit_rolling_body, motions_of
-from odeform.training.rolling_law import fit_law, law_error_mm
 from odeform.training.train import train
 
 
@@ -68,7 +68,7 @@ def test_the_true_law_explains_the_motions_and_a_fit_approaches_it(data: Trainin
 
 @pytest.mark.slow
 def test_a_trained_model_predicts_motions_that_it_has_not_seen(predictor: Predictor, dataset: Dataset) -> None:
-    assert isinstance(predictor, RollingODeform)
+    assert isinstance(predictor, RollingModel)
     scores = predictor.checkpoint.scores
     assert scores["rmse_pooled_mm"] < 1.3
     assert scores["deformation_relative"] < 0.15
@@ -101,15 +101,15 @@ def test_what_is_shown_does_not_depend_on_what_was_asked_before(predictor: Predi
 def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> None:
     arrays = {**predictor.checkpoint.arrays, damaged: np.zeros(2)}
     with pytest.raises(InputError, match=damaged):
-        RollingODeform(replace(predictor.checkpoint, arrays=arrays))
+        RollingModel(replace(predictor.checkpoint, arrays=arrays))
     missing = replace(predictor.checkpoint, arrays={name: a for name, a in arrays.items() if name != damaged})
     with pytest.raises(InputError, match="missing or wrong"):
-        RollingODeform(missing)
+        RollingModel(missing)
 
 
 @pytest.mark.slow
 def test_later_motions_are_those_of_the_ode_alone(predictor: Predictor) -> None:
-    assert isinstance(predictor, RollingODeform)
+    assert isinstance(predictor, RollingModel)
     assert predictor.correction is not None
     end, theta = predictor.correction.stop, np.array([0.2, -0.3, 0.5])
     assert 0.1 < end < 0.5 * predictor.schema.window.stop

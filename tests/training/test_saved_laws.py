@@ -9,8 +9,8 @@ import pytest
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.mechanics.law import MechanicalLaw
+from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
 from odeform.simulation.scenes.contact_force import SCENE
-from odeform.training.saved_laws import SHARED, SavedLaws
 
 ENTRIES = (Entry("one", "train", {"object": "cat"}, "a"), Entry("two", "test", {"object": "cat"}, "b"))
 DATA = Dataset(Path("pushes"), SCENE.schema, ENTRIES, lambda entry: None, {})  # pyright: ignore[reportArgumentType]

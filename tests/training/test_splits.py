@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from odeform.dataset.index import Dataset, Entry
-from odeform.training import config
-from odeform.training.body import body_arrays
-from odeform.training.methods import Run, train_model
-from odeform.training.request import TrainRequest
+from odeform.models.latent.training import config
+from odeform.models.training.body import body_arrays
+from odeform.models.training.request import TrainRequest
+from odeform.models.training.run import Run, train_model
 from odeform.types import MotionSequence
 
 

@@ -14,10 +14,10 @@ from odeform.geometry.contact import nearest_on
 from odeform.mechanics.law import MechanicalLaw
 from odeform.models.contact.regression import PARTS
 from odeform.models.error_band import NOMINAL
-from odeform.models.mechanical.carried_correction import CarriedCorrection, shape_distance, share_at
-from odeform.models.mechanical.elastic_body import elastic_body
-from odeform.models.mechanical.model import MechanicalODeform
-from odeform.models.mechanical.own_body import OwnBodyPredictor, resting_body
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.model import ModalModel
+from odeform.models.modal.transferred_residual import CarriedCorrection, shape_distance, share_at
+from odeform.models.modal.user_body import UserBodyPredictor, resting_body
 from odeform.models.per_object import PerObject, joined
 from odeform.simulation.contacts import vector_of
 from odeform.simulation.objects.catalog import get_object
@@ -37,7 +37,7 @@ def part(name: str) -> Checkpoint:
     """A body with the law as it is before training, and no correction."""
     body = elastic_body(get_object(name), 12, 8)
     return Checkpoint(
-        MechanicalODeform.model,
+        ModalModel.model,
         replace(SCENE.schema, objects=(name,)),
         {
             "largest": [0.5, 0.1],
@@ -59,16 +59,16 @@ def checkpoint() -> Checkpoint:
 
 @pytest.fixture(scope="module")
 def trained(checkpoint: Checkpoint) -> PerObject:
-    return PerObject(checkpoint, MechanicalODeform)
+    return PerObject(checkpoint, ModalModel)
 
 
 @pytest.fixture(scope="module")
-def donut(trained: PerObject) -> OwnBodyPredictor:
+def donut(trained: PerObject) -> UserBodyPredictor:
     """The trained donut, as if a user had brought it."""
-    return OwnBodyPredictor(trained, resting_body(get_object("donut"), "donut"))
+    return UserBodyPredictor(trained, resting_body(get_object("donut"), "donut"))
 
 
-def motions(predictor: OwnBodyPredictor, count: int) -> tuple[MotionSequence, ...]:
+def motions(predictor: UserBodyPredictor, count: int) -> tuple[MotionSequence, ...]:
     """Some pushes, as the predictor itself has them."""
     item, times, found = predictor.own.item, np.arange(5) / 100.0, []
     for given in pushes_of(item, count, 0):
@@ -77,7 +77,7 @@ def motions(predictor: OwnBodyPredictor, count: int) -> tuple[MotionSequence, ..
     return tuple(found)
 
 
-def test_a_model_that_is_the_truth_has_no_error_and_deforms_as_much_as_it_should(donut: OwnBodyPredictor) -> None:
+def test_a_model_that_is_the_truth_has_no_error_and_deforms_as_much_as_it_should(donut: UserBodyPredictor) -> None:
     shape = UnseenShape("ring", INSTANCE, "donut", donut.own.item, motions(donut, 2))
     found = measure(donut, donut.trained, shape)
     row = found.to_json({"rmse_pooled_mm": 0.5, "relative": 0.1})
@@ -117,11 +117,11 @@ def test_distance_does_not_depend_on_where_a_shape_stands_and_less_is_carried_ov
     assert 1.0 >= share_at(0.0) > share_at(0.1) > 0.0
 
 
-def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: OwnBodyPredictor) -> None:
+def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: UserBodyPredictor) -> None:
     """The same body gets its own gains, as much as is carried over; one with stiffer modes those of stiffer modes."""
     gains, times = np.linspace(1.0, 2.0, 12), np.arange(3) / 100.0
-    part = PerObject(_corrected(checkpoint, gains, times), MechanicalODeform).parts["donut"]
-    assert isinstance(part, MechanicalODeform)
+    part = PerObject(_corrected(checkpoint, gains, times), ModalModel).parts["donut"]
+    assert isinstance(part, ModalModel)
     body = donut.own.body
     same = CarriedCorrection(part, body, 0.5)
     np.testing.assert_allclose(same.kept[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
@@ -141,11 +141,11 @@ def _corrected(checkpoint: Checkpoint, gains: Floats, times: Floats) -> Checkpoi
     return replace(checkpoint, config={**checkpoint.config, "objects": objects}, arrays={**checkpoint.arrays, **added})
 
 
-def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, donut: OwnBodyPredictor) -> None:
+def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, donut: UserBodyPredictor) -> None:
     assert not donut.knows_foreign_errors
     band = {"level": 0.0, "by_size": 1.0, "by_distance": 1.0, "times": [0.1, 0.19], "profile": [[0.0, 1.0]] * 2}
-    told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": band}), MechanicalODeform)
-    near, far = (OwnBodyPredictor(told, replace(donut.own, like=like)) for like in NAMES)
+    told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": band}), ModalModel)
+    near, far = (UserBodyPredictor(told, replace(donut.own, like=like)) for like in NAMES)
     given = pushes_of(donut.own.item, 1, 0)[0]
     found = near.error_band(given, np.array([0.0, 0.1, 0.19]))
     assert near.knows_foreign_errors
@@ -166,7 +166,7 @@ def test_an_object_that_is_left_out_is_gone_and_the_others_have_one_law(trained:
 
 
 def test_finished_shapes_are_read_again_and_failed_pushes_are_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, donut: OwnBodyPredictor
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, donut: UserBodyPredictor
 ) -> None:
     (truth,) = motions(donut, 1)
     answers = iter([truth, "2 of 5 tetrahedra are inside out at the end"])

@@ -1,17 +1,30 @@
 """Reduced models whose parameters are solved for in closed form, not trained by descent."""
 
 from abc import abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.reduced_model import ReducedModel
 from odeform.types import Arrays, Floats
+
+if TYPE_CHECKING:
+    from odeform.models.training.run import Run
 
 __all__ = ["FittedModel"]
 
 
 class FittedModel(ReducedModel):
-    """A reduced model with a closed-form fit: `odeform train` calls `fit` and stores what it returns."""
+    """A reduced model with a closed-form fit: `train` calls `fit` and stores what it returns."""
+
+    closed_form = True
+
+    @classmethod
+    def train(cls, run: "Run") -> Checkpoint:
+        from odeform.models.training.continuation import with_continuation
+
+        data = run.reduced_data(patterns=True)
+        return with_continuation(cls(run.reduced_checkpoint(data, *cls.fit(data))), data)
 
     @staticmethod
     @abstractmethod

@@ -1,6 +1,9 @@
 """ODeform for a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under a learned law of
 contact."""
 
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
 import numpy as np
 from jaxtyping import Float
 
@@ -10,9 +13,9 @@ from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.integrated_model import IntegratedModel
-from odeform.models.odeform.correction import Correction
-from odeform.models.odeform.inference import Decoder
-from odeform.models.odeform.latent_trajectory import LatentTrajectory
+from odeform.models.latent.correction import Correction
+from odeform.models.latent.inference import Decoder
+from odeform.models.latent.latent_trajectory import LatentTrajectory
 from odeform.models.rolling.phases import Begun, Resumed
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start, push_inputs
@@ -25,7 +28,10 @@ from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
 from odeform.types import Floats, Times, Vector
 
-__all__ = ["UNTURNED", "RollingODeform", "placed"]
+if TYPE_CHECKING:
+    from odeform.models.training.run import Run
+
+__all__ = ["UNTURNED", "RollingModel", "placed"]
 
 FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
 """What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
@@ -43,11 +49,22 @@ def placed(moved: Float[np.ndarray, "rows 3"], axis: Vector) -> Float[np.ndarray
     return np.concatenate([moved[:, :1] * ahead + moved[:, 1:2] * UP, moved[:, 2:] * axis], axis=1)
 
 
-class RollingODeform(IntegratedModel):
+class RollingModel(IntegratedModel):
     """The motion of one round body in a plane, or up and down."""
 
-    model = "odeform-rolling"
+    model = "rolling"
     continues_itself = True
+    ablations: ClassVar[Mapping[str, str]] = {
+        "network": "coefficients of the contact law depend on the material alone",
+        "corners": "the body rolls over a smooth floor on a smooth rim",
+        "correction": "what is left unexplained is not regressed",
+    }
+
+    @classmethod
+    def train(cls, run: "Run") -> Checkpoint:
+        from odeform.models.rolling.training.fit import train_rolling
+
+        return train_rolling(run)
 
     def _read(self, checkpoint: Checkpoint) -> None:
         super()._read(checkpoint)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from odeform.models.odeform.latent_trajectory import LatentTrajectory
+from odeform.models.latent.latent_trajectory import LatentTrajectory
 from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 
 from odeform_viz.benchmark.visitors import Visitors
-from odeform_viz.own_shapes import takes_own_bodies
+from odeform_viz.own_shapes import takes_user_bodies
 
 __all__ = ["load_shapes"]
 
@@ -16,7 +16,7 @@ def load_shapes(visitors: Visitors) -> None:
     """Upload a broken file, a mesh and splats, move each, and go back to the trained body."""
     app, client = visitors.app, visitors.first
     predictor = app.columns.all[0].predictor
-    own = predictor is not None and takes_own_bodies(predictor)
+    own = predictor is not None and takes_user_bodies(predictor)
     client.upload(UPLOAD, "broken.ply", b"ply\nformat ascii 1.0\nelement vertex 9\n")
     visitors.expect_refusal("broken.ply")
     contents = {"ball.obj": _ball()} if own else {"ball.obj": _ball(), "ball.splat": _splats()}

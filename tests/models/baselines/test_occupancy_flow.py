@@ -8,7 +8,7 @@ import pytest
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.models.baselines.occupancy_flow import OccupancyFlow
+from odeform.models.points.occupancy_flow import OccupancyFlow
 from odeform.models.registry import load, observations
 from odeform.motion.recorded import RecordedMotion
 from odeform.training.train import train

@@ -11,7 +11,7 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
-from odeform.models.baselines.node_graph import NodeGraph
+from odeform.models.points.node_graph import NodeGraph
 from odeform.models.registry import load
 from odeform.motion.base import Motion
 from odeform.motion.caveats import caveats

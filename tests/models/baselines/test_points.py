@@ -14,15 +14,15 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_z
 from odeform.models.base import Predictor
-from odeform.models.baselines.arithmetic import Net, Numpy
-from odeform.models.baselines.point_model import PointModel
-from odeform.models.baselines.point_network import Trial, sum_of
-from odeform.models.baselines.point_trajectories import point_batch
 from odeform.models.layers import layer_shapes
+from odeform.models.points.arithmetic import Net, Numpy
+from odeform.models.points.point_model import PointModel
+from odeform.models.points.point_network import Trial, sum_of
+from odeform.models.points.point_trajectories import point_batch
+from odeform.models.points.training.fit import Budget, fit_points, initial_weights
+from odeform.models.points.training.point_data import PointData, prepare_points
+from odeform.models.points.training.torch_arithmetic import Torch
 from odeform.models.registry import load, models_of
-from odeform.training.point_data import PointData, prepare_points
-from odeform.training.points import Budget, fit_points, initial_weights
-from odeform.training.torch_arithmetic import Torch
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 SETTING = {"mass": 0.6, "force": 110.0, "azimuth": 0.7}

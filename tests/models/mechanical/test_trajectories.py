@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from odeform.models.mechanical.correction import kept_of
+from odeform.models.modal.correction import kept_of
 from odeform.motion.base import SolveStats
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory

@@ -1,0 +1,151 @@
+"""The latent state of an object over time: integrated once, decoded at any time."""
+
+import time
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from odeform.cancellation import check_cancelled
+from odeform.models.latent.inference import Decoder
+from odeform.motion.base import SolveStats
+from odeform.motion.recent import Recent
+from odeform.motion.reduced_space import motion_rmse
+from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.method import Field
+from odeform.solver.solution import Solution, Status
+from odeform.types import Floats
+
+__all__ = ["LatentTrajectory"]
+
+MOMENTS = 128  # times at which the error of the solver is measured
+FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in ((1e-6, 1e-4), (1e-9, 0.0))}
+"""The finer solutions that errors are measured against -> error in mm from which on each suffices."""
+RECENT = 4  # results that are kept: pose, deformation and gradient of a time are evaluated one after the other
+
+
+class LatentTrajectory:
+    """A solved state z(t), decoded at the requested times. Later times extend it; nothing solved ever changes.
+
+    Where adaptive steps fail, the fixed steps of `fallback` take over from the last good state.
+    """
+
+    def __init__(
+        self,
+        field: Field,
+        decode: Decoder,
+        start: Floats,
+        quality: SolverSettings,
+        fallback: SolverSettings,
+        until: float,
+        gyration_radius: float,
+        precise: Callable[[], tuple[Field, Floats]],
+        finer: Mapping[SolverSettings, float] = MappingProxyType(FINER),
+    ) -> None:
+        """Integrate from `start` (state,) at time 0 to `until` seconds.
+
+        `precise` returns the field and the start in double precision, to measure the error of the solution by `finer`
+        ones (`FINER`).
+        """
+        self._precise, self._finer = precise, finer
+        self._field, self._decode, self._gyration_radius = field, decode, gyration_radius
+        self._quality, self._fallback = quality, fallback
+        begin = time.perf_counter()
+        with np.errstate(all="ignore"):  # an overflow ends the integration with a status
+            self._solution, self._rest = integrate(field, start, quality, until), None
+            self._extend(until)
+        self._wall_ms = 1e3 * (time.perf_counter() - begin)
+        self._origin = decode(np.zeros(1), start[None])
+        self._span = until
+        self._recent: Recent[Floats] = Recent(RECENT)
+
+    def _extend(self, until: float) -> None:
+        """Solve at least to `until` seconds, as far as possible."""
+        first = integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
+        if first.status is not Status.OK and self._quality.tolerance is not None:
+            begin = first.end if self._rest is None else self._rest
+            self._rest = integrate(self._field, first.states[-1], self._fallback, until, begin=begin)
+
+    def _sample(self, times: Floats) -> Floats:
+        """(T, state) at `times` that are solved."""
+        first, rest = self._solution, self._rest
+        if rest is None:
+            return first.sample(times)
+        return np.where((times <= first.end)[:, None], first.sample(times), rest.sample(times))
+
+    @property
+    def _last(self) -> Solution:
+        return self._solution if self._rest is None else self._rest
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which the integration succeeded."""
+        return float("inf") if self._last.status is Status.OK else self._last.end
+
+    def states(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, state)."""
+        self._extend(float(times.max()))
+        return self._sample(times)
+
+    def reduced(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, 6 + K), read-only; zero at time 0."""
+        requested = np.asarray(times, dtype=float)
+        return self._recent.get(requested.tobytes(), lambda: self._decoded(requested))
+
+    def _decoded(self, times: Floats) -> Floats:
+        with np.errstate(all="ignore"):
+            self._extend(float(times.max()))
+        # y(0) = 0 bit-exactly: a product over many rows rounds differently from that over one
+        y = (self._decode(times, self._sample(times)) - self._origin) * (times > 0.0)[:, None]
+        y.flags.writeable = False
+        return y
+
+    @cached_property
+    def _error_mm(self) -> float | None:
+        """RMS over coordinates, points and the span, in mm: the difference from a finer solution in double precision.
+
+        Where that difference is so small that the finer solution's own error matters, an even finer one is computed.
+        """
+        if self._last.status is not Status.OK or self._rest is not None:
+            return None
+        field, start = self._precise()
+        times = np.linspace(0.0, self._span, MOMENTS + 1)[1:]
+        mine = self._decode(times, self._solution.sample(times))
+        error = None
+        for finer, enough in self._finer.items():
+            with np.errstate(all="ignore"):
+                other = integrate(field, start, finer, self._span, before_step=check_cancelled)
+            if other.status is not Status.OK:
+                break
+            truth = self._decode(times, other.sample(times))
+            error = 1e3 * motion_rmse(mine, truth, self._gyration_radius)
+            if error >= enough:
+                break
+        return error
+
+    @property
+    def stats(self) -> SolveStats:
+        """Solver, steps and elapsed time; if the solver failed, where, and the fixed steps computed instead."""
+        first, rest = self._solution, self._rest
+        solver, status = _describe(self._quality), self._last.status.value
+        steps, evaluations = first.steps, first.evaluations
+        if rest is not None:
+            failed = f"{solver} failed at t = {first.end:.3f} s: {first.status.value}"
+            solver = f"{_describe(self._fallback)} ({failed})"
+            status = "fixed steps" if rest.status is Status.OK else f"fixed steps, {status}"
+            steps, evaluations = steps + rest.steps, evaluations + rest.evaluations
+        return SolveStats(
+            solver=solver,
+            steps=steps,
+            evaluations=evaluations,
+            rejected=first.rejected,
+            status=status,
+            wall_ms=self._wall_ms,
+            estimate=lambda: self._error_mm,
+        )
+
+
+def _describe(settings: SolverSettings) -> str:
+    value = f"h = {1e3 * settings.step:.3g} ms" if settings.step else f"tol {settings.tolerance:.0e}"
+    return f"{settings.method}, {value}"

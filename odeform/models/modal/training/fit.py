@@ -1,0 +1,250 @@
+"""The training of the mechanical model: a law of contact and material for all bodies of a data set, then for each."""
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.dataset.index import Dataset
+from odeform.dataset.subsampling import FrameSubsampling
+from odeform.errors import InputError
+from odeform.mechanics.law import MechanicalLaw
+from odeform.models.base import Predictor
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.model import EXACT, QUALITIES, ModalModel
+from odeform.models.modal.training import contact_fit
+from odeform.models.modal.training.contact_fit import FINE, described, fit_law, relative_errors
+from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
+from odeform.models.modal.training.pushes import Pushes, read_pushes
+from odeform.models.modal.training.residual_fit import fit_correction
+from odeform.models.per_object import PerObject, joined
+from odeform.models.training.qualities import Validation, with_qualities
+from odeform.models.training.run import Run
+from odeform.motion.reduced_space import POSE
+from odeform.parallel import as_completed
+from odeform.progress import Progress
+from odeform.schema import Schema
+from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Arrays, Floats
+
+__all__ = ["fit_mechanical", "train_modal", "with_measured_qualities"]
+
+SEQUENCES = 8  # of each body, to which the law that all share is fitted; it has ten numbers
+OWN_SEQUENCES, DRAWS = 32, 2  # to which laws of one body are, and how many such draws; the best law is kept
+FIXED = {"pulse_s", "projectile_radius_m", "projectile_mass_kg"}
+MODES, LEFT_OUT = (120, 400), 0.15  # the second number of modes where the first leaves out more of the deformation
+Checkpointed = tuple[Arrays, dict[str, Any]]
+TOLERANCES = (7e-4, 6e-4, 5e-4, 4e-4, 3.5e-4, 3e-4, 2.5e-4, 2e-4, 1.8e-4, 1.5e-4, 1.2e-4, 1e-4, 8e-5, 6e-5, 4e-5)
+"""m, tried for each body."""
+SOLVER_SHARES = {"draft": (1.0, 1.0), "balanced": (0.15, 0.3)}
+"""Of the model's errors, as `odeform.models.training.qualities.SHARES`: this adds one per cent to the total error."""
+
+
+def train_modal(run: Run) -> Checkpoint:
+    """Train on the objects of the data of `run`, up to the last frame asked for; see `fit_mechanical`.
+
+    `InputError` for frames that are left out, and a number of steps.
+    """
+    request, dataset = run.request, run.dataset
+    if request.every > 1 or request.stagger or request.steps is not None:
+        raise InputError("modal: expected no --every, --stagger or --steps")
+    window = dataset.schema.window
+    last = (FrameSubsampling(request.window).count(dataset.schema) - 1) / window.rate
+    dataset = replace(dataset, schema=replace(dataset.schema, window=replace(window, stop=last)))
+    laws = SavedLaws(run.part, dataset, request.seed, request.resume)
+    return fit_mechanical(dataset, laws, request.seed, run.report, "correction" not in request.without)
+
+
+def fit_mechanical(
+    dataset: Dataset, laws: SavedLaws, seed: int, report: Callable[[str], None], correct: bool = True
+) -> Checkpoint:
+    """Train on the objects of a data set of the scene `contact-force`; laws that are finished are kept in `laws`, and
+    those that it has are not fitted again.
+
+    Without `correct`, motions are those of the mechanics alone. `InputError` for other data.
+    """
+    missing = [name for name in dataset.objects if name not in OBJECTS]
+    if missing or not dataset.objects or not set(dataset.fixed) >= FIXED:
+        raise InputError(
+            f"{dataset.root}: expected data of scene contact-force, of objects {', '.join(OBJECTS)}; "
+            f"got scene {dataset.schema.scene}"
+        )
+    begin, pulse = time.process_time(), dataset.fixed["pulse_s"]
+    each: dict[str, Pushes] = {}
+    for name in dataset.objects:
+        each[name] = _training_pushes(dataset, name)
+        pushes = each[name]
+        report(
+            f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.squares)} modes leave out "
+            f"{100.0 * pushes.share_left_out:.0f} % of the deformation"
+        )
+    shared = laws.get(SHARED)
+    if shared is None:
+        some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
+        shared = fit_law(some, pulse, MechanicalLaw(), report=report)
+        laws.add(SHARED, shared)
+    bodies = [
+        _Body(
+            dataset.of(name).schema,
+            {split: _inputs(dataset.of(name), split) for split in ("train", "val")},
+            pushes,
+            read_pushes(dataset.of(name), "val", pushes.body),
+            shared,
+            laws.get(name),
+            pulse,
+            seed,
+            contact_fit.EVALUATIONS,
+            correct,
+        )
+        for name, pushes in each.items()
+    ]
+    found: dict[str, Checkpoint] = {}
+    spent, names = time.process_time() - begin, list(each)
+    progress = Progress("bodies", len(bodies))
+    for index, (law, part, seconds) in as_completed(_fitted, bodies):
+        name, spent = names[index], spent + seconds
+        laws.add(name, law)
+        found[name] = part
+        report(f"{name}: {described(law)}")
+        progress.advance(note=name)
+    progress.close()
+    whole = joined(dataset.schema, {name: found[name] for name in names})
+    return replace(whole, config={**whole.config, "val": {"seconds": spent}})
+
+
+def _inputs(dataset: Dataset, split: str) -> Floats:
+    """(S, P) in [-1, 1]."""
+    return np.array([dataset.schema.vector(entry.parameters) for entry in dataset.select(split)])
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """What the fit of one body needs."""
+
+    schema: Schema
+    theta: dict[str, Floats]
+    """(S, P) inputs by split."""
+    train: Pushes
+    val: Pushes
+    shared: MechanicalLaw
+    own: MechanicalLaw | None
+    """Its law, if an interrupted training has finished it."""
+    pulse: float
+    seed: int
+    evaluations: int
+    correct: bool
+
+
+def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpoint, float]:
+    """Its law, its checkpoint, and the seconds of processor time that they took."""
+    begin = time.process_time()
+    law = _law(body) if body.own is None else body.own
+    correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
+    checkpoint = _checkpoint(body.schema, body.theta["train"], body.train, law, body.pulse, correction)
+    checkpoint = _with_qualities(checkpoint, body.theta["val"], body.val)
+    return law, checkpoint, time.process_time() - begin
+
+
+def _with_qualities(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
+    """With solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
+
+    Each body has its own: what a solver error does to a motion depends on it. Where the correction alone makes the
+    motion, none has an error, and the finest is that of all bodies.
+    """
+    known = Validation(theta, val.times, val.reduced, np.ones(val.reduced.shape[:2], dtype=bool))
+    candidates = [SolverSettings("limex", tolerance=tolerance, dtype="float64") for tolerance in TOLERANCES]
+    finest = QUALITIES["reference"]
+    chosen = with_qualities(checkpoint, known, EXACT, [*candidates, finest], SOLVER_SHARES)
+    qualities = {**chosen.config["qualities"], "reference": finest.to_json()}
+    return replace(chosen, config={**chosen.config, "qualities": qualities})
+
+
+def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:
+    """The checkpoint of a trained mechanical model, with solver settings that are chosen again on validation motions.
+
+    The model stays as it is. `InputError` for other models.
+    """
+    parts = model.parts.items() if isinstance(model, PerObject) else ()
+    asked = [
+        (part.checkpoint, _inputs(dataset.of(name), "val"), read_pushes(dataset.of(name), "val", part.body))
+        for name, part in parts
+        if isinstance(part, ModalModel)
+    ]
+    if not asked:
+        raise InputError(f"{model.model}: expected a mechanical model, of pushed objects")
+    objects = dict(model.checkpoint.config["objects"])
+    for index, found in as_completed(_measured, asked):
+        name = model.schema.objects[index]
+        objects[name] = {**found.config, "schema": objects[name]["schema"]}
+    return replace(model.checkpoint, config={**model.checkpoint.config, "objects": objects})
+
+
+def _measured(asked: tuple[Checkpoint, Floats, Pushes]) -> Checkpoint:
+    return _with_qualities(*asked)
+
+
+def _law(body: _Body) -> MechanicalLaw:
+    """Of that of all bodies and its own, fitted to several draws of its motions, the one with the smallest error on all
+    training and validation motions.
+
+    Friction and damping of the simulator depend on how mass and vertices are spread in a body. Where a sphere slips off
+    or not, errors jump with the law, and a fit ends in one of many minima.
+    """
+    draws = (body.train.some(OWN_SEQUENCES, body.seed + index) for index in range(DRAWS))
+    own = [
+        fit_law([some], body.pulse, body.shared, report=lambda _: None, evaluations=2 * body.evaluations)
+        for some in draws
+    ]
+
+    def error(law: MechanicalLaw) -> float:
+        total = 0.0
+        for pushes in (body.train, body.val):
+            errors = relative_errors(pushes, pushes.predicted(law, body.pulse, FINE))
+            total += len(pushes.contacts) * float(np.square(errors).sum())
+        return total if np.isfinite(total) else np.inf
+
+    return min([*own, body.shared], key=error)
+
+
+def _training_pushes(dataset: Dataset, name: str) -> Pushes:
+    """With as many modes as the body's motions ask for."""
+    few, many = MODES
+    pushes = read_pushes(dataset.of(name), "train", elastic_body(get_object(name), few))
+    if pushes.share_left_out <= LEFT_OUT:
+        return pushes
+    return read_pushes(dataset.of(name), "train", elastic_body(get_object(name), many))
+
+
+def _checkpoint(
+    schema: Schema,
+    theta: Floats,
+    pushes: Pushes,
+    law: MechanicalLaw,
+    pulse: float,
+    correction: Checkpointed | None = None,
+) -> Checkpoint:
+    """That of one body, trained on `pushes` with inputs `theta` (S, P)."""
+    body = pushes.body
+    largest = [np.linalg.norm(pushes.reduced[..., part], axis=-1).max() for part in (slice(0, 3), slice(POSE, None))]
+    return Checkpoint(
+        model=ModalModel.model,
+        schema=schema,
+        config={
+            "largest": [float(size) for size in largest],
+            "body": body.to_json(),
+            "law": asdict(law),
+            "pulse_s": pulse,
+            **({"correction": correction[1]} if correction else {}),
+            "projectile": asdict(pushes.projectile),
+        },
+        arrays={
+            **(correction[0] if correction else {}),
+            **body.arrays(),
+            **body.shown(),
+            "training.theta": theta.astype(np.float32),
+        },
+    )

@@ -1,0 +1,67 @@
+"""The correction of a mechanical model: which share of each part of the motion is the mechanics', and the regression of
+what that leaves."""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.mechanics.law import MechanicalLaw
+from odeform.models.contact.inputs import ContactInputs
+from odeform.models.contact.regression import PARTS, fit_contact_regression
+from odeform.models.modal.training.contact_fit import FINE
+from odeform.models.modal.training.pushes import Pushes
+from odeform.motion.reduced_space import POSE
+from odeform.types import Arrays, Floats
+
+__all__ = ["SHARES", "fit_correction"]
+
+ENERGY = 0.99  # of the deformations that are left to the correction, in the modes of their trajectories
+SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
+"""Of the mechanics' motion, tried for each part. Without any, a part is the regression of whole motions."""
+PRIOR = 0.1  # weight of a gain of one, relative to that of the motions
+
+
+def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays and settings of the correction of one body: see `odeform.models.modal.correction`.
+
+    Each coefficient of the deformation has the gain of least squares. Shift, rotation and deformation have the share
+    with the smallest squared error on training motions, each predicted from all others, and validation motions
+    together.
+    """
+    known, asked = (ContactInputs(p.contacts, p.normals, p.forces) for p in (train, val))
+    own, own_val = (p.predicted(law, pulse, FINE) for p in (train, val))
+    gains = _gains(own[..., POSE:], train.reduced[..., POSE:])
+    own[..., POSE:] *= gains
+    own_val[..., POSE:] *= gains
+    trials = {
+        share: fit_contact_regression(
+            known, asked, train.times, train.reduced - share * own, val.reduced - share * own_val, ENERGY
+        )
+        for share in SHARES
+    }
+    best = {part: min(SHARES, key=lambda share: trials[share][1]["errors"][part]) for part in PARTS}
+    arrays: Arrays = {"gains": gains.astype(np.float32)}
+    arrays |= {key: value for key, value in trials[best["deformation"]][0].items() if not _part_of(key)}
+    settings: dict[str, Any] = {"shares": best, "blend": {}, "trials": []}
+    for part, share in best.items():
+        found, chosen = trials[share]
+        arrays |= {key: value for key, value in found.items() if _part_of(key) == part}
+        settings["blend"][part] = chosen["blend"][part]
+        settings["trials"] += [
+            {"part": part, "share": tried, "error": result["errors"][part]} for tried, (_, result) in trials.items()
+        ]
+    return arrays, settings
+
+
+def _gains(own: Floats, truth: Floats) -> Float[np.ndarray, " coefficients"]:
+    """(K,) of least squares between deformations (S, T, K) by mechanics and in truth, drawn towards one."""
+    power = (own**2).sum(axis=(0, 1))
+    prior = PRIOR * power + 1e-4 * power.max() + 1e-30
+    return ((own * truth).sum(axis=(0, 1)) + prior) / (power + prior)
+
+
+def _part_of(key: str) -> str | None:
+    """The part of the motion that an array gp.PART.EXPERT.NAME belongs to; None for those of all parts."""
+    name = key.split(".")[1] if key.count(".") > 1 else ""
+    return name if name in PARTS else None

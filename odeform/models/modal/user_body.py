@@ -1,0 +1,205 @@
+"""The mechanical model of a body that it was not trained on: a mesh, points or splats of the user's own."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from odeform.errors import InputError
+from odeform.geometry.rigid import best_rigid
+from odeform.geometry.shape import FittedShape
+from odeform.geometry.similarity import Similarity
+from odeform.models.base import Predictor
+from odeform.models.modal.elastic_body import ElasticBody, elastic_body
+from odeform.models.modal.model import ModalModel
+from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
+from odeform.models.modal.transferred_residual import CarriedCorrection, shape_distance, share_at
+from odeform.models.per_object import PerObject
+from odeform.motion.recent import Recent
+from odeform.motion.trust import Trust
+from odeform.schema import OBJECT, Parameters
+from odeform.simulation.objects.soft_object import SoftObject
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Points, Times
+
+__all__ = ["UserBody", "UserBodyPredictor", "resting_body", "takes_user_bodies", "user_body"]
+
+OPAQUE = 0.3  # opacity below which a splat does not outline a body
+SIZES = 8  # motions whose size is kept
+NEIGHBOURS = 4  # nodes that carry a point of the shape
+
+
+@dataclass(frozen=True, eq=False)
+class UserBody:
+    """A shape as a soft body that rests on the floor."""
+
+    item: SoftObject
+    body: ElasticBody
+    like: str
+    """The trained object whose material and forces it has."""
+    fit: FittedShape
+    """The shape as it was given, placed where the body rests."""
+
+
+def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) -> UserBody:
+    """Make a soft body of a shape. It takes 5 to 20 seconds.
+
+    Splats and points without faces get a closed surface around them first. A defective mesh is repaired. `up` is the
+    axis of the shape that points up, as "+y"; by default it is guessed. Needs the extra `objects`.
+
+    Raises:
+        InputError: for a shape that encloses no volume, holds several bodies, or does not come to rest on the floor.
+    """
+    from odeform.simulation.objects.foreign import placed_object  # looking at trained bodies needs no simulator
+
+    try:
+        placed = placed_object(_surface(geometry), name, up=up)
+    except InputError as error:
+        raise InputError(f"{name}: {str(error).removeprefix(f'mesh {name}: ')}") from None
+    item = placed.item
+    weights = np.full(item.surface_count, 1.0 / item.surface_count)
+    free, settled = (nodes[: item.surface_count] for nodes in (item.points, item.settled))
+    turn, shift = best_rigid(free, settled, weights)
+    laying = Similarity(1.0, turn, weights @ free + shift - turn @ (weights @ free))
+    laid = laying @ placed.transform
+    shape, stiff = laid.shape(geometry), laying.points(item.points)
+    sagging = _carried(item.settled - stiff, stiff, np.asarray(shape.points, dtype=float))
+    shape = replace(shape, points=(shape.points + sagging).astype(np.float32))
+    fit = FittedShape(geometry, None, laid, shape, None, 0.0)
+    return UserBody(item, elastic_body(item), placed.like, fit)
+
+
+def resting_body(item: SoftObject, like: str) -> UserBody:
+    """A soft object as it rests on the floor, whose shape is its own surface."""
+    rest = item.rest_mesh()
+    return UserBody(item, elastic_body(item), like, FittedShape(rest, None, Similarity(), rest, None, 0.0))
+
+
+def _surface(geometry: Geometry) -> Mesh:
+    if isinstance(geometry, Mesh):
+        return geometry
+    from odeform.simulation.objects.enclosing import enclosing_surface
+
+    points = np.asarray(geometry.points, dtype=float)
+    if isinstance(geometry, GaussianSplats):
+        points = points[geometry.opacities > OPAQUE]
+    return enclosing_surface(points)
+
+
+def _carried(
+    values: Float[np.ndarray, "nodes 3"], nodes: Float[np.ndarray, "nodes 3"], points: Points
+) -> Float[np.ndarray, "points 3"]:
+    """The values at the nodes, carried to points."""
+    away, near = KDTree(nodes).query(points, NEIGHBOURS)
+    weights = 1.0 / np.maximum(away, 1e-9)
+    return np.einsum("nk,nki->ni", weights / weights.sum(axis=1, keepdims=True), values[near])
+
+
+def takes_user_bodies(predictor: Predictor) -> bool:
+    """Whether a model computes bodies that it was not trained on from their shape and material."""
+    return _part_of(predictor) is not None
+
+
+def _part_of(predictor: Predictor, like: str = "") -> ModalModel | None:
+    """The part for one object, the first if there is none for it; None for other models."""
+    if isinstance(predictor, PerObject):
+        found = predictor.parts.get(like, next(iter(predictor.parts.values())))
+        return found if isinstance(found, ModalModel) else None
+    return predictor if isinstance(predictor, ModalModel) else None
+
+
+def _largest(part: ModalModel, own: UserBody) -> list[float]:
+    """m: the largest shift and deformation that motions of a body are bounded by, softly.
+
+    At least those of the trained body. A lighter one may fly as far as the strongest pulse throws it, a larger one may
+    deform more.
+    """
+    shift, deformation = part.space.largest
+    solid, window = own.body.solid, part.schema.window
+    thrown = own.item.forces[1] * part.pulse / solid.mass * window.stop
+    sizes = [float(np.ptp(body.points, axis=0).max()) for body in (own.body, part.body)]
+    return [max(shift, thrown), deformation * max(sizes[0] / sizes[1], 1.0)]
+
+
+class UserBodyPredictor(ModalModel):
+    """The learned law of a trained model, with the modes of another body.
+
+    Attributes:
+        distance: How far the body is from the trained one that it is like, relative to that one's size: see
+            `odeform.models.modal.transferred_residual.shape_distance`.
+    """
+
+    def __init__(self, trained: Predictor, own: UserBody) -> None:
+        """`InputError` for a model that `takes_user_bodies` is false for."""
+        trained = trained.trained if isinstance(trained, UserBodyPredictor) else trained
+        part = _part_of(trained, own.like)
+        if part is None:
+            raise InputError(f"{trained.model}: knows its trained bodies only; expected a mechanical model")
+        self.trained, self.own = trained, own
+        body, checkpoint = own.body, part.checkpoint
+        self.distance = shape_distance(Mesh(body.points.astype(np.float32), body.faces), part.rest)
+        # a correction is that of the trained body: what similar shapes get of it is added below; and so are solver
+        # errors, which were not measured on this one
+        of_trained = ("correction", "qualities", "frontier")
+        kept = {key: value for key, value in checkpoint.config.items() if key not in of_trained}
+        super().__init__(
+            replace(
+                checkpoint,
+                schema=trained.schema,
+                config={**kept, "body": body.to_json(), "largest": _largest(part, own)},
+                arrays={**body.shown(), **body.arrays()},
+            )
+        )
+        if part.correction is not None:
+            self.correction = CarriedCorrection(part, body, share_at(self.distance))
+        band = trained.checkpoint.config.get(SHAPE_BAND)
+        self._band = None if band is None else ShapeBand.from_json(band)
+        self.knows_foreign_errors = self._band is not None
+        self._sizes: Recent[float] = Recent(SIZES)
+
+    def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
+        return self.own.item.forces
+
+    @cached_property
+    def trust(self) -> Trust:
+        return replace(super().trust, foreign=f"{self.describe_motion()}, {self._describe_error()}")
+
+    def describe_motion(self) -> str:
+        """What decides the motion of the body, as the start of a sentence in lower case."""
+        return f"its motion follows from its shape, and from the {self.own.like}'s material and law of contact"
+
+    def _describe_error(self) -> str:
+        if self._band is None:
+            return "with an unknown error"
+        away = 100.0 * self.distance
+        return (
+            f"with an error as measured on other unseen shapes; its distance from the {self.own.like} is {away:.1f} %"
+        )
+
+    @property
+    def bodies(self) -> tuple[Mesh, ...]:
+        return self.trained.bodies
+
+    def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
+        """(T, 2) mm at `times` (T,) s, as that of trained bodies, from errors on other shapes that were not trained: it
+        widens with `distance`. None where the checkpoint has no such errors."""
+        if self._band is None:
+            return None
+        given = self.complete({**self.parameters_like(), **parameters})
+        size = self._sizes.get(tuple(given.items()), lambda: self._size_of(given))
+        return self._band.at(size, self.distance, times)
+
+    def _size_of(self, parameters: Parameters) -> float:
+        """mm: RMS displacement of the whole motion."""
+        moved = self.solve(None, parameters, "draft").vertices(self.schema.window.times[1:]) - self.rest.points
+        return 1e3 * float(np.sqrt((moved.astype(float) ** 2).mean()))
+
+    def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
+        return self.rest
+
+    def parameters_like(self) -> dict[str, str]:
+        """The object to name in parameters: the one that the body is like, if it was trained."""
+        return {OBJECT: self.own.like} if self.own.like in self.schema.objects else {}

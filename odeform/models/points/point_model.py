@@ -1,0 +1,99 @@
+"""What all models that move each point by itself share: how they are stored and read, and how they solve."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from odeform.checkpoint import Checkpoint
+from odeform.errors import InputError
+from odeform.models.base import Predictor, check_finite
+from odeform.models.layers import layer_shapes
+from odeform.models.points.arithmetic import Net, Numpy
+from odeform.models.points.point_network import PointNet
+from odeform.models.points.point_trajectories import FramedPoints, MomentaryPoints
+from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, PointTrajectory, evaluate_probes
+from odeform.motion.reduced_space import to_canonical
+from odeform.schema import Parameters, Schema
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Arrays, GaussianSplats, Geometry, MotionSequence, Points
+
+if TYPE_CHECKING:
+    from odeform.models.training.run import Run
+
+__all__ = ["PREFIX", "PointModel", "frame_from_json", "frame_to_json", "point_checkpoint"]
+
+PREFIX = "net."
+
+
+class PointModel(Predictor):
+    """A predictor of where each point goes.
+
+    A subclass sets `model`, its `network`, which `odeform train` trains, and the `trajectory` that evaluates it.
+    """
+
+    network: PointNet
+    trajectory: type[MomentaryPoints | FramedPoints]
+
+    @classmethod
+    def train(cls, run: "Run") -> Checkpoint:
+        from odeform.models.points.training.fit import train_points
+
+        return train_points(cls, run)
+
+    def _read(self, checkpoint: Checkpoint) -> None:
+        self.frame = frame_from_json(checkpoint.config["frame"])
+        weights = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
+        for name, shape in layer_shapes(self.network.sizes(len(self.schema.learned), checkpoint.config["width"])):
+            if weights[name].shape != shape or not np.isfinite(weights[name]).all():
+                raise ValueError(f"{name}: expected finite numbers of shape {shape}, got {weights[name].shape}")
+        self.net = Net(weights, Numpy())
+        self.mean = MeanMotion(checkpoint.arrays["mean.times"], checkpoint.arrays["mean.shifts"])
+        self._probes = evaluate_probes(self.rest, np.array(self.frame.anchor))
+
+    def _trajectory(self, rest: Points, parameters: Parameters, observed: MotionSequence | None) -> PointTrajectory:
+        """The trajectory of points (N, 3) in metres about the anchor, canonical."""
+        inputs, theta = self.frame.inputs(rest), self.schema.inputs(parameters)
+        return self.trajectory(self.net, self.network, self.frame, self.schema.window, inputs, theta)
+
+    def _solve(
+        self,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
+    ) -> PointMotion:
+        check_finite(geometry)
+        if isinstance(geometry, GaussianSplats):
+            raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
+        rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
+        moved, body = (self._trajectory(x, parameters, observed) for x in (rest, self._probes.points))
+        frame, mean, probes = self.frame, self.mean, self._probes
+        return PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.trust)
+
+
+def frame_to_json(frame: PointFrame) -> dict[str, Any]:
+    """The frame as JSON. Files call the radius of gyration `arm`."""
+    values = asdict(frame)
+    return {"arm": values.pop("gyration_radius"), **values}
+
+
+def frame_from_json(data: Mapping[str, Any]) -> PointFrame:
+    """The frame of a file; `KeyError`, `TypeError` or `ValueError` where something is missing or wrong."""
+    values = dict(data)
+    x, y, z = map(float, values.pop("anchor"))
+    sizes = {name: float(value) for name, value in values.items()}
+    if not np.isfinite([x, y, z]).all() or not all(0.0 < size < np.inf for size in sizes.values()):
+        raise ValueError(f"frame: expected a finite anchor and positive lengths, got {dict(data)}")
+    return PointFrame((x, y, z), sizes.pop("arm"), **sizes)
+
+
+def point_checkpoint(
+    model: str, schema: Schema, frame: PointFrame, mean: MeanMotion, weights: Arrays, config: dict[str, Any]
+) -> Checkpoint:
+    """The checkpoint of a point model, without the body that viewers show."""
+    arrays = {PREFIX + name: np.asarray(value, dtype=np.float32) for name, value in weights.items()}
+    arrays |= {"mean.times": mean.times, "mean.shifts": mean.shifts}
+    return Checkpoint(model, schema, {"frame": frame_to_json(frame), **config}, arrays)

@@ -1,0 +1,182 @@
+"""Training of networks that move each point by itself: the same procedure for all of them.
+
+Adam on points of randomly drawn sequences, with a warm-up and a cosine decay of the learning rate, clipped gradients,
+and the weights with the best validation error. Learning rate and width are chosen by validation among a few trials,
+each a fifth as long as the final training.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+import torch
+
+from odeform.checkpoint import Checkpoint
+from odeform.dataset.subsampling import FrameSubsampling
+from odeform.errors import InputError
+from odeform.models.layers import layer_shapes
+from odeform.models.points.arithmetic import Net
+from odeform.models.points.point_model import PointModel, point_checkpoint
+from odeform.models.points.point_network import PointNet, Trial, sum_of
+from odeform.models.points.training.point_data import PointData, prepare_points
+from odeform.models.points.training.samplers import SAMPLERS
+from odeform.models.points.training.torch_arithmetic import Torch
+from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.run import Run
+from odeform.types import Arrays
+
+__all__ = ["Budget", "fit_points", "initial_weights", "train_points"]
+
+SHARE = 0.2  # length of a trial, relative to the final training
+WARM = 0.03  # share of the length in which the learning rate rises
+CLIP = 1.0  # norm of the gradient
+VALIDATIONS = 25  # over the length
+APART = 20  # steps between two validations, at least
+AHEAD = 1.0  # windows beyond the trained one, each of which takes as long as that
+WATCHED = 256  # validation motions of a point
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Training budget including trials: processor time in seconds, or a number of steps where one is given."""
+
+    seconds: float
+    steps: int | None = None
+
+    def part(self, share: float) -> "Budget":
+        """A share in (0, 1] of this budget, at least one step."""
+        return Budget(share * self.seconds, None if self.steps is None else max(round(share * self.steps), 1))
+
+
+def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dict[str, torch.Tensor]:
+    """Uniform within 1 / sqrt(inputs of the layer), as `torch.nn.Linear` draws them."""
+    generator, out = torch.Generator().manual_seed(seed), {}
+    inputs = 1
+    for name, shape in shapes:
+        inputs = shape[1] if name.endswith("weight") else inputs
+        out[name] = (2.0 * torch.rand(shape, generator=generator) - 1.0) / math.sqrt(inputs)
+    return out
+
+
+class _Learner:
+    """One training of one network."""
+
+    def __init__(self, network: PointNet, data: PointData, trial: Trial, seed: int, device: torch.device) -> None:
+        self.network, self.trial, self.scale_mm = network, trial, 1e3 * data.frame.scale
+        sampler = SAMPLERS[network.sampling]
+        self.train_split, self.val_split = (sampler(network, data, split, device) for split in ("train", "val"))
+        shapes = list(layer_shapes(network.sizes(data.theta["train"].shape[1], trial.width)))
+        self.weights = {name: w.to(device).requires_grad_() for name, w in initial_weights(shapes, seed).items()}
+        self.net = Net(self.weights, Torch())
+        self.optimiser = torch.optim.Adam(self.weights.values(), lr=trial.rate)
+        self.generator = torch.Generator().manual_seed(seed + 1)
+        self.watched = self._draw_watched()
+        self.best = (math.inf, self._snapshot())
+        self.done = 0
+
+    def _snapshot(self) -> Arrays:
+        return {name: weight.detach().cpu().numpy().copy() for name, weight in self.weights.items()}
+
+    def _draw_watched(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Validation sequences in turn, and a point of each: the same in every trial."""
+        sequences, _, points, _ = self.val_split.moved.shape
+        generator = torch.Generator().manual_seed(0)
+        return torch.arange(WATCHED) % sequences, torch.randint(0, points, (WATCHED,), generator=generator)
+
+    def _loss(self, share: float) -> torch.Tensor:
+        train = self.train_split
+        sample = train.draw(share, self.generator)
+        batch, truth, centre = train.batch(sample)
+        weights = train.weights(sample)
+        parts = self.network.predict(self.net, batch)
+        # of several parts the first is the motion of the whole body: each has a target of its own
+        targets = [truth] if len(parts) == 1 else [centre, truth - centre]
+        sizes = [1.0] if len(parts) == 1 else [1.0, train.finer]
+        squares = [
+            weights * ((part - target) / size) ** 2 for part, target, size in zip(parts, targets, sizes, strict=True)
+        ]
+        return torch.stack([part.mean() for part in squares]).sum()
+
+    def advance(self, share: float) -> float:
+        """One step of descent at this share of the length; returns its loss."""
+        warm_up = min(1.0, (share + 1e-3) / WARM)
+        self.optimiser.param_groups[0]["lr"] = self.trial.rate * warm_up * cosine_decay(share)
+        self.optimiser.zero_grad()
+        loss = self._loss(share)
+        loss.backward()
+        norm = torch.nn.utils.clip_grad_norm_(self.weights.values(), CLIP)
+        if torch.isfinite(norm):
+            self.optimiser.step()
+        self.done += 1
+        return float(loss.detach())
+
+    @torch.no_grad()
+    def validate(self) -> float:
+        """Pooled RMSE in mm on validation; keeps the weights if they are the best so far."""
+        sample = self.val_split.all_frames(*self.watched)
+        batch, truth, _ = self.val_split.batch(sample)
+        squares = (sum_of(self.network.predict(self.net, batch)) - truth).square()
+        error = self.scale_mm * float((self.val_split.weights(sample) * squares).mean().sqrt())
+        if error < self.best[0]:
+            self.best = (error, self._snapshot())
+        return error
+
+    def train(self, budget: Budget, report: Callable[[str], None]) -> None:
+        begin, validated, share, validations = time.process_time(), 0, 0.0, 0
+        while share < 1.0:
+            loss = self.advance(share)
+            spent = time.process_time() - begin
+            share = self.done / budget.steps if budget.steps is not None else spent / budget.seconds
+            if share >= 1.0 or (share * VALIDATIONS >= validations + 1 and self.done >= validated + APART):
+                validations, validated = int(share * VALIDATIONS), self.done
+                error = self.validate()
+                report(f"{100 * share:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
+
+
+def fit_points(
+    model: str, network: PointNet, data: PointData, budget: Budget, seed: int, report: Callable[[str], None]
+) -> Checkpoint:
+    """Choose among the trials, train, and return the checkpoint, without the body that viewers show."""
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    whole = 1.0 / (1.0 + SHARE * len(network.trials))
+    trials, begin = [], time.process_time()
+
+    def learn(trial: Trial, budget: Budget, title: str) -> _Learner:
+        learner = _Learner(network, data, trial, seed, device)
+        learner.train(budget, lambda line: report(f"{title}: {line}"))
+        return learner
+
+    with small_batches():
+        for trial in network.trials:
+            title = f"trial of rate {trial.rate:g}, width {trial.width}"
+            learner = learn(trial, budget.part(SHARE * whole), title)
+            trials.append({**asdict(trial), "steps": learner.done, "val": learner.best[0]})
+        best = network.trials[int(np.argmin([trial["val"] for trial in trials]))]
+        learner = learn(best, budget.part(whole), f"rate {best.rate:g}, width {best.width}")
+    error, weights = learner.best
+    val = {"val_rmse_mm": error, "steps": learner.done, "seconds": time.process_time() - begin}
+    config = {**asdict(best), "every": data.given, "trials": trials, "val": val}
+    schema = data.schema
+    if network.sampling != "between":
+        # networks of the time, or of the last frame, continue beyond the window
+        schema = replace(schema, window=replace(schema.window, reach=AHEAD))
+    return point_checkpoint(model, schema, data.frame, data.mean, weights, config)
+
+
+def train_points(model: type[PointModel], run: Run) -> Checkpoint:
+    """Train a model of points on the data of `run`.
+
+    `InputError` for a model that interpolates between frames, and is not told to leave any out.
+    """
+    request, between = run.request, model.network.sampling == "between"
+    if between and request.every < 2:
+        raise InputError(f"{request.model}: interpolates between observed frames; expected --every of at least 2")
+    every, given = (1, request.every) if between else (request.every, 1)
+    subsampling = FrameSubsampling(request.window, every, request.stagger and not between)
+    data = prepare_points(run.dataset, subsampling, given)
+    run.report(f"{request.model} on {len(data.theta['train'])} sequences of {data.moved['train'].shape[1]} frames")
+    budget = Budget(60.0 * request.minutes, request.steps)
+    checkpoint = fit_points(request.model, model.network, data, budget, request.seed, run.report)
+    return replace(checkpoint, arrays=run.with_body(checkpoint.arrays, data.theta["train"]))
