@@ -6,8 +6,8 @@ Budgets are steps, so that the speed of a machine does not change the models.
 from collections.abc import Iterable
 from dataclasses import replace
 
-from odeform.tables.paper import UNSEEN_OBJECTS
-from odeform.tables.runs import Run
+from odeform_figures.tables.paper import UNSEEN_OBJECTS
+from odeform_figures.tables.runs import Run
 
 __all__ = [
     "AHEAD",

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from odeform.tables.cells import Runs, models, paragraph, scored_rows, scores_of, table
-from odeform.tables.plan import ABLATED, FEWER, FRAMES
+from odeform_figures.tables.cells import Runs, models, paragraph, scored_rows, scores_of, table
+from odeform_figures.tables.plan import ABLATED, FEWER, FRAMES
 
 __all__ = ["ablations", "learning_curve"]
 

@@ -24,10 +24,10 @@ from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.generate import generate
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
 from odeform.types import Floats, Mesh, MotionSequence
-from odeform.unseen.left_out import without
-from odeform.unseen.measure import measure
-from odeform.unseen.predictions import nearest_motion
-from odeform.unseen.shapes import INSTANCE, UnseenShape, pushes_of, shape_file, simulated
+from odeform_figures.unseen.left_out import without
+from odeform_figures.unseen.measure import measure
+from odeform_figures.unseen.predictions import nearest_motion
+from odeform_figures.unseen.shapes import INSTANCE, UnseenShape, pushes_of, shape_file, simulated
 
 NAMES = ("donut", "bottle")
 QUALITIES = {name: {"method": "limex", "step": 5e-3, "dtype": "float64"} for name in ("draft", "balanced", "reference")}
@@ -170,7 +170,7 @@ def test_finished_shapes_are_read_again_and_failed_pushes_are_named(
 ) -> None:
     (truth,) = motions(donut, 1)
     answers = iter([truth, "2 of 5 tetrahedra are inside out at the end"])
-    monkeypatch.setattr("odeform.unseen.shapes._run", lambda item, given: next(answers))
+    monkeypatch.setattr("odeform_figures.unseen.shapes._run", lambda item, given: next(answers))
     path = shape_file(tmp_path, "ring", 2, 0)
     one = simulated(path, lambda: UnseenShape("ring", INSTANCE, "donut", donut.own.item), 2, 0, 1)
     again = simulated(path, lambda: pytest.fail("it is finished"), 2, 0, 1)

@@ -11,8 +11,8 @@ from odeform.geometry.rigid import best_rigid
 from odeform.models.base import Predictor
 from odeform.models.mechanical.own_body import OwnBodyPredictor
 from odeform.types import Floats, Frames, Perpoint, Points
-from odeform.unseen.predictions import Predictions, predictions
-from odeform.unseen.shapes import UnseenShape
+from odeform_figures.unseen.predictions import Predictions, predictions
+from odeform_figures.unseen.shapes import UnseenShape
 
 __all__ = ["Measured", "measure"]
 

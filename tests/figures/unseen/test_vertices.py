@@ -12,7 +12,7 @@ from odeform.models.base import Predictor
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import SCENE
 from odeform.types import MotionSequence
-from odeform.unseen.vertices import errors_at, held_out, without_vertices
+from odeform_figures.unseen.vertices import errors_at, held_out, without_vertices
 
 
 def still(entry: Entry) -> MotionSequence:

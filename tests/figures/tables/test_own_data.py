@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from odeform.synthetic.motions.registry import KINDS
-from odeform.tables import own_data
-from odeform.tables.own_data import MODELS, main, summary
+from odeform_figures.tables import own_data
+from odeform_figures.tables.own_data import MODELS, main, summary
 
 
 def scores(*errors: float) -> own_data.Scores:

@@ -31,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> None:
     from odeform.cluster import on_cluster
-    from odeform.tables.tables import tables
+    from odeform_figures.tables.tables import tables
 
     positive("--share", args.share)
     positive("--jobs", args.jobs)

@@ -17,7 +17,7 @@ from odeform.training.mechanical import SEQUENCES
 from odeform.training.mechanical_law import fit_law
 from odeform.training.pushes import read_pushes
 from odeform.types import MotionSequence
-from odeform.unseen.shapes import LEFT_OUT, UnseenShape
+from odeform_figures.unseen.shapes import LEFT_OUT, UnseenShape
 
 __all__ = ["law_without", "left_out_shape", "without"]
 

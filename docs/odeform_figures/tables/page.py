@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from odeform.tables.cells import Runs, key_of, models, number, paragraph, scored_rows, scores_of, table
-from odeform.tables.paper import (
+from odeform_figures.tables.cells import Runs, key_of, models, number, paragraph, scored_rows, scores_of, table
+from odeform_figures.tables.paper import (
     EXTRAPOLATED,
     EXTRAPOLATED_FORCE,
     IDENTIFIED,
@@ -15,9 +15,9 @@ from odeform.tables.paper import (
     UNSEEN_FORCE,
     UNSEEN_OBJECTS,
 )
-from odeform.tables.plan import AHEAD, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, MINUTES, PUSH, UNTIL
-from odeform.tables.runs import ALONE
-from odeform.tables.studies import ablations, learning_curve
+from odeform_figures.tables.plan import AHEAD, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, MINUTES, PUSH, UNTIL
+from odeform_figures.tables.runs import ALONE
+from odeform_figures.tables.studies import ablations, learning_curve
 
 __all__ = ["page"]
 
@@ -33,7 +33,7 @@ PAIR = (METRICS[0], SHAPE)
 
 
 def page(found: Mapping[str, Any]) -> str:
-    """Markdown of the results that `odeform.tables.tables` collects."""
+    """Markdown of the results that `odeform_figures.tables.tables` collects."""
     runs: Mapping[str, Runs] = found["runs"]
     share = f" --share {found['share']:g}" if found["share"] != 1.0 else ""
     commands = dict.fromkeys(

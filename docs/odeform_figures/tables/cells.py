@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from odeform.tables.runs import Result, Run
+from odeform_figures.tables.runs import Result, Run
 
 __all__ = ["Runs", "key_of", "models", "number", "paragraph", "scored_rows", "scores_of", "spread", "table"]
 

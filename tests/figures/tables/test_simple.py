@@ -9,10 +9,10 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import prepare
-from odeform.evaluation.simple import ballistic, continued, evaluate_simple, hold_last, spline_through
 from odeform.schema import Schema, Window
 from odeform.training.continuation import fit_dynamics
 from odeform.types import MotionSequence
+from odeform_figures.tables.simple import ballistic, continued, evaluate_simple, hold_last, spline_through
 
 
 class Falling(Dataset):

@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    from odeform.unseen.unseen import Plan, attach_band, unseen
+    from odeform_figures.unseen.unseen import Plan, attach_band, unseen
 
     positive("--pushes", args.pushes)
     positive("--workers", args.workers)

@@ -11,15 +11,22 @@ from odeform.dataset.store import open_dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import prepare
 from odeform.evaluation.metrics import evaluate
-from odeform.evaluation.simple import SimplePredictor, ballistic, continued, evaluate_simple, hold_last, spline_through
 from odeform.identification.table import identify_split
 from odeform.io import atomic_write
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
-from odeform.tables.page import page
-from odeform.tables.plan import AHEAD, BALLS, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
-from odeform.tables.runs import KEPT, complete_runs, kept_scores
 from odeform.training.continuation import fit_dynamics
+from odeform_figures.tables.page import page
+from odeform_figures.tables.plan import AHEAD, BALLS, DROP, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform_figures.tables.runs import KEPT, complete_runs, kept_scores
+from odeform_figures.tables.simple import (
+    SimplePredictor,
+    ballistic,
+    continued,
+    evaluate_simple,
+    hold_last,
+    spline_through,
+)
 
 __all__ = ["tables"]
 

@@ -1,4 +1,4 @@
-"""Vertices that training does not see: `python -m odeform.unseen.vertices`.
+"""Vertices that training does not see: `python -m odeform_figures.unseen.vertices`.
 
 A tenth of the vertices of each object is held out: in training they have no weight. The model moves them as it moves
 all points of a body, and its error there is compared with that at the others.
@@ -67,13 +67,13 @@ def _study(dataset: Dataset, seed: int) -> dict[str, Any]:
         objects = errors_at(predictor, dataset, SHARE, seed)
     keys = ("held_out_mm", "others_mm", "ratio")
     mean = {key: float(np.mean([one[key] for one in objects.values()])) for key in keys}
-    command = f"python -m odeform.unseen.vertices --seed {seed}"
+    command = f"python -m odeform_figures.unseen.vertices --seed {seed}"
     return {"command": command, "share": SHARE, "objects": objects, "mean": mean}
 
 
 def main(argv: list[str] | None = None) -> None:
     """Train without a tenth of the vertices and print their errors, or write them to a file."""
-    parser = argparse.ArgumentParser("python -m odeform.unseen.vertices", description=__doc__)
+    parser = argparse.ArgumentParser("python -m odeform_figures.unseen.vertices", description=__doc__)
     parser.add_argument("--data", default="contact-force", metavar="DATASET", help="default: contact-force")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the choice of vertices (default: 0)")
     parser.add_argument(

@@ -11,10 +11,10 @@ from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.models.registry import load
 from odeform.simulation.objects.catalog import OBJECTS
-from odeform.tables.cells import _led
-from odeform.tables.page import page
-from odeform.tables.plan import AHEAD, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
-from odeform.tables.runs import ALONE, KEPT, Result, Run, complete_runs
+from odeform_figures.tables.cells import _led
+from odeform_figures.tables.page import page
+from odeform_figures.tables.plan import AHEAD, FINAL, FORCE, FRAMES, IMPACT, INTERVALS, UNTIL, plan
+from odeform_figures.tables.runs import ALONE, KEPT, Result, Run, complete_runs
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ from odeform.models.mechanical.own_band import OWN_BAND, OwnErrors, coverage, fi
 from odeform.models.mechanical.own_body import OwnBodyPredictor, resting_body, takes_own_bodies
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load
-from odeform.unseen.instances import factors_of
-from odeform.unseen.left_out import law_without, left_out_shape, without
-from odeform.unseen.measure import Measured, measure
-from odeform.unseen.shapes import INSTANCE, LEFT_OUT, SCAN, UnseenShape, instance, scan, shape_file, simulated
+from odeform_figures.unseen.instances import factors_of
+from odeform_figures.unseen.left_out import law_without, left_out_shape, without
+from odeform_figures.unseen.measure import Measured, measure
+from odeform_figures.unseen.shapes import INSTANCE, LEFT_OUT, SCAN, UnseenShape, instance, scan, shape_file, simulated
 
 __all__ = ["Plan", "attach_band", "unseen"]
 
