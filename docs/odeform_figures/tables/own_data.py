@@ -15,9 +15,9 @@ from typing import Any
 from odeform.dataset.importers.registry import import_dataset
 from odeform.dataset.store import open_dataset
 from odeform.io import atomic_write
-from odeform.synthetic.motions.folder import write_folder
-from odeform.synthetic.motions.registry import KINDS
 from odeform.training.train import print_line, train
+from odeform_figures.motions.folder import write_folder
+from odeform_figures.motions.registry import KINDS
 
 __all__ = ["main", "measure", "summary"]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from odeform.synthetic.motions.registry import KINDS
+from odeform_figures.motions.registry import KINDS
 from odeform_figures.tables import own_data
 from odeform_figures.tables.own_data import MODELS, main, summary
 

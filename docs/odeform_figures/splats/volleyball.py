@@ -1,4 +1,4 @@
-"""A volleyball in a small room, as Gaussian splats: `python -m odeform.synthetic.volleyball --out volleyball.spz`.
+"""A volleyball in a small room, as Gaussian splats: `python -m odeform_figures.splats.volleyball --out volleyball.spz`.
 
 The ball has the size of the bundled models' body.
 """
@@ -17,9 +17,9 @@ from odeform.geometry.region import Sphere, region_to_json
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.io import atomic_write
-from odeform.synthetic.room import room
-from odeform.synthetic.surfels import Surfels, joined_surfels, sphere_surfels, splats_of
 from odeform.types import GaussianSplats, Ints, Perpoint, Points
+from odeform_figures.splats.room import room
+from odeform_figures.splats.surfels import Surfels, joined_surfels, sphere_surfels, splats_of
 
 __all__ = ["BALL", "REGION", "main", "volleyball_in_room"]
 
@@ -66,7 +66,7 @@ def _panels(directions: Points) -> tuple[Ints, Perpoint]:
 
 def main() -> None:
     """Write the splats and their region from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.synthetic.volleyball", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.splats.volleyball", description=__doc__)
     parser.add_argument("--out", required=True, metavar="FILE.spz")
     path = Path(parser.parse_args().out)
     atomic_write(path, spz_bytes(FILE.shape(volleyball_in_room()), fraction=14))

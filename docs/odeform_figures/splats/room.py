@@ -5,8 +5,8 @@ Metres, z up, the ball on the floor at the origin. Light is baked into the colou
 
 import numpy as np
 
-from odeform.synthetic.surfels import Surfels, grid, joined_surfels, tiles
 from odeform.types import Floats, Perpoint, Points
+from odeform_figures.splats.surfels import Surfels, grid, joined_surfels, tiles
 
 __all__ = ["room"]
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from odeform.simulation.scenes.mass_elastic import SCHEMA, simulate
-from odeform.synthetic.motions.kind import Kind
 from odeform.types import Faces, Floats, Frames
+from odeform_figures.motions.kind import Kind
 
 __all__ = ["KIND"]
 

@@ -1,16 +1,16 @@
-"""`python -m odeform.synthetic.motions KIND --out DIR` writes a data set of mesh frames."""
+"""`python -m odeform_figures.motions KIND --out DIR` writes a data set of mesh frames."""
 
 import argparse
 import sys
 from pathlib import Path
 
-from odeform.synthetic.motions.folder import write_folder
-from odeform.synthetic.motions.registry import KINDS
+from odeform_figures.motions.folder import write_folder
+from odeform_figures.motions.registry import KINDS
 
 
 def main() -> None:
     kinds = "; ".join(f"{name}: {kind.description}" for name, kind in KINDS.items())
-    parser = argparse.ArgumentParser("python -m odeform.synthetic.motions", description=f"Mesh frames of {kinds}")
+    parser = argparse.ArgumentParser("python -m odeform_figures.motions", description=f"Mesh frames of {kinds}")
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("--out", required=True, metavar="DIR", help="new folder")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="of the parameters (default: 0)")

@@ -1,7 +1,7 @@
 """The kinds of motion by name."""
 
-from odeform.synthetic.motions import drops, pendulum, throw, vibration, walk
-from odeform.synthetic.motions.kind import Kind
+from odeform_figures.motions import drops, pendulum, throw, vibration, walk
+from odeform_figures.motions.kind import Kind
 
 __all__ = ["KINDS"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from odeform.formats.writing import write_shape
 from odeform.io import atomic_write
-from odeform.synthetic.motions.kind import Kind
 from odeform.types import Mesh
+from odeform_figures.motions.kind import Kind
 
 __all__ = ["write_folder"]
 

@@ -10,8 +10,8 @@ from odeform.formats.bundled import bundled_shapes, read_shape, region_beside
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
 from odeform.models.registry import load
-from odeform.synthetic import volleyball
 from odeform.types import GaussianSplats
+from odeform_figures.splats import volleyball
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import pytest
 
 from odeform.dataset.importers.registry import import_dataset
 from odeform.dataset.index import Dataset
-from odeform.synthetic.motions.folder import write_folder
-from odeform.synthetic.motions.registry import KINDS
+from odeform_figures.motions.folder import write_folder
+from odeform_figures.motions.registry import KINDS
 
 FEW = replace(KINDS["pendulum"], sequences=8, frames=12)
 
@@ -40,7 +40,7 @@ def test_every_split_has_sequences(dataset: Dataset) -> None:
 
 
 def test_a_folder_that_exists_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "odeform.synthetic.motions", "throw", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "odeform_figures.motions", "throw", "--out", str(tmp_path)]
     found = subprocess.run(command, capture_output=True, text=True, env=dict(os.environ), check=False)
     assert found.returncode == 2
     assert "exists" in found.stderr

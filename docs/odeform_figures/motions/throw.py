@@ -5,8 +5,8 @@ from scipy.integrate import solve_ivp
 
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.physics import GRAVITY
-from odeform.synthetic.motions.kind import Kind
 from odeform.types import Faces, Floats, Frames
+from odeform_figures.motions.kind import Kind
 
 __all__ = ["KIND"]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from odeform.synthetic.motions.registry import KINDS
 from odeform.types import Floats, Frames
+from odeform_figures.motions.registry import KINDS
 
 QUICK = [name for name in KINDS if name != "drops"]
 

@@ -8,10 +8,10 @@ import pytest
 
 from odeform.checkpoint import bundled_checkpoints
 from odeform.cli import main
-from odeform.cli.retrain import _command
 from odeform.dataset.store import bundled_datasets
 from odeform.io import bundled
 from odeform.models.registry import load
+from odeform_figures.commands.retrain import _command
 
 RECORDED = bundled("results") / "retrained.json"
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from odeform.simulation.objects.catalog import get_object
-from odeform.synthetic.motions.kind import Kind, smoothstep
 from odeform.types import Faces, Floats, Frames, Points
+from odeform_figures.motions.kind import Kind, smoothstep
 
 __all__ = ["KIND"]
 

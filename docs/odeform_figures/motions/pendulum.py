@@ -4,8 +4,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from odeform.simulation.physics import GRAVITY
-from odeform.synthetic.motions.kind import Kind, smoothstep
 from odeform.types import Faces, Floats, Frames
+from odeform_figures.motions.kind import Kind, smoothstep
 
 __all__ = ["KIND"]
 
