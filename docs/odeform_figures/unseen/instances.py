@@ -1,6 +1,6 @@
 """Other instances of the seven classes: one of moderate, random proportions, and one at the ends of the ranges."""
 
-from odeform.simulation.objects.generate import proportions
+from odeform_figures.bodies.generate import proportions
 
 __all__ = ["EXTREMES", "factors_of"]
 

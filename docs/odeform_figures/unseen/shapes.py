@@ -43,8 +43,8 @@ class UnseenShape:
 
 
 def instance(key: str, name: str, factors: Mapping[str, float]) -> UnseenShape:
-    """A body of the class `name` with other proportions, called `key`; see `odeform.simulation.objects.generate`."""
-    from odeform.simulation.objects.generate import generate  # looking at finished shapes needs no mesher
+    """A body of the class `name` with other proportions, called `key`; see `odeform_figures.bodies.generate`."""
+    from odeform_figures.bodies.generate import generate  # looking at finished shapes needs no mesher
 
     return UnseenShape(key, INSTANCE, name, generate(name, factors=factors))
 

@@ -21,9 +21,9 @@ from odeform.models.mechanical.own_body import OwnBodyPredictor, resting_body
 from odeform.models.per_object import PerObject, joined
 from odeform.simulation.contacts import vector_of
 from odeform.simulation.objects.catalog import get_object
-from odeform.simulation.objects.generate import generate
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
 from odeform.types import Floats, Mesh, MotionSequence
+from odeform_figures.bodies.generate import generate
 from odeform_figures.unseen.left_out import without
 from odeform_figures.unseen.measure import measure
 from odeform_figures.unseen.predictions import nearest_motion

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from odeform.benchmark.later import RESTS
 from odeform.errors import InputError
 from odeform.formats.drawing import GREY, View, draw
 from odeform.models.registry import load
 from odeform.parallel import parallel_map
 from odeform.schema import Parameters
-from odeform.simulation.measurements import contacts
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Mesh, MotionSequence
+from odeform_figures.studies.later import RESTS
+from odeform_figures.studies.measurements import contacts, measurements_of
 
 __all__ = ["landing", "pictures"]
 
@@ -44,7 +44,7 @@ def pictures(names: list[str]) -> Image.Image:
     for name in names:
         model = load(name)
         scene, stop = get_scene(model.schema.scene), model.schema.window.stop
-        extremes = scene.measurements.extremes
+        extremes = measurements_of(scene.schema.scene).extremes
         if not extremes:
             raise InputError(f"scene {scene.schema.scene}: has no extremes")
         work = partial(_simulated, scene.schema.scene, WINDOWS * stop)
@@ -78,7 +78,7 @@ def _column(truth: MotionSequence, frame: int, shown: Floats, said: str) -> Imag
 
 def main() -> None:
     """Draw the landings and write the picture."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.benchmark.landings", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.landings", description=__doc__)
     parser.add_argument("checkpoints", nargs="+", metavar="CKPT", help="bundled checkpoints, by their names")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE.webp", help="picture to write")
     args = parser.parse_args()

@@ -77,7 +77,7 @@ def surface(name: str, factors: Mapping[str, float]) -> Mesh:
 
 
 def _shape(name: str) -> ModuleType:
-    return import_module(f"odeform.simulation.objects.shapes.{name.replace('-', '_')}")
+    return import_module(f"odeform_figures.bodies.shapes.{name.replace('-', '_')}")
 
 
 def _projected(mesh: Mesh, distance: Callable[[Points], Perpoint]) -> Points:

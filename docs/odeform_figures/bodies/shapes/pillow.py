@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from odeform.simulation.objects.signed_distance import smooth_intersection
 from odeform.types import Perpoint, Points
+from odeform_figures.bodies.signed_distance import smooth_intersection
 
 __all__ = ["RANGES", "distance"]
 

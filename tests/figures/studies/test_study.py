@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from odeform.simulation.measurements import contacts, rebound
-from odeform.simulation.study import RATE, _condition, _rmse, main
 from odeform.types import Floats, MotionSequence
+from odeform_figures.studies.measurements import contacts, rebound
+from odeform_figures.studies.study import RATE, _condition, _rmse, main
 
 
 def bobbing(*heights: float, weights: tuple[float, ...] = (0.5, 0.5), above: float = 0.0) -> MotionSequence:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from odeform.benchmark.landings import _column, landing
 from odeform.geometry.primitives import octasphere
 from odeform.types import Floats, Frames, MotionSequence
+from odeform_figures.studies.landings import _column, landing
 
 BALL = octasphere(0.1, 4)
 TIMES = np.linspace(0.0, 2.0, 81)

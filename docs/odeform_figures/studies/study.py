@@ -1,4 +1,4 @@
-"""Is a scene's simulation sound? `python -m odeform.simulation.study SCENE` answers on a few of its sequences.
+"""Is a scene's simulation sound? `python -m odeform_figures.studies.study SCENE` answers on a few of its sequences.
 
 Prints JSON: how much halving the time step changes a motion, the scene's own figures (for a ball: how far it sinks into
 the floor, flattens and rebounds), and whether its parameters leave separate marks on the motion. The shipped figures
@@ -17,9 +17,9 @@ from odeform.errors import InputError
 from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters
-from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import SCENES, get_scene
 from odeform.types import MotionSequence
+from odeform_figures.studies.measurements import Measurements, measurements_of
 
 __all__ = ["main", "study"]
 
@@ -48,15 +48,19 @@ def _nudge(parameters: Parameters, parameter: Parameter, by: float) -> dict[str,
 
 
 def _row(
-    scene: Scene, parameters: Parameters, coarse: MotionSequence, fine: MotionSequence, nudged: list[MotionSequence]
+    measured: Measurements,
+    parameters: Parameters,
+    coarse: MotionSequence,
+    fine: MotionSequence,
+    nudged: list[MotionSequence],
 ) -> dict[str, Any]:
     """The figures of one sequence, at the scene's time step and at half of it."""
     return {
         "parameters": dict(parameters),
         "seconds": float(coarse.times[-1]),
         "halving_rmse_mm": 1e3 * _rmse(coarse, fine),
-        **scene.measurements.figures(coarse, fine),
-        "condition": _condition(scene.measurements.frames(coarse), nudged),
+        **measured.figures(coarse, fine),
+        "condition": _condition(measured.frames(coarse), nudged),
     }
 
 
@@ -64,8 +68,10 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
     """The figures of `count` sequences: the scene's extremes first, then space-filling samples of the trained box."""
     scene = get_scene(scene_name)
     if scene.schema.objects:
-        raise InputError(f"{scene_name}: its parameters fill no box; see `python -m odeform.simulation.contact_study`")
-    measured, learned = scene.measurements, scene.schema.learned
+        raise InputError(
+            f"{scene_name}: its parameters fill no box; see `python -m odeform_figures.studies.contact_study`"
+        )
+    measured, learned = measurements_of(scene_name), scene.schema.learned
     hidden = [p for p in learned if p.name in (measured.hidden or [q.name for q in learned])]
     settings = [*measured.extremes, *scene.sample(count, seed)][:count]
     jobs = [(p, scene.step) for p in settings] + [(p, 0.5 * scene.step) for p in settings]
@@ -74,11 +80,11 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
     coarse, fine = motions[:count], motions[count : 2 * count]
     width = 2 * len(hidden)
     nudged = [motions[at : at + width] for at in range(2 * count, len(motions), width)]
-    rows = [_row(scene, *given) for given in zip(settings, coarse, fine, nudged, strict=True)]
+    rows = [_row(measured, *given) for given in zip(settings, coarse, fine, nudged, strict=True)]
     figures = [key for key in rows[0] if key not in ("parameters", "seconds", "halving_rmse_mm")]
     return {
         "scene": scene_name,
-        "command": f"python -m odeform.simulation.study {scene_name} --count {count} --seed {seed}",
+        "command": f"python -m odeform_figures.studies.study {scene_name} --count {count} --seed {seed}",
         "step_ms": 1e3 * scene.step,
         "fixed": scene.fixed,
         "halving_rmse_mm": float(np.sqrt(np.mean([row["halving_rmse_mm"] ** 2 for row in rows]))),
@@ -89,7 +95,7 @@ def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any
 
 def main() -> None:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.simulation.study", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.study", description=__doc__)
     cores = os.cpu_count() or 1
     parser.add_argument("scene", metavar="SCENE", help=f"one of {', '.join(SCENES)}")
     parser.add_argument("--count", type=int, default=10, metavar="N", help="number of sequences (default: 10)")

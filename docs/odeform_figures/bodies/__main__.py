@@ -1,4 +1,4 @@
-"""Rebuild the bundled objects: `python -m odeform.simulation.objects [NAME ...]`."""
+"""Rebuild the bundled objects: `python -m odeform_figures.bodies [NAME ...]`."""
 
 import argparse
 import sys
@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from odeform.io import bundled
 from odeform.simulation.objects.catalog import OBJECTS
 from odeform.simulation.objects.files import write_object
-from odeform.simulation.objects.generate import generate
+from odeform_figures.bodies.generate import generate
 
 __all__ = ["main"]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Make the named objects (default: all) and write their files."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.simulation.objects", description="Rebuild the objects.")
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.bodies", description="Rebuild the objects.")
     parser.add_argument("names", metavar="NAME", nargs="*", default=OBJECTS, help=f"of {', '.join(OBJECTS)}")
     for name in parser.parse_args(argv).names:
         item = generate(name)

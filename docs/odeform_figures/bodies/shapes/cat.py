@@ -1,7 +1,7 @@
 """A toy cat, sitting upright, that faces +x with its tail around its left side."""
 
-from odeform.simulation.objects.signed_distance import capsule, ellipsoid, mirrored, smooth_union, tube
 from odeform.types import Perpoint, Points
+from odeform_figures.bodies.signed_distance import capsule, ellipsoid, mirrored, smooth_union, tube
 
 __all__ = ["RANGES", "distance"]
 

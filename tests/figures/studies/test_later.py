@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odeform.benchmark import later
-from odeform.benchmark.later import SPANS, compare_later, main, simulate_later
 from odeform.dataset.store import open_dataset
 from odeform.models.registry import load
 from odeform.schema import Parameters
 from odeform.simulation.scenes.kick import SCHEMA, simulate
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
+from odeform_figures.studies import later
+from odeform_figures.studies.later import SPANS, compare_later, main, simulate_later
 
 
 def test_a_ball_at_rest_stays_so_for_as_long_as_is_asked() -> None:
@@ -54,7 +54,7 @@ def test_the_command_writes_the_comparison(tmp_path: Path) -> None:
     out = tmp_path / "later.json"
     main(["mass-elastic/nearest", "--count", "1", "--json", str(out)])
     found = json.loads(out.read_text())
-    assert found["command"] == "python -m odeform.benchmark.later mass-elastic/nearest --count 1"
+    assert found["command"] == "python -m odeform_figures.studies.later mass-elastic/nearest --count 1"
     assert set(found["models"]) == {"mass-elastic/nearest"}
 
 

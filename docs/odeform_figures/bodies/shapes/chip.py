@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from odeform.simulation.objects.signed_distance import capsule
-from odeform.simulation.objects.triangles import triangulate
 from odeform.types import Floats, Mesh, Perpoint
+from odeform_figures.bodies.signed_distance import capsule
+from odeform_figures.bodies.triangles import triangulate
 
 __all__ = ["RANGES", "chip"]
 

@@ -1,6 +1,6 @@
 """How far motions beyond the trained window are right: compared with simulations of several windows.
 
-Run `python -m odeform.benchmark.later CKPT ...`; the checkpoints are of one scene.
+Run `python -m odeform_figures.studies.later CKPT ...`; the checkpoints are of one scene.
 """
 
 import argparse
@@ -116,7 +116,7 @@ def _summary(centre: Float[np.ndarray, "times 3"], rate: float) -> list[float]:
 
 def main(argv: list[str] | None = None) -> None:
     """Compare checkpoints over several windows, and print the result or write it to a file."""
-    parser = argparse.ArgumentParser("python -m odeform.benchmark.later", description=__doc__)
+    parser = argparse.ArgumentParser("python -m odeform_figures.studies.later", description=__doc__)
     parser.add_argument("checkpoints", nargs="+", metavar="CKPT", help="paths or bundled names, all of one scene")
     parser.add_argument("--data", metavar="DATA", help="data set with the test sequences (default: the scene's)")
     parser.add_argument("--count", type=int, default=COUNT, metavar="N", help=f"test sequences (default: {COUNT})")
@@ -141,7 +141,7 @@ def main(argv: list[str] | None = None) -> None:
         parser.error(f"--data: expected a data set of scene {scene}, got one of {dataset.schema.scene}")
     later = simulate_later(dataset, args.count, args.keep)
     data = f" --data {args.data}" if args.data else ""
-    command = f"python -m odeform.benchmark.later {' '.join(args.checkpoints)}{data} --count {args.count}"
+    command = f"python -m odeform_figures.studies.later {' '.join(args.checkpoints)}{data} --count {args.count}"
     found = {"command": command, "models": {name: compare_later(model, later) for name, model in models.items()}}
     write_or_print(found, args.json)
 

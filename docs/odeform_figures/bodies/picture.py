@@ -1,4 +1,4 @@
-"""The picture of the seven objects in the documentation: `python -m odeform.simulation.objects.picture FILE`."""
+"""The picture of the seven objects in the documentation: `python -m odeform_figures.bodies.picture FILE`."""
 
 import argparse
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ def draw_object(name: str) -> Picture:
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Draw the seven objects in two rows."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.simulation.objects.picture")
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.bodies.picture")
     parser.add_argument("file", metavar="FILE", type=Path, help="picture to write, such as docs/pictures/objects.webp")
     path = parser.parse_args(argv).file
     tiles = [draw_object(name) for name in OBJECTS]

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from odeform.simulation.objects.signed_distance import smooth_intersection, smooth_union
 from odeform.types import Perpoint, Points
+from odeform_figures.bodies.signed_distance import smooth_intersection, smooth_union
 
 __all__ = ["RANGES", "distance"]
 

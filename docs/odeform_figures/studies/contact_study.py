@@ -1,4 +1,4 @@
-"""Is the simulation of `contact-force` sound? `python -m odeform.simulation.contact_study` answers for each object.
+"""Is the simulation of `contact-force` sound? `python -m odeform_figures.studies.contact_study` answers, by object.
 
 Prints JSON: how much halving the time step changes the displacement, how much a contact that is moved by 1 mm and a
 force that is 2 % stronger do, how deep dents are, and how far bodies sink into the floor. The shipped figures are in
@@ -36,7 +36,7 @@ def study(count: int, seed: int, workers: int) -> dict[str, Any]:
     by_object = {name: _pooled([row for row in rows if row["parameters"][OBJECT] == name]) for name in OBJECTS}
     return {
         "scene": SCENE.schema.scene,
-        "command": f"python -m odeform.simulation.contact_study --count {count} --seed {seed}",
+        "command": f"python -m odeform_figures.studies.contact_study --count {count} --seed {seed}",
         "step_ms": 1e3 * SCENE.step,
         "fixed": SCENE.fixed,
         "objects": by_object,
@@ -120,7 +120,7 @@ def _pooled(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def main() -> None:
     """Run the study from the command line."""
-    parser = argparse.ArgumentParser(prog="python -m odeform.simulation.contact_study", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.contact_study", description=__doc__)
     parser.add_argument("--count", type=int, default=3, metavar="N", help="sequences of each object (default: 3)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="random seed of the parameters (default: 0)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W", help="number of processes")

@@ -1,14 +1,22 @@
-"""What a study measures on the motions of a scene."""
+"""What a study measures on the motions of a scene, besides the effect of the time step."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from odeform.schema import Parameters
+from odeform.schema import Parameters, Schema
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
-__all__ = ["Figures", "Measurements", "bounce_figures", "contacts", "first_contact", "rebound", "whole_motion"]
+__all__ = [
+    "SCENES",
+    "Figures",
+    "Measurements",
+    "contacts",
+    "measurements_of",
+    "rebound",
+]
 
 CONTACT = 2e-3  # m; a vertex lower than this touches the floor
 LOW = 1e-2  # m; a lower rebound is a roll, whose relative change means nothing
@@ -28,7 +36,7 @@ def _no_figures(coarse: MotionSequence, fine: MotionSequence) -> Figures:
 
 @dataclass(frozen=True)
 class Measurements:
-    """A scene's part in `odeform.simulation.study`, which halves the time step of any scene."""
+    """A scene's part in `odeform_figures.studies.study`, which halves the time step of any scene."""
 
     extremes: tuple[Parameters, ...] = ()
     """Parameter sets at which the simulation is hardest. They are studied first."""
@@ -70,3 +78,29 @@ def bounce_figures(coarse: MotionSequence, fine: MotionSequence) -> Figures:
         "penetration_mm": float(-1e3 * coarse.vertices[..., 2].min()),
         "flattening": float(1.0 - extent.min() / extent[0]),
     }
+
+
+def _extremes(schema: Schema) -> tuple[Parameters, ...]:
+    """Softest and heaviest, where a ball flattens most; stiffest and lightest, where its contact is hardest. All else,
+    such as a force, is at its highest."""
+    defaults = schema.complete(None)
+    return tuple(
+        {**defaults, **{p.name: p.low if p.name == lowest else p.high for p in schema.learned}}
+        for lowest in ("bending", "mass")
+    )
+
+
+def _bouncing(name: str, hidden: tuple[str, ...]) -> Measurements:
+    return Measurements(_extremes(get_scene(name).schema), hidden, first_contact, bounce_figures)
+
+
+SCENES: dict[str, Callable[[], Measurements]] = {
+    "kick": lambda: _bouncing("kick", ("mass", "bending", "force")),
+    "mass-elastic": lambda: _bouncing("mass-elastic", ("mass", "bending")),
+}
+"""By name of the scene. Of others, a study measures the effect of the time step and the marks of all parameters."""
+
+
+def measurements_of(scene: str) -> Measurements:
+    """Return what is measured on a scene of this name, of its own or what is measured on any."""
+    return SCENES.get(scene, Measurements)()
