@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from odeform.benchmark.ablations import with_modes
 from odeform.models.base import Predictor
+from odeform_figures.speed.ablations import with_modes
 
 TIMES = np.array([0.0, 0.03, 0.4])
 

@@ -59,7 +59,7 @@ def _interpolated(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
 
 
 def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
-    """One row per ablation: its name as `knob`, ms per frame, ms saved per frame, and added RMS error in mm."""
+    """One row per ablation: its name, ms per frame, ms saved per frame, and added RMS error in mm."""
     shape = round_cloud(POINTS, predictor)
     motion = as_reduced(predictor.solve(shape))
     window = predictor.schema.window
@@ -70,7 +70,7 @@ def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
     def row(name: str, work: Any, frames: Floats) -> dict[str, Any]:
         ms = typical(lambda i: work(float(moments[i % len(moments)])), len(moments))
         error = float(1e3 * np.sqrt(((frames - truth) ** 2).mean()))
-        return {"knob": name, "points": POINTS, "ms": ms, "saves_ms": whole - ms, "error_mm": error}
+        return {"ablation": name, "points": POINTS, "ms": ms, "saves_ms": whole - ms, "error_mm": error}
 
     whole = typical(lambda i: motion.vertices(float(moments[i % len(moments)])), len(moments))
     rows, modes = [], len(motion.evaluated.values)
