@@ -4,8 +4,8 @@ import subprocess
 import sys
 import tempfile
 
-from odeform_viz.benchmark.client import DEADLINE
-from odeform_viz.benchmark.visitors import Missed, Visitors
+from odeform_figures.viewer_benchmark.client import DEADLINE
+from odeform_figures.viewer_benchmark.visitors import Missed, Visitors
 
 __all__ = ["record", "stop_recording"]
 

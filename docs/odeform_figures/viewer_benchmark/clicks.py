@@ -9,7 +9,7 @@ from odeform.geometry.contact import nearest_on, touching_centre
 from odeform.geometry.normals import vertex_normals
 from odeform.models.base import Predictor
 from odeform.types import Floats, Mesh, Points
-from odeform_viz.benchmark.latency import served
+from odeform_figures.viewer_benchmark.latency import served
 from odeform_viz.columns import Column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 

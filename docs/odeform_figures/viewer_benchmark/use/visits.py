@@ -1,6 +1,6 @@
 """Visits: browsers that open the page and leave at once, while others drag."""
 
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.visitors import Visitors
 
 __all__ = ["come_and_go"]
 

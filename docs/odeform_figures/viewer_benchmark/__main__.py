@@ -1,4 +1,4 @@
-"""Benchmarks of the viewer: `python -m odeform_viz.benchmark`."""
+"""Benchmarks of the viewer: `python -m odeform_figures.viewer_benchmark`."""
 
 import argparse
 import math
@@ -14,13 +14,13 @@ from odeform.cli import run_guarded
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.models.base import Predictor
 from odeform.models.reduced_model import ReducedModel
+from odeform_figures.viewer_benchmark.clicks import click
+from odeform_figures.viewer_benchmark.fits import drag_while_fitting
+from odeform_figures.viewer_benchmark.latency import drag, play_free_flight, scrub_splats
+from odeform_figures.viewer_benchmark.recording import record_playback
+from odeform_figures.viewer_benchmark.soak import soak
+from odeform_figures.viewer_benchmark.stages import stages
 from odeform_viz.app import App
-from odeform_viz.benchmark.clicks import click
-from odeform_viz.benchmark.fits import drag_while_fitting
-from odeform_viz.benchmark.latency import drag, play_free_flight, scrub_splats
-from odeform_viz.benchmark.recording import record_playback
-from odeform_viz.benchmark.soak import soak
-from odeform_viz.benchmark.stages import stages
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.pushing import contacts_of
 
@@ -29,7 +29,7 @@ COLUMNS = (2, 5, 8)
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m odeform_viz.benchmark",
+        prog="python -m odeform_figures.viewer_benchmark",
         description="Measure the latency of the viewer, from the message of a slider to the message that answers it.",
     )
     parser.add_argument("--checkpoint", default="kick", metavar="CKPT", help="path or bundled name (default: kick)")

@@ -6,8 +6,8 @@ import time
 
 from odeform.errors import InputError
 from odeform.schema import OBJECT
+from odeform_figures.viewer_benchmark.visitors import Visitors
 from odeform_viz.app import App
-from odeform_viz.benchmark.visitors import Visitors
 from odeform_viz.columns import Column
 
 __all__ = ["are_callbacks_done", "moment_of", "reset"]

@@ -6,9 +6,9 @@ import time
 import numpy as np
 
 from odeform.models.base import Predictor
+from odeform_figures.viewer_benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.latency import DRAG_RATE, measure
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.benchmark.latency import DRAG_RATE, measure
 from odeform_viz.columns import Column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 

@@ -1,6 +1,6 @@
 """Simulations: one that is cancelled, and one whose browser closes, which the others see."""
 
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.visitors import Visitors
 
 __all__ = ["simulate"]
 

@@ -1,6 +1,6 @@
 """Fits: of a browser that closes in the middle, taken to the sliders, left for another truth, and cancelled."""
 
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.visitors import Visitors
 from odeform_viz.panels.truth import NONE
 
 __all__ = ["choose_truth", "fit"]

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.visitors import Visitors
 
 __all__ = ["export", "take_pictures"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.visitors import Visitors
 from odeform_viz.own_shapes import takes_own_bodies
 
 __all__ = ["load_shapes"]

@@ -1,4 +1,4 @@
-"""The pictures of the documentation, taken from the page itself: `python -m odeform_viz.screenshots`.
+"""The pictures of the documentation, taken from the page itself: `python -m odeform_figures.screenshots`.
 
 Needs playwright (of the development dependencies) and Chromium on the PATH, or in the environment variable CHROMIUM.
 """
@@ -27,8 +27,8 @@ from odeform.errors import InputError
 from odeform.formats.writing import write_shape
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Column, truth_column
 
@@ -337,7 +337,8 @@ def _take_objects(browser: Browser, out: Path) -> None:
 def main() -> int:
     """Run the command; returns its exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m odeform_viz.screenshots", description="Take the pictures of the documentation from the page."
+        prog="python -m odeform_figures.screenshots",
+        description="Take the pictures of the documentation from the page.",
     )
     parser.add_argument("--only", nargs="+", choices=(*PICTURES, *OTHERS), help="take only these")
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"), help="folder (default: docs/pictures)")

@@ -7,7 +7,7 @@ import numpy as np
 from odeform.benchmark.probes import round_splats
 from odeform.benchmark.timing import milliseconds
 from odeform.models.base import Predictor
-from odeform_viz.benchmark.latency import SPLATS, largest_deformation_times
+from odeform_figures.viewer_benchmark.latency import SPLATS, largest_deformation_times
 from odeform_viz.columns import Column, Columns
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.runtime.access import Access

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 
-from odeform_viz.benchmark.client import DEADLINE
-from odeform_viz.benchmark.use.fits import CANCEL, STEP, choose_truth
-from odeform_viz.benchmark.use.fits import START as FIT
-from odeform_viz.benchmark.use.recordings import stop_recording
-from odeform_viz.benchmark.use.simulations import START as SIMULATE
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.client import DEADLINE
+from odeform_figures.viewer_benchmark.use.fits import CANCEL, STEP, choose_truth
+from odeform_figures.viewer_benchmark.use.fits import START as FIT
+from odeform_figures.viewer_benchmark.use.recordings import stop_recording
+from odeform_figures.viewer_benchmark.use.simulations import START as SIMULATE
+from odeform_figures.viewer_benchmark.visitors import Visitors
 from odeform_viz.panels.truth import NONE
 from odeform_viz.runtime.jobs import JOB
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from odeform_viz.benchmark.client import Control, LoopbackClient
+from odeform_figures.viewer_benchmark.client import Control, LoopbackClient
 
 __all__ = ["send_random_input"]
 

@@ -9,8 +9,8 @@ import numpy as np
 from odeform.benchmark.probes import round_mesh, round_splats
 from odeform.models.base import Predictor
 from odeform.types import Floats
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 

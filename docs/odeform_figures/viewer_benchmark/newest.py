@@ -9,10 +9,10 @@ import numpy as np
 
 from odeform.simulation.contacts import contact_parameters, push_from
 from odeform.types import Mesh, Points
+from odeform_figures.viewer_benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.resetting import moment_of
+from odeform_figures.viewer_benchmark.visitors import Visitors, slider_of
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.benchmark.resetting import moment_of
-from odeform_viz.benchmark.visitors import Visitors, slider_of
 from odeform_viz.pushing import contacts_of, surface_of
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 from odeform_viz.session import visible_deformation

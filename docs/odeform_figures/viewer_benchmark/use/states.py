@@ -2,7 +2,7 @@
 
 import json
 
-from odeform_viz.benchmark.visitors import Visitors, slider_of
+from odeform_figures.viewer_benchmark.visitors import Visitors, slider_of
 
 __all__ = ["save_and_restore"]
 

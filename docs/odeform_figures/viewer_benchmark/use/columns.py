@@ -1,6 +1,6 @@
 """Columns: other models, pinned copies, a sweep, colours, hidden and removed."""
 
-from odeform_viz.benchmark.visitors import Visitors
+from odeform_figures.viewer_benchmark.visitors import Visitors
 
 __all__ = ["compare"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from odeform_figures.viewer_benchmark.client import DEADLINE, LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import DEADLINE, LoopbackClient
 
 __all__ = ["Missed", "Visitors"]
 
