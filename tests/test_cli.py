@@ -1,7 +1,7 @@
 import argparse
 import json
 import re
-from importlib.metadata import version
+from importlib.metadata import EntryPoint, EntryPoints, entry_points, version
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from odeform.cli import main, run_guarded
-from odeform.cli.entry import COMMANDS
+from odeform.cli.entry import commands
 from odeform.cli.evaluate import COLUMNS
 from odeform.cli.evaluate import _table as scores_table
 from odeform.dataset.index import Dataset
@@ -330,19 +330,34 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out == f"odeform {version('odeform')}\n"
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", commands())
 def test_every_argument_has_a_help_text(command: str) -> None:
     parser = argparse.ArgumentParser()
-    COMMANDS[command].add_options(parser)
+    commands()[command].add_options(parser)
     assert all(action.help for action in parser._actions)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", commands())
 def test_help_lists_the_arguments(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main([command, "--help"])
     assert end.value.code == 0
     assert capsys.readouterr().out.startswith(f"usage: odeform {command} ")
+
+
+def test_a_declared_command_is_listed_only_where_its_package_is_installed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wheel declares commands of a clone."""
+    found = entry_points(group="odeform.commands")
+    absent = EntryPoints([EntryPoint(one.name, f"no_such_package.{one.name}", one.group) for one in found])
+    monkeypatch.setattr("odeform.cli.declared.entry_points", lambda **which: absent.select(**which))
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "tables" not in capsys.readouterr().out
+    assert main(["tables", "--keep", "a", "--out", "b"]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: odeform tables: it makes figures of the documentation, and needs a clone")
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["predict"], ["predict", "a", "--out"], ["train", "a"]], ids=str)

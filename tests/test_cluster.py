@@ -21,7 +21,7 @@ from odeform.errors import InputError
 from odeform.parallel import as_completed
 from odeform.simulation.runner import simulate
 from odeform.stress.watched import check_shown
-from odeform.tables.runs import Run, complete_runs
+from odeform_figures.tables.runs import Run, complete_runs
 
 pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow

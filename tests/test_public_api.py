@@ -15,8 +15,8 @@ import odeform
 ACCESSORS = (property, cached_property, classmethod, staticmethod)
 SLOW = {"calibrate", "identify", "simulate", "train"}
 ROOT = Path(odeform.__file__).parent
-PACKAGES = (ROOT, ROOT.parent / "odeform_viz")
-COMMANDS = "odeform.cli."
+PACKAGES = (ROOT, ROOT.parent / "odeform_viz", ROOT.parent / "docs" / "odeform_figures")
+COMMANDS = ("odeform.cli.", "odeform_figures.commands.")
 """Modules of commands: `odeform.cli.entry.Command` documents their functions."""
 
 NAMES = [name for name in odeform.__all__ if name != "__version__"]

@@ -6,13 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from odeform.benchmark.ablations import ablations
 from odeform.benchmark.comparisons import comparisons
 from odeform.benchmark.objects import bench_objects
 from odeform.benchmark.precision import OperatingPoint, measure, operating_points, work_precision
 from odeform.benchmark.probes import random_parameters, round_mesh, round_splats
 from odeform.benchmark.roofline import roofline, scaling
-from odeform.benchmark.startup import startup
 from odeform.benchmark.timing import as_viewed, milliseconds, quantiles
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
@@ -103,9 +101,7 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
             result |= _solver(predictor, points)
         return {
             **result,
-            "knobs": ablations(predictor),
             "limits": roofline(predictor),
-            "startup": startup(checkpoint),
             "scaling": scaling(predictor, SIZES),
             "peers": comparisons(predictor, dataset, points),
         }

@@ -58,11 +58,8 @@ def _solver(result: Mapping[str, Any]) -> list[str]:
 
 
 def _speed(result: Mapping[str, Any]) -> list[str]:
-    rows = [{"ablation": row["knob"], **row} for row in result["knobs"]]
-    lines = _table("ablations, per frame", rows, ("ablation", "points", "ms", "saves_ms", "error_mm"))
     rows = [{"limit": key, "measured": value} for key, value in result["limits"].items()]
-    lines += _table("roofline: limits of this machine", rows, ("limit", "measured"))
-    lines += _table("a new process, seconds", [result["startup"]], tuple(result["startup"]))
+    lines = _table("roofline: limits of this machine", rows, ("limit", "measured"))
     return lines + _table("scaling, per frame", result["scaling"], ("points", "solve_ms", "basis_ms", "decode_ms"))
 
 

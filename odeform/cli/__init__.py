@@ -1,4 +1,5 @@
-"""The `odeform` command. Each subcommand is one module here, listed in `odeform.cli.entry.COMMANDS`."""
+"""The `odeform` command. Each subcommand is one module here, listed in `odeform.cli.entry.COMMANDS`,
+or of another package, by an entry point in the group `odeform.commands`."""
 
 from odeform.cli.entry import main, run_guarded
 

@@ -2,9 +2,9 @@
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from odeform.cli import (
     bench,
@@ -14,20 +14,18 @@ from odeform.cli import (
     info,
     pack,
     predict,
-    retrain,
     simulate,
     stress,
-    tables,
     train,
-    unseen,
 )
 from odeform.cli.interrupts import interruptible
 from odeform.cli.options import Parser
 from odeform.errors import FailedCheck, InputError, one_line
 
-__all__ = ["COMMANDS", "Command", "main", "run_guarded"]
+__all__ = ["COMMANDS", "Command", "commands", "main", "run_guarded"]
 
 
+@runtime_checkable
 class Command(Protocol):
     """What the module of a command provides."""
 
@@ -50,16 +48,20 @@ COMMANDS: dict[str, Command] = {
     "import": import_,
     "pack": pack,
     "train": train,
-    "retrain": retrain,
-    "tables": tables,
     "evaluate": evaluate,
     "predict": predict,
     "identify": identify,
     "bench": bench,
     "stress": stress,
-    "unseen": unseen,
     "info": info,
 }
+
+
+def commands() -> dict[str, Command]:
+    """`COMMANDS`, and those that installed packages declare (`odeform.cli.declared`)."""
+    from odeform.cli.declared import declared_commands  # reading entry points takes time
+
+    return COMMANDS | declared_commands()
 
 
 class _Parser(Parser):
@@ -113,17 +115,31 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: Sequence[str] | None) -> int:
-    parser = _Parser(prog="odeform", description="Simulate, train, evaluate and run models of soft-body motion.")
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, command in COMMANDS.items():
-        commands.add_parser(name, help=command.HELP, description=f"{command.HELP}.").command = command
-    args = parser.parse_args(argv)
+    first = next(iter(sys.argv[1:] if argv is None else argv), "")
+    known = COMMANDS if first in COMMANDS else commands()
+    if first not in known and (code := run_guarded(lambda: _refuse_absent(first))):
+        return code
+    args = _parser_of(known).parse_args(argv)
     missing = _missing_folders(args)
     code = run_guarded(lambda: args.run(args))
     for folder in (folder for folder in missing if folder.exists()):
         print(f"note: created the folder {folder}", file=sys.stderr)
     return code
+
+
+def _refuse_absent(name: str) -> None:
+    from odeform.cli.declared import refuse_absent
+
+    refuse_absent(name)
+
+
+def _parser_of(known: Mapping[str, Command]) -> argparse.ArgumentParser:
+    parser = _Parser(prog="odeform", description="Simulate, train, evaluate and run models of soft-body motion.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    listed = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, command in known.items():
+        listed.add_parser(name, help=command.HELP, description=f"{command.HELP}.").command = command
+    return parser
 
 
 def _missing_folders(args: argparse.Namespace) -> list[Path]:

@@ -9,7 +9,6 @@ import numpy as np
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.contacts import Contacts
 from odeform.simulation.glyphs import Arrow
-from odeform.simulation.measurements import Measurements
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
 from odeform.types import Mesh, MotionSequence, Points
 
@@ -50,8 +49,6 @@ class Scene:
     """Resolutions of the simulated mesh, finest first. The first counts as the truth; none: it cannot be changed."""
     glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs
     """`glyphs(parameters, rest_points)` are the arrows that show the parameters on a body of points (N, 3) m."""
-    measurements: Measurements = field(default_factory=Measurements)
-    """What `odeform.simulation.study` measures besides the effect of the time step."""
     checks: tuple[PhysicalCheck, ...] = STANDARD_CHECKS
     """What `odeform stress` asks of predicted motions."""
     contacts: Contacts | None = None

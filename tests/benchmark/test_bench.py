@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from odeform.benchmark import ablations, bench, comparisons, precision, roofline
+from odeform.benchmark import bench, comparisons, precision, roofline
 from odeform.cli import main
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
@@ -20,7 +20,6 @@ def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
         (precision, "REPEATS", 1),
         (precision, "SEQUENCES", 1),
         (precision, "ladder", lambda frame: full_ladder(frame)[::6]),
-        (ablations, "POINTS", 400),
         (roofline, "SIDE", 64),
         (roofline, "BYTES", 1 << 16),
         (roofline, "POINTS", 400),
@@ -56,7 +55,6 @@ def test_bench(
     assert {(row["at"], row["dtype"]) for row in result["work_precision"]} == {
         (point, dtype) for point in ("default", "corner") for dtype in ("float32", "float64")
     }
-    assert all(result["startup"][key] > 0.0 for key in ("import_s", "predict_s"))
     assert list(result["qualities"]) == ["draft", "balanced", "reference"]
     assert len(result["frontier"]) == len(predictors["odeform"].frontier)
     assert {"parameter_change_ms", "scrub_ms", "splats_1k_ms", "encode_ms", "solve_ms", "basis_ms"} < set(
@@ -74,7 +72,7 @@ def test_bench(
     assert result["peers"]["this model"]["error_mm"] > 0.0
     assert {"gemm_gflops", "memory_gb_s", "decode_share_of_limit"} < set(result["limits"])
     assert "mujoco, equal error: skipped, no time" in text
-    for word in ("bosh3", "frontier", "pod-rbf", "no deformation", "decode_share_of_limit"):
+    for word in ("bosh3", "frontier", "pod-rbf", "decode_share_of_limit"):
         assert word in text
 
 

@@ -8,11 +8,9 @@ def test_a_dash_is_explained() -> None:
         "data": None,
         "machine": {"cores": 2, "processor": "x", "load": 0.5},
         "latency": {"points": 10},
-        "knobs": [],
-        "limits": {},
-        "startup": {"import_s": 1.0},
+        "limits": {"memory_gb_s": 1.0},
         "scaling": [],
         "peers": {},
     }
     assert "not measured" not in report(result)
-    assert report({**result, "startup": {"import_s": None}}).splitlines()[-1] == "-: not measured"
+    assert report({**result, "limits": {"memory_gb_s": None}}).splitlines()[-1] == "-: not measured"

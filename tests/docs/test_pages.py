@@ -11,7 +11,7 @@ from blocks import ROOT, blocks_of, pages, prose
 from commands import parser_of
 
 import odeform
-from odeform.cli.entry import COMMANDS, Command
+from odeform.cli.entry import Command, commands
 from odeform.models.names import ALIASES, TRAINABLE
 
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -75,7 +75,7 @@ def documented(text: str) -> set[str]:
 
 def test_the_page_of_commands_has_every_command_and_option():
     page = ROOT / "docs" / "cli.md"
-    expected = {f"odeform {name}": options_of(command) for name, command in COMMANDS.items()}
+    expected = {f"odeform {name}": options_of(command) for name, command in commands().items()}
     expected["odeform-viz"] = options(parser_of("odeform-viz", []))
     for name, its in expected.items():
         assert documented(section(page, name)) == its - {"--help", "--version"}, name
@@ -83,7 +83,7 @@ def test_the_page_of_commands_has_every_command_and_option():
 
 @pytest.mark.parametrize("page", pages(), ids=lambda p: p.stem)
 def test_commands_in_sentences_exist_with_these_options(page: Path):
-    known = {f"odeform {name}": options_of(command) for name, command in COMMANDS.items()}
+    known = {f"odeform {name}": options_of(command) for name, command in commands().items()}
     known |= {"odeform": {"--version"}, "odeform-viz": options(parser_of("odeform-viz", []))}
     for code in re.findall(r"`(odeform(?:-viz)?(?: [^`]+)?)`", page.read_text()):
         words = code.split()

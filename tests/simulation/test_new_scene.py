@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,13 @@ from odeform.errors import InputError
 from odeform.geometry.primitives import octasphere
 from odeform.schema import Parameter, Parameters, Schema, Window
 from odeform.simulation.glyphs import Arrow
-from odeform.simulation.measurements import Figures, Measurements
 from odeform.simulation.runner import simulate
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import SCENES, find_scene, get_scene, known_scenes
-from odeform.simulation.study import study
 from odeform.types import Mesh, MotionSequence, Points
+from odeform_figures.studies.measurements import SCENES as MEASURED
+from odeform_figures.studies.measurements import Figures, Measurements
+from odeform_figures.studies.study import study
 
 BODY = octasphere(0.1, 2)
 
@@ -53,9 +53,7 @@ SCHEMA = Schema(
     (Parameter("speed", "m/s", 0.5, 2.0, 1.0), Parameter("drag", "1/s", 0.1, 1.0, 0.5)),
     Window(0.0, 0.5, 20.0),
 )
-SCENE = Scene(
-    SCHEMA, slide, rest_mesh, step=0.01, count=8, glyphs=velocity, measurements=Measurements(figures=distance)
-)
+SCENE = Scene(SCHEMA, slide, rest_mesh, step=0.01, count=8, glyphs=velocity)
 
 
 @pytest.fixture
@@ -92,7 +90,8 @@ def test_a_new_scene_makes_a_data_set(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("toy")
-def test_a_new_scene_is_studied_by_its_own_figures() -> None:
+def test_a_new_scene_is_studied_by_its_own_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(MEASURED, "slide", lambda: Measurements(figures=distance))
     found = study("slide", count=3, seed=0, workers=1)
     assert [row["parameters"] for row in found["sequences"]] == SCENE.sample(3, 0)
     assert found["largest_distance_m"] == max(row["distance_m"] for row in found["sequences"])
@@ -104,8 +103,8 @@ def test_a_new_scene_is_studied_by_its_own_figures() -> None:
 
 def test_extremes_are_studied_before_samples(toy: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     extreme = {"speed": 2.0, "drag": 1.0}
-    hard = replace(toy, measurements=Measurements((extreme,), ("speed",), lambda _: slice(0, 2)))
-    monkeypatch.setattr(sys.modules[__name__], "SCENE", hard)
+    hard = Measurements((extreme,), ("speed",), lambda _: slice(0, 2))
+    monkeypatch.setitem(MEASURED, "slide", lambda: hard)
     found = study("slide", count=2, seed=0, workers=1)
     assert [row["parameters"] for row in found["sequences"]] == [extreme, *toy.sample(1, 0)]
     # one parameter cannot be mistaken for another

@@ -162,5 +162,5 @@ def test_frames_after_the_window_are_not_trained_on(
     assert seen == [(0.1, 0, True), (whole, 0, True), (whole, 0, False)]
     refused: tuple[dict[str, Any], ...] = ({"every": 2}, {"steps": 10}, {"without": ["ode"]})
     for options in refused:
-        with pytest.raises(InputError, match="expected no --every|modal has correction"):
+        with pytest.raises(InputError, match=r"expected no --every|modal has correction"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)

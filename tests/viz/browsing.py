@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
+from odeform_figures.screenshots import CHROMIUM, FLAGS
 from odeform_viz.app import App
 from odeform_viz.columns import Column
-from odeform_viz.screenshots import CHROMIUM, FLAGS
 
 __all__ = ["PHONE", "Tab", "needs_chromium", "open_tab", "until"]
 

@@ -10,8 +10,8 @@ from stubs import StubPredictor
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.recording.writer import Recorder
 from odeform_viz.session import Session

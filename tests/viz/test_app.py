@@ -8,8 +8,8 @@ from stubs import StubPredictor
 
 from odeform import InputError
 from odeform.cancellation import check_cancelled
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.rendering.checkerboard import checkerboard_parts
 from odeform_viz.view import Frame

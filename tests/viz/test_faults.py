@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from odeform.dataset.store import open_dataset
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels import fit, truth
 from odeform_viz.panels.fit import FitPanel
 from odeform_viz.panels.truth import TruthPanel, entry_label
@@ -165,7 +165,7 @@ def _shown(app: App) -> tuple[float, float] | None:
 SERVED = """
 import odeform
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 model = odeform.load("mass-elastic/pod-rbf")
 app = App([Column("pod-rbf", model, model.rest, origin="mass-elastic/pod-rbf")], port=0)

@@ -24,7 +24,7 @@ COMMANDS = {
     "viewer and recording": """
 import odeform, pathlib, threading
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 model = odeform.load("mass-elastic/pod-rbf")
 app = App([Column("pod-rbf", model, model.rest, origin="mass-elastic/pod-rbf")], port=0, record="a.rrd")

@@ -12,8 +12,8 @@ from authors import TETRAHEDRON, Authors, write_sequence
 from odeform.cli import main
 from odeform.dataset.importers.registry import import_dataset
 from odeform.types import Mesh
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Columns, truth_column
 from odeform_viz.session import Session

@@ -14,8 +14,8 @@ from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, PointCloud
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.panels.playback import PlaybackPanel

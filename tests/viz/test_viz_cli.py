@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from odeform_viz.benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.cli import main
 from odeform_viz.recording.reader import read_recording
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from odeform.geometry.primitives import octasphere
-from odeform.schema import Parameter, Parameters, Schema
+from odeform.schema import Parameter, Parameters
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.material import Material, wall_thickness
 from odeform.simulation.physics import GRAVITY
@@ -26,7 +26,6 @@ __all__ = [
     "SEGMENTS",
     "STEP",
     "bending",
-    "extremes",
     "mass",
     "relaxed",
     "rest_mesh",
@@ -81,16 +80,6 @@ def sphere(segments: int = SEGMENTS) -> Mesh:
     ball = octasphere(RADIUS, segments)
     up, side = np.array([1.0, 1.0, 1.0]) / math.sqrt(3.0), np.array([1.0, -1.0, 0.0]) / math.sqrt(2.0)
     return Mesh(ball.points @ np.stack([np.cross(side, up), side, up], axis=1), ball.faces)
-
-
-def extremes(schema: Schema) -> tuple[Parameters, ...]:
-    """Softest and heaviest, where a ball flattens most; stiffest and lightest, where its contact is hardest. All else,
-    such as a force, is at its highest."""
-    defaults = schema.complete(None)
-    return tuple(
-        {**defaults, **{p.name: p.low if p.name == lowest else p.high for p in schema.learned}}
-        for lowest in ("bending", "mass")
-    )
 
 
 def relaxed(mesh: Mesh, radius: float, thickness: float, material: Material) -> tuple[Mesh, Mesh]:

@@ -8,7 +8,6 @@ import numpy as np
 from odeform.geometry.rigid import rotation_z
 from odeform.schema import Parameter, Parameters, Schema, Window
 from odeform.simulation.glyphs import Arrow
-from odeform.simulation.measurements import Measurements, bounce_figures, first_contact
 from odeform.simulation.objects.ball import (
     FIXED,
     NOTES,
@@ -16,7 +15,6 @@ from odeform.simulation.objects.ball import (
     SEGMENTS,
     STEP,
     bending,
-    extremes,
     mass,
     rest_mesh,
     stress_free,
@@ -116,5 +114,4 @@ SCENE = Scene(
     gravity=GRAVITY,
     resolutions=RESOLUTIONS,
     glyphs=glyphs,
-    measurements=Measurements(extremes(SCHEMA), ("mass", "bending", "force"), first_contact, bounce_figures),
 )

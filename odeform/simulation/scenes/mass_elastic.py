@@ -7,7 +7,6 @@ import numpy as np
 
 from odeform.schema import Parameters, Schema, Window
 from odeform.simulation.errors import SimulationError
-from odeform.simulation.measurements import Measurements, bounce_figures, first_contact
 from odeform.simulation.objects.ball import (
     FIXED,
     NOTES,
@@ -16,7 +15,6 @@ from odeform.simulation.objects.ball import (
     SEGMENTS,
     STEP,
     bending,
-    extremes,
     mass,
     rest_mesh,
     stress_free,
@@ -99,5 +97,4 @@ SCENE = Scene(
     fixed={**FIXED, "height_m": HEIGHT, "rest_speed_m_s": REST_SPEED, "rest_time_s": REST_TIME},
     gravity=GRAVITY,
     resolutions=RESOLUTIONS,
-    measurements=Measurements(extremes(SCHEMA), ("mass", "bending"), first_contact, bounce_figures),
 )

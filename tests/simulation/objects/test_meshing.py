@@ -9,15 +9,13 @@ import trimesh
 from odeform.errors import InputError
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.canonical import most_like, plausible_scale
-from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.files import read_object, write_object
 from odeform.simulation.objects.foreign import make_object
-from odeform.simulation.objects.generate import generate, proportions
 from odeform.simulation.objects.level_set import surface_of
 from odeform.simulation.objects.remesh import remesh
 from odeform.simulation.objects.repair import even_surface, repaired
 from odeform.simulation.objects.settling import settle
-from odeform.simulation.objects.shapes.chip import chip
 from odeform.simulation.objects.tetrahedra import boundary, tetrahedralise
 from odeform.simulation.objects.thickness import thicknesses
 from odeform.types import Mesh, Perpoint, Points
@@ -70,18 +68,6 @@ def test_the_boundary_of_one_tetrahedron_faces_outward():
 
 def test_the_thickness_of_a_ball_is_its_diameter():
     assert thicknesses(mesh_of(trimesh.creation.icosphere(3, 0.05))) == pytest.approx(0.1, rel=0.02)
-
-
-@pytest.mark.parametrize("name", OBJECTS)
-def test_variants_repeat_and_differ(name: str):
-    assert proportions(name, None) == {}
-    assert proportions(name, 3) == proportions(name, 3) != proportions(name, 4)
-
-
-def test_chips_have_even_triangles():
-    mesh = shape_of(chip())
-    assert np.degrees(mesh.face_angles.min()) > 15.0
-    assert 1000 <= len(mesh.vertices) <= 1300
 
 
 def test_a_file_returns_what_was_written(tmp_path):
@@ -195,15 +181,6 @@ def test_a_foreign_mesh_becomes_a_solid_of_its_size():
     assert np.ptp(item.settled, axis=0) == pytest.approx([0.17, 0.17, 0.05], abs=0.004)
     assert shape_of(item.rest_mesh()).is_watertight
     assert len(item.points) <= 1500
-
-
-@pytest.mark.slow
-def test_code_rebuilds_the_bundled_donut():
-    made, kept = generate("donut"), get_object("donut")
-    assert made.mass == pytest.approx(kept.mass, rel=0.01)
-    assert np.ptp(made.settled, axis=0) == pytest.approx(np.ptp(kept.settled, axis=0), abs=1e-3)
-    assert made.surface_count == pytest.approx(kept.surface_count, rel=0.05)
-    assert (made.material, made.forces) == (kept.material, kept.forces)
 
 
 @pytest.mark.slow

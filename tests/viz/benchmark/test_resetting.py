@@ -2,9 +2,9 @@
 
 import threading
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.resetting import are_callbacks_done
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
-from odeform_viz.benchmark.resetting import are_callbacks_done
 
 DEADLINE = 60.0  # s
 

@@ -1,4 +1,4 @@
-"""Hundreds of random inputs and all scripts; `python -m odeform_viz.benchmark --soak` goes on for an hour."""
+"""Hundreds of random inputs and all scripts; `python -m odeform_figures.viewer_benchmark --soak` runs for an hour."""
 
 import time
 from pathlib import Path
@@ -9,8 +9,8 @@ import pytest
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.types import MotionSequence
+from odeform_figures.viewer_benchmark.soak import Soak, soak
 from odeform_viz.app import App
-from odeform_viz.benchmark.soak import Soak, soak
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels import truth
 from odeform_viz.runtime import jobs

@@ -3,8 +3,8 @@
 import viser
 from stubs import StubPredictor
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 
 Stubbed = tuple[App, LoopbackClient]

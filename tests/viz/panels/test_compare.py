@@ -6,8 +6,8 @@ import numpy as np
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.colors import MODELS, color_of
 from odeform_viz.columns import MOST, Column
 from odeform_viz.view import Frame

@@ -11,8 +11,8 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.identification.identify import Identification, Identified
 from odeform.models.registry import load
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import MOST, Column
 from odeform_viz.panels import fit
 from odeform_viz.panels.fit import FitPanel, describe_identification

@@ -2,8 +2,8 @@
 
 import pytest
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.help import TABS
 
 

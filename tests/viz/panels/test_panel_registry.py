@@ -7,8 +7,8 @@ from stubs import StubPredictor
 from toy_panel import ToyPanel, UnneededPanel
 
 import odeform
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels.help import HelpPanel
 from odeform_viz.panels.registry import PANELS, Entry

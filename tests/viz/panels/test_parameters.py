@@ -7,8 +7,8 @@ import pytest
 from stubs import SCHEMA
 
 from odeform.models.base import Predictor
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.parameters import NO_PRESET, ParameterPanel, presets, samples_svg, slider_range, slider_step
 from odeform_viz.runtime import notices
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 import viser
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels import picture
 from odeform_viz.panels.picture import PicturePanel
 

@@ -4,8 +4,8 @@ import threading
 
 import pytest
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 
 Kicked = tuple[App, LoopbackClient]
 FRAME = 1.0 / 120.0

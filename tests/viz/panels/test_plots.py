@@ -9,8 +9,8 @@ import pytest
 
 from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.panels.playback import PlaybackPanel
 from odeform_viz.panels.plot_legend import legend_html, values_html

@@ -10,8 +10,8 @@ from odeform.errors import InputError
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.push import push_of
 from odeform.simulation.contacts import push_from, vector_of
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels.push import PushPanel
 from odeform_viz.pushing import push_shown

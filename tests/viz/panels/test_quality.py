@@ -7,8 +7,8 @@ import pytest
 from odeform.models.base import Predictor
 from odeform.models.frontier import cheapest_within_error
 from odeform.models.registry import load
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels.quality import ERROR_BUDGET, TIME_BUDGET, QualityPanel, quality_names
 from odeform_viz.session import settings_of

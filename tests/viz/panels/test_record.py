@@ -15,8 +15,8 @@ from odeform.dataset.store import open_dataset
 from odeform.formats.writing import shape_at, write_shape
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels.parameters import ParameterPanel
 

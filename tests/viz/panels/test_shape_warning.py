@@ -12,8 +12,8 @@ from odeform.geometry.likeness import Likeness
 from odeform.geometry.shape import FittedShape, fit_to
 from odeform.models.base import Predictor
 from odeform.types import Mesh
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.shape_warning import ShapeWarningPanel, shape_warning

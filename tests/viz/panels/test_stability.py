@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.panels.stability import StabilityPanel
 from odeform_viz.runtime.jobs import Report
 

@@ -1,7 +1,7 @@
 """The theme: each client has its own."""
 
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 
 
 def test_a_theme_is_of_one_client_with_its_floor(kicked: tuple[App, LoopbackClient], port: int) -> None:

@@ -12,8 +12,8 @@ from odeform.models.base import Predictor
 from odeform.models.registry import load, load_model
 from odeform.simulation.scenes import kick as kick_scene
 from odeform.types import MotionSequence
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.benchmark.client import LoopbackClient
 from odeform_viz.columns import Column
 from odeform_viz.panels import truth
 from odeform_viz.panels.parameters import ParameterPanel

@@ -8,7 +8,7 @@ import pytest
 import viser
 
 from odeform.errors import InputError
-from odeform_viz.benchmark.client import LoopbackClient
+from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import _LoopEvent, open_server
 

@@ -1,0 +1,1 @@
+"""The seven objects: made from formulas, and drawn."""

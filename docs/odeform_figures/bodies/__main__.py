@@ -1,0 +1,29 @@
+"""Rebuild the bundled objects: `python -m odeform_figures.bodies [NAME ...]`."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from odeform.io import bundled
+from odeform.simulation.objects.catalog import OBJECTS
+from odeform.simulation.objects.files import write_object
+from odeform_figures.bodies.generate import generate
+
+__all__ = ["main"]
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Make the named objects (default: all) and write their files."""
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.bodies", description="Rebuild the objects.")
+    parser.add_argument("names", metavar="NAME", nargs="*", default=OBJECTS, help=f"of {', '.join(OBJECTS)}")
+    for name in parser.parse_args(argv).names:
+        item = generate(name)
+        write_object(item, bundled("objects") / f"{name}.npz")
+        print(
+            f"{name}: {item.surface_count} surface vertices, {len(item.points)} nodes, {len(item.elements)} elements, "
+            f"{item.mass:.4g} kg, {1e3 * item.thickness:.0f} mm thick"
+        )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Commands of `odeform` in a clone, by the entry points `odeform.commands`."""

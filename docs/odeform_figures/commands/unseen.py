@@ -1,0 +1,82 @@
+"""`odeform unseen`."""
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from odeform.cli.options import add_checkpoint, add_json, add_seed, positive, write_json
+
+__all__ = ["HELP", "add_options", "run"]
+
+HELP = "Measure a model of pushed bodies on shapes that it was not trained on"
+COLUMNS = ("distance", "moved_mm", "model_mm", "rigid_mm", "nearest_mm", "seen_mm", "ratio", "relative_ratio")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    cores = os.cpu_count() or 1
+    add_checkpoint(parser)
+    parser.add_argument(
+        "--keep", required=True, metavar="DIR", help="folder of simulated motions; what it holds is not simulated again"
+    )
+    parser.add_argument(
+        "--shape", nargs="+", action="extend", default=[], metavar="MESH", help="scanned solids to measure as well"
+    )
+    parser.add_argument(
+        "--data", metavar="DATASET", help="training data: each class is then also left out of the law, and predicted"
+    )
+    parser.add_argument(
+        "--object", nargs="+", action="extend", default=[], metavar="NAME", help="classes of instances (default: all)"
+    )
+    parser.add_argument("--pushes", type=int, default=10, metavar="N", help="simulated for each shape (default: 10)")
+    add_seed(parser, "contacts and forces")
+    parser.add_argument(
+        "--workers", type=int, default=cores, metavar="W", help=f"number of processes (default: {cores}, one per core)"
+    )
+    parser.add_argument(
+        "--kept-only", action="store_true", help="make nothing; shapes that are not in DIR are left out"
+    )
+    parser.add_argument("--attach", action="store_true", help="store the error band in the checkpoint")
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> None:
+    from odeform_figures.unseen.unseen import Plan, attach_band, unseen
+
+    positive("--pushes", args.pushes)
+    positive("--workers", args.workers)
+    scans, objects = tuple(Path(path) for path in args.shape), tuple(args.object)
+    plan = Plan(Path(args.keep), args.pushes, args.seed, objects, scans, args.data, args.workers, args.kept_only)
+    result = unseen(args.checkpoint, plan)
+    write_json(result, args.json)
+    print(_report(result))
+    if args.attach:
+        attach_band(args.checkpoint, result)
+        print(f"error band stored in {args.checkpoint}")
+
+
+def _report(result: dict[str, Any]) -> str:
+    lines = []
+    for kind, mean in result["kinds"].items():
+        rows = {name: row for name, row in result["shapes"].items() if row["kind"] == kind}
+        if not rows:
+            continue
+        lines.append(f"{kind:<44} {'like':<10}" + "".join(f"{column:>15}" for column in COLUMNS))
+        for name, row in rows.items():
+            cells = "".join(f"{row[column]:>15.3g}" for column in COLUMNS)
+            failed = f"  failed: {len(row['failed'])}" if row["failed"] else ""
+            lines.append(f"  {name:<42} {row['like']:<10}{cells}{failed}")
+        lines.append(
+            f"  ratio {mean['mean_ratio']:.2f} on average, {mean['largest_ratio']:.2f} at most (bar: {mean['bar']:g}); "
+            f"better than the nearest object on {mean['better_than_nearest']}, than rigid motion on "
+            f"{mean['better_than_rigid']} of {mean['shapes']}"
+        )
+    for name, reasons in result["not_simulated"].items():
+        lines.append(f"{name}: no motion to compare with, {reasons[0]}")
+    if result["coverage_90"] is not None:
+        found = result["coverage_90"]
+        lines.append(
+            f"90 % error band, fitted on half of the shapes, on the others: covers {100.0 * found['mean']:.0f} % "
+            f"(four in five halves: {100.0 * found['p10']:.0f} to {100.0 * found['p90']:.0f} %)"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Figures of speed beyond those of `odeform bench`."""

@@ -1,0 +1,1 @@
+"""Studies of simulations: convergence, and motions beyond the trained window beside longer simulations."""

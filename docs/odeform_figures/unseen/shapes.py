@@ -1,0 +1,126 @@
+"""Shapes that no model was trained on, and their simulated motions: one file for each shape."""
+
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.formats.reading import read_geometry
+from odeform.io import atomic_open
+from odeform.parallel import parallel_map
+from odeform.schema import Parameters
+from odeform.simulation.contact_draws import contact_draws
+from odeform.simulation.errors import SimulationError
+from odeform.simulation.objects.files import arrays_of, object_of
+from odeform.simulation.objects.soft_object import SoftObject
+from odeform.simulation.scenes.contact_force import simulate_object
+from odeform.types import Mesh, MotionSequence
+
+__all__ = ["INSTANCE", "LEFT_OUT", "SCAN", "UnseenShape", "instance", "pushes_of", "scan", "shape_file", "simulated"]
+
+INSTANCE, SCAN, LEFT_OUT = "other instance", "scanned shape", "class left out"
+
+
+@dataclass(frozen=True, eq=False)
+class UnseenShape:
+    """A soft body that a model was not trained on, and what the simulator does with it."""
+
+    name: str
+    kind: str
+    """`INSTANCE`, `SCAN` or `LEFT_OUT`."""
+    like: str
+    """The object whose material and forces it has."""
+    item: SoftObject
+    motions: tuple[MotionSequence, ...] = ()
+    failed: tuple[str, ...] = ()
+    """Reasons why simulations of further pushes have no motion."""
+
+
+def instance(key: str, name: str, factors: Mapping[str, float]) -> UnseenShape:
+    """A body of the class `name` with other proportions, called `key`; see `odeform_figures.bodies.generate`."""
+    from odeform_figures.bodies.generate import generate  # looking at finished shapes needs no mesher
+
+    return UnseenShape(key, INSTANCE, name, generate(name, factors=factors))
+
+
+def scan(path: Path) -> UnseenShape:
+    """The body of a mesh, aligned automatically. `InputError` for a file that holds no mesh of a solid."""
+    from odeform.simulation.objects.foreign import placed_object
+
+    mesh = read_geometry(path)
+    if not isinstance(mesh, Mesh):
+        raise InputError(f"shape {path}: expected a mesh")
+    placed = placed_object(mesh, path.stem)
+    return UnseenShape(path.stem, SCAN, placed.like, placed.item)
+
+
+def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:
+    """`count` contacts and forces on a body, as parameters of the scene: the same draw for every shape."""
+    drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed])
+    named = [(("contact", contact), ("force", force)) for contact, force in drawn]
+    return [
+        {f"{key}_{axis}": float(x) for key, vector in push for axis, x in zip("xyz", vector, strict=True)}
+        for push in named
+    ]
+
+
+def shape_file(folder: Path, name: str, count: int, seed: int) -> Path:
+    """Where the motions of a shape under `count` pushes are kept."""
+    return folder / f"{name}.{count}-pushes.seed-{seed}.npz"
+
+
+def simulated(
+    path: Path, make: Callable[[], UnseenShape], count: int, seed: int, workers: int | None = None
+) -> UnseenShape:
+    """The shape that `make` returns with its motions, from the file `path`, or simulated and then written to it."""
+    if path.exists():
+        return _read(path)
+    shape = make()
+    pushes = pushes_of(shape.item, count, seed)
+    done = parallel_map(f"simulate {shape.name}", partial(_run, shape.item), pushes, workers)
+    motions = tuple(motion for motion in done if isinstance(motion, MotionSequence))
+    shape = replace(shape, motions=motions, failed=tuple(reason for reason in done if isinstance(reason, str)))
+    _write(path, shape)
+    return shape
+
+
+def _run(item: SoftObject, parameters: Parameters) -> MotionSequence | str:
+    try:
+        return simulate_object(item, parameters)
+    except SimulationError as error:
+        return str(error)
+
+
+def _write(path: Path, shape: UnseenShape) -> None:
+    facts = {
+        "name": shape.name,
+        "kind": shape.kind,
+        "like": shape.like,
+        "parameters": [dict(motion.parameters) for motion in shape.motions],
+        "failed": shape.failed,
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    arrays: dict[str, Any] = {"facts": np.array(json.dumps(facts)), **arrays_of(shape.item)}
+    for at, motion in enumerate(shape.motions):
+        arrays |= {f"vertices.{at}": motion.vertices, f"times.{at}": motion.times}
+    with atomic_open(path) as file:
+        np.savez_compressed(file, **arrays)
+
+
+def _read(path: Path) -> UnseenShape:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            item, facts = object_of(file), json.loads(str(file["facts"]))
+            motions = tuple(
+                MotionSequence(file[f"times.{at}"], file[f"vertices.{at}"], item.faces, item.weights, parameters)
+                for at, parameters in enumerate(facts["parameters"])
+            )
+        return UnseenShape(facts["name"], facts["kind"], facts["like"], item, motions, tuple(facts["failed"]))
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        raise InputError(f"shape {path}: cannot be read ({error})") from None
