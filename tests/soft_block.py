@@ -23,14 +23,14 @@ class Block:
     body: ReducedBody
 
 
-def grid() -> tuple[Points, Ints]:
-    """Nodes (N, 3) and tetrahedra (M, 4): six in each cell of a box that stands on z = 0."""
-    counts = np.array(CELLS) + 1
+def grid(cells: tuple[int, int, int] = CELLS, size: Floats = SIZE) -> tuple[Points, Ints]:
+    """Nodes (N, 3) and tetrahedra (M, 4): six in each of the cells of a box of `size` m that stands on z = 0."""
+    counts = np.array(cells) + 1
     index = np.arange(counts.prod()).reshape(counts)
     points = np.stack(np.meshgrid(*(np.linspace(0, 1, n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
     cell = np.stack(
         [
-            index[i : i + CELLS[0], j : j + CELLS[1], k : k + CELLS[2]].ravel()
+            index[i : i + cells[0], j : j + cells[1], k : k + cells[2]].ravel()
             for i in (0, 1)
             for j in (0, 1)
             for k in (0, 1)
@@ -38,7 +38,7 @@ def grid() -> tuple[Points, Ints]:
         axis=1,
     )
     paths = [[0, 4, 6, 7], [0, 4, 5, 7], [0, 2, 6, 7], [0, 2, 3, 7], [0, 1, 5, 7], [0, 1, 3, 7]]
-    return points * SIZE - [0.5 * SIZE[0], 0.5 * SIZE[1], 0.0], np.concatenate([cell[:, path] for path in paths])
+    return points * size - [0.5 * size[0], 0.5 * size[1], 0.0], np.concatenate([cell[:, path] for path in paths])
 
 
 def outside(elements: Ints, points: Points) -> Ints:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import eigsh
 
+from odeform.mechanics.hinges import hinge_stiffness
 from odeform.types import Floats, Ints, Perpoint, Points
 
 __all__ = ["ElasticModes", "elastic_modes", "rigid_modes", "tangent_stiffness"]
@@ -35,7 +36,7 @@ def tangent_stiffness(
     """(3 N, 3 N) N/m: minus the derivative of the elastic forces at `positions` (N, 3) m.
 
     `points` (N, 3) m are without stress, `young` is in Pa. `elements` are tetrahedra (M, 4), or the triangles (M, 3) of
-    a shell of `thickness` metres, which bends as well.
+    a shell of `thickness` metres, which bends as well, from the curvature of `points`.
     """
     shear = young / (2.0 * (1.0 + poisson))
     if elements.shape[1] == 4:
@@ -51,7 +52,8 @@ def tangent_stiffness(
     blocks *= volume[:, None, None, None, None]
     stiffness = _assembled(blocks, elements, len(points))
     if elements.shape[1] == 3:
-        stiffness = stiffness + _bending(points, elements, young * thickness**3 / (12.0 * (1.0 - poisson**2)))
+        rigidity = young * thickness**3 / (12.0 * (1.0 - poisson**2))
+        stiffness = stiffness + _assembled(*hinge_stiffness(points, elements, positions, rigidity), len(points))
     return stiffness
 
 
@@ -79,29 +81,6 @@ def _blocks(slopes: Floats, corners: Floats, lame: float, shear: float) -> Float
     blocks += shear * np.einsum("mab,mij->maibj", slopes @ slopes.transpose(0, 2, 1), left)
     initial = slopes @ stress @ slopes.transpose(0, 2, 1)
     return blocks + np.einsum("mab,ij->maibj", initial, np.eye(3))
-
-
-def _bending(points: Points, faces: Ints, rigidity: float) -> csc_matrix:
-    """Stiffness of hinges between triangles, for a plate of `rigidity` N m that is flat without stress (Bergou et al.
-    2006, A quadratic bending model for inextensible surfaces)."""
-    x = np.asarray(points, dtype=float)
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(edges.T)
-    pairs = np.flatnonzero((edges[order[1:]] == edges[order[:-1]]).all(axis=1))
-    one, other = order[pairs], order[pairs + 1]
-    ends, across = edges[one], np.stack([faces[e // 3, (e % 3 + 2) % 3] for e in (one, other)], axis=1)
-
-    def cotangent(at: Ints, to: Ints, beside: Ints) -> Floats:
-        u, v = x[to] - x[at], x[beside] - x[at]
-        return (u * v).sum(axis=1) / np.linalg.norm(np.cross(u, v), axis=1)
-
-    (a, b), (c, d) = ends.T, across.T
-    tips = [np.linalg.norm(np.cross(x[b] - x[a], x[tip] - x[a]), axis=1) for tip in (c, d)]
-    area = 0.5 * (tips[0] + tips[1])
-    ac, ad, bc, bd = cotangent(a, b, c), cotangent(a, b, d), cotangent(b, a, c), cotangent(b, a, d)
-    weights = np.stack([bc + bd, ac + ad, -ac - bc, -ad - bd], axis=1)
-    blocks = rigidity / area[:, None, None] * weights[:, :, None] * weights[:, None, :]
-    return _assembled(np.einsum("mab,ij->maibj", blocks, np.eye(3)), np.stack([a, b, c, d], axis=1), len(x))
 
 
 def _assembled(blocks: Floats, elements: Ints, count: int) -> csc_matrix:

@@ -19,6 +19,7 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.rigid import rotation_from_vector
+from odeform.locks import Lock
 from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
@@ -180,6 +181,7 @@ class ContinuedTrajectory(ChangedTrajectory):
         self._dynamics, self._theta = dynamics, theta
         self._stop, self._rate = window.stop, window.rate
         self._frames: list[Floats] = []
+        self._lock = Lock()
 
     def reduced(self, times: Floats) -> Floats:
         """(T,) seconds -> (T, 6 + K)."""
@@ -198,9 +200,10 @@ class ContinuedTrajectory(ChangedTrajectory):
     def _between(self, frames: Floats) -> Floats:
         """(T, 6 + K) at (T,) frames after the end of the window, as fractions."""
         index = np.floor(frames).astype(int)
-        self._extend(int(index.max()) + 4)
-        # the first kept frame is one before the end of the window
-        kept = np.stack(self._frames)
+        with self._lock:
+            self._extend(int(index.max()) + 4)
+            # the first kept frame is one before the end of the window
+            kept = np.stack(self._frames)
         four = [kept[index + k] for k in range(4)]
         return catmull_rom(*four, share=(frames - index)[:, None])
 

@@ -150,8 +150,9 @@ class PointMotion(Motion):
         return float("inf")
 
     def vertices(self, t: float | Times) -> Points | Frames:
-        if np.ndim(t) == 0 and self._last is not None and self._last[0] == t:
-            return self._last[1].copy()
+        last = self._last  # once: another thread may replace it
+        if np.ndim(t) == 0 and last is not None and last[0] == t:
+            return last[1].copy()
         moved = self._displaced(self._shape, t)
         out = self._points + moved @ self._turn.T.astype(np.float32)
         if np.ndim(t) == 0:

@@ -45,9 +45,9 @@ class ShellBody(FlexBody):
 def relax(reference: Mesh, thickness: float, material: Material) -> Mesh:
     """The shape in which a shell built from `reference` is free of stress, centred at its mean point.
 
-    The bending energy of MuJoCo's shells has no curved rest state: a curved shell changes shape as soon as it is
-    simulated. Without gravity, in large implicit steps with all velocity removed (a damped Newton iteration), it finds
-    its equilibrium.
+    MuJoCo's shells rest at the curvature of `reference`, but only to the first order of the angles between triangles:
+    a ball of 162 vertices grows by 0.8 to 4 % as soon as it is simulated. Without gravity, in large implicit steps with
+    all velocity removed (a damped Newton iteration), it finds its equilibrium.
     """
     body = ShellBody(reference, 1.0, thickness, material, step=0.05, gravity=0.0, floor=False)
     for _ in range(40):

@@ -100,8 +100,8 @@ def integrate(
     """Integrate dz/dt = field(t, z) at least to `until` seconds.
 
     `start` (n,) is the state at time `begin` in seconds; its dtype is the precision. A `Solution` given as `begin` is
-    continued in place. `before_step` is called before each step, and may raise (`check_cancelled`). Failures end the
-    solution early with a status other than OK; nothing else is raised.
+    continued in place, by one thread at a time. `before_step` is called before each step, and may raise
+    (`check_cancelled`). Failures end the solution early with a status other than OK; nothing else is raised.
     """
     if isinstance(begin, Solution):
         solution = begin
@@ -109,13 +109,14 @@ def integrate(
         solution = Solution([begin], [start], [field(begin, start)], evaluations=1)
         if not (_finite(solution.states[0]) and _finite(solution.slopes[0])):
             solution.status = Status.NON_FINITE
-    if solution.status is Status.OK:
-        method = get_method(quality.method)
-        stepper = method.stepper(start)
-        if quality.step is not None:
-            _fixed(stepper, field, quality.step, solution, until, before_step)
-        else:
-            _controlled(method, stepper, field, quality.tolerance or 0.0, solution, until, before_step)
+    with solution.lock:
+        if solution.status is Status.OK and solution.end < until:
+            method = get_method(quality.method)
+            stepper = method.stepper(start)
+            if quality.step is not None:
+                _fixed(stepper, field, quality.step, solution, until, before_step)
+            else:
+                _controlled(method, stepper, field, quality.tolerance or 0.0, solution, until, before_step)
     return solution
 
 
@@ -135,9 +136,7 @@ def _fixed(
             solution.status = Status.NON_FINITE
             return
         # nodes are multiples of the step: no drift, however often the solution is continued
-        solution.times.append(origin + (solution.steps + 1) * step)
-        solution.states.append(after)
-        solution.slopes.append(slope)
+        solution.append(origin + (solution.steps + 1) * step, after, slope)
 
 
 def _controlled(
@@ -178,8 +177,5 @@ def _controlled(
         factor = SAFETY * ratio**-first * solution.last_ratio**second
         solution.next_step = step * min(longest, max(SHRINK, factor))
         solution.last_ratio, longest = max(ratio, 1e-4), GROW
-        solution.times.append(time + step)
-        solution.states.append(after)
-        solution.slopes.append(slope)
-        if method.knows_middle:
-            solution.middles.append(stepper.middle(state, step))
+        middle = stepper.middle(state, step) if method.knows_middle else None
+        solution.append(time + step, after, slope, middle)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.locks import Lock
 from odeform.types import Floats
 
 __all__ = ["Solution", "Status"]
@@ -26,7 +27,7 @@ class Solution:
 
     `times[i]` in seconds, `states[i]` (n,) and `slopes[i]` (n,), the field, belong to node i; `middles[i]` (n,) is the
     state halfway through step i, for methods with a quartic interpolant. It grows at its end only (see `integrate`), so
-    its state at a time never changes.
+    its state at a time never changes. Threads may share it: `integrate` holds `lock` while it grows.
     """
 
     times: list[float]
@@ -39,6 +40,20 @@ class Solution:
     next_step: float = 0.0
     last_ratio: float = 1.0
     """Estimated error of the last step divided by the tolerance, where steps are controlled."""
+    lock: Lock = field(default_factory=Lock, init=False, repr=False, compare=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        with self.lock:
+            # lists as they are now: another thread may go on before they are written
+            return {name: value[:] if isinstance(value, list) else value for name, value in vars(self).items()}
+
+    def append(self, time: float, state: Any, slope: Any, middle: Any | None = None) -> None:
+        """Add a node at `time` in seconds, with its `state` (n,), `slope` (n,), and the `middle` (n,) of the step."""
+        self.states.append(state)
+        self.slopes.append(slope)
+        if middle is not None:
+            self.middles.append(middle)
+        self.times.append(time)  # last: what other threads read of the solution is then complete
 
     @property
     def steps(self) -> int:
@@ -52,10 +67,11 @@ class Solution:
 
     def at(self, time: float) -> Any:
         """(n,) state at `time` in seconds, clamped to the integrated span. Cubic Hermite, or quartic with middles."""
-        if self.steps == 0:
+        last = self.steps - 1  # once: the solution may be growing
+        if last < 0:
             return self.states[0]
         index = int(np.searchsorted(self.times, time, side="right")) - 1
-        index = min(max(index, 0), self.steps - 1)
+        index = min(max(index, 0), last)
         step = self.times[index + 1] - self.times[index]
         s = min(max((time - self.times[index]) / step, 0.0), 1.0)
         middle = self.middles[index] if self.middles else None
@@ -69,7 +85,7 @@ class Solution:
         if self.steps == 0 or len(times) == 1:
             return np.stack([self.at(float(time)) for time in times])
         nodes = np.asarray(self.times)
-        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, self.steps - 1)
+        index = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 2)
         step = nodes[index + 1] - nodes[index]
         s = np.clip((times - nodes[index]) / step, 0.0, 1.0)
         y0, y1, f0, f1 = (

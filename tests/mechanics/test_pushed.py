@@ -50,6 +50,23 @@ def test_steps_converge_to_what_an_explicit_method_finds(block: Block) -> None:
     assert errors[1] < 3e-5
 
 
+def test_free_flight_is_of_second_order(block: Block) -> None:
+    push = pushed(block, 0.0 * NORMAL).push
+    field, generator = PushedBody(Mechanics(block.body, MechanicalLaw(), SPHERE), push, 0.0), np.random.default_rng(0)
+    start = field.start
+    start[2], start[12 : 12 + field.directions] = 1.0, 1e-3 * generator.normal(size=field.directions)
+    velocities = start[13 + field.directions :]
+    velocities[:6] = [0.5, -0.3, 0.2, 4.0, 7.0, -5.0]
+
+    def end(method: str, step: float) -> np.ndarray:
+        solution = integrate(field, start, SolverSettings(method, step=step, dtype="float64"), 0.016)
+        return solution.at(0.016)[:17]  # shift, rotation and the softest modes
+
+    exact, steps = end("rk4", 8e-5), [1e-3, 5e-4, 2.5e-4]
+    errors = [np.abs(end("limex", step) - exact).max() for step in steps]
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.2)
+
+
 def test_a_step_may_end_anywhere_in_the_pulse(block: Block) -> None:
     field = pushed(block, -2.0 * NORMAL)
     ends = [

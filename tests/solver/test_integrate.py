@@ -237,3 +237,8 @@ def test_many_times_at_once_are_each_time_alone(quality: SolverSettings, dtype: 
     times = np.concatenate([[-1.0, 0.0, 9.0], np.random.default_rng(0).uniform(0.0, 3.2, 40), solution.times[3:5]])
     assert np.array_equal(solution.sample(times), np.stack([solution.at(float(time)) for time in times]))
     assert np.array_equal(solution.sample(times[5:6])[0], solution.at(float(times[5])))
+
+
+def test_a_stiff_method_steps_fields_of_its_own_kind() -> None:
+    with pytest.raises(InputError, match="solver limex: expected the field of a mechanical model"):
+        integrate(field, exact(0.0), SolverSettings("limex", step=0.1), until=1.0)

@@ -62,7 +62,6 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
     quick, slow = FADING
     lowest, highest = EXPONENTS
     shallowest, deepest = DEPTHS
-    inputs = np.empty(INPUTS)
 
     def field(_: float, state: Floats) -> Floats:
         _, height, angle, ahead, rising, rim, one, two = state.tolist()
@@ -87,7 +86,7 @@ def make_field(law: RollingLaw, support: Support, radius: float, material: Float
                 gap += base * high
                 tilt = base * (lean - apart * high) / REACHING
             depth, sliding = min(max(100.0 * gap, shallowest), deepest), ahead - lever * spin
-            inputs[:] = depth / DEEP, rising / UPWARD, abs(sliding), abs(ahead) / AHEAD
+            inputs = np.array((depth / DEEP, rising / UPWARD, abs(sliding), abs(ahead) / AHEAD))
             exponents = product(1.0, last, np.tanh(product(1.0, first, inputs, 1.0, bias)), 1.0, bases)
             strong = np.exp(np.minimum(np.maximum(exponents, lowest), highest))
             stiffness, damping, friction, rolling, grip, felt = strong.tolist()

@@ -62,10 +62,11 @@ class LatentTrajectory:
 
     def _extend(self, until: float) -> None:
         """Solve at least to `until` seconds, as far as possible."""
-        first = integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
-        if first.status is not Status.OK and self._quality.tolerance is not None:
-            begin = first.end if self._rest is None else self._rest
-            self._rest = integrate(self._field, first.states[-1], self._fallback, until, begin=begin)
+        with self._solution.lock:
+            first = integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
+            if first.status is not Status.OK and self._quality.tolerance is not None:
+                begin = first.end if self._rest is None else self._rest
+                self._rest = integrate(self._field, first.states[-1], self._fallback, until, begin=begin)
 
     def _sample(self, times: Floats) -> Floats:
         """(T, state) at `times` that are solved."""

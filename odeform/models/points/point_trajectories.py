@@ -80,12 +80,12 @@ class FramedPoints:
 
     def _computed(self, beyond: float) -> Frames:
         """(F, N, 3) metres, canonical: the frames so far, at least to `beyond` windows after the window."""
-        grid, done = self._grid(beyond), len(self._frames)
-        if done < len(grid):
+        grid, frames = self._grid(beyond), self._frames  # once: another thread may replace them
+        if len(frames) < len(grid):
             begin = time.perf_counter()
-            self._frames = np.concatenate([self._frames, self._roll_out(grid)[done:]])
+            self._frames = frames = np.concatenate([frames, self._roll_out(grid)[len(frames) :]])
             self._wall_ms += 1e3 * (time.perf_counter() - begin)
-        return self._frames
+        return frames
 
     def stats(self) -> SolveStats:
         """Solver, steps and elapsed time, once all frames are computed; the solver error where it is known."""

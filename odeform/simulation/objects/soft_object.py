@@ -37,7 +37,7 @@ class SoftObject:
 
     name: str
     points: Points
-    """(N, 3) m, the nodes without stress. Those of a shell are free of stretch; its bending has a flat rest state."""
+    """(N, 3) m, the nodes without stress. A shell bends from the curvature that it has here."""
     elements: Ints
     """(M, 4) tetrahedra of a solid or (M, 3) triangles of a shell: indices of nodes."""
     faces: Faces
