@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
+from odeform.surroundings import Surroundings
 from odeform.types import Floats
 
 __all__ = ["LATER", "OBJECT", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
@@ -190,6 +191,7 @@ class Schema:
         notes: Remarks for people.
         impact: Half-open span of time in seconds that is also scored separately: free flight and rest dilute scores.
         objects: Names of the bodies of a scene with several. The parameter "object" selects one, by default the first.
+        surroundings: Floor, gravity and contacts; None where they are not known.
 
     Examples:
         >>> import odeform
@@ -209,6 +211,7 @@ class Schema:
     notes: tuple[str, ...] = ()
     impact: tuple[float, float] | None = None
     objects: tuple[str, ...] = ()
+    surroundings: Surroundings | None = None
 
     @property
     def learned(self) -> tuple[Parameter, ...]:
@@ -318,6 +321,7 @@ class Schema:
                 notes=tuple(data.get("notes", ())),
                 impact=tuple(data["impact"]) if data.get("impact") else None,
                 objects=_texts(data.get("objects", ())),
+                surroundings=Surroundings.from_json(data["surroundings"]) if data.get("surroundings") else None,
             )
         except InputError:
             raise

@@ -14,8 +14,9 @@ from odeform.geometry.rays import first_on_mesh, first_on_points
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT, Parameters, Schema
-from odeform.simulation.contacts import Contacts, push_from
-from odeform.simulation.scenes.registry import find_scene
+from odeform.simulation.contacts import push_from
+from odeform.simulation.scenes.registry import surroundings_of
+from odeform.surroundings import Contacts
 from odeform.types import Floats, Geometry, Mesh, Points, Vector
 from odeform_viz.columns import Column
 from odeform_viz.view import ColumnFrame, Frame
@@ -41,8 +42,8 @@ PICK = 0.02  # of a shape's size: how far from a ray its points may be
 
 def contacts_of(schema: Schema) -> Contacts | None:
     """How a sphere pushes the bodies of a scene; None in scenes without one."""
-    scene = find_scene(schema.scene) if schema.objects else None
-    return scene.contacts if scene else None
+    surroundings = surroundings_of(schema) if schema.objects else None
+    return surroundings.contacts if surroundings else None
 
 
 def surface_of(column: Column, parameters: Parameters) -> Mesh:
@@ -124,7 +125,7 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
         count = min(NEIGHBOURS, len(points))
         carriers = np.atleast_1d(KDTree(points).query(contact.point, count)[1])
         shares = np.full(count, 1.0 / count)
-    strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces(name)[1]
+    strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces_on(name)[1]
     return ShownPush(push, contacts, surface, strongest, carriers, shares, contact.point - shares @ points[carriers])
 
 

@@ -14,7 +14,7 @@ from odeform.benchmark.roofline import roofline, scaling
 from odeform.benchmark.timing import as_viewed, milliseconds, quantiles
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.models.per_object import PerObject
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load
@@ -49,14 +49,14 @@ def _latency(predictor: ReducedModel) -> dict[str, Any]:
         "solve_ms": np.array([motion.stats.wall_ms for motion in motions[3:]]),
         "coordinates_ms": milliseconds(lambda i: motions[1].trajectory.reduced(np.array([moments[i]])), 300 - 3),
     }
-    if isinstance(predictor, IntegratedModel):
+    if isinstance(predictor, Model):
         evaluated = predictor.evaluate_basis(shape, predictor.schema.azimuth(parameters[0]))
         thetas = [predictor.schema.vector(predictor.schema.complete(p)) for p in parameters]
         timed["encode_ms"] = milliseconds(lambda i: predictor.problem(thetas[i % 60], evaluated, np.float32), 60)
     return {"points": POINTS, **{name: quantiles(samples) for name, samples in timed.items()}}
 
 
-def _solver(model: IntegratedModel, points: list[OperatingPoint]) -> dict[str, Any]:
+def _solver(model: Model, points: list[OperatingPoint]) -> dict[str, Any]:
     default = points[0]
     qualities = {name: measure(model, default, quality) for name, quality in model.qualities.items()}
     ms_per_evaluation = float(np.median([row["ms_p50"] / row["evaluations"] for row in qualities.values()]))
@@ -96,7 +96,7 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
         if not isinstance(predictor, ReducedModel):
             raise InputError(f"bench: expected a model of reduced coordinates, got {predictor.model}")
         result |= {"data": data, "latency": _latency(predictor)}
-        if isinstance(predictor, IntegratedModel):
+        if isinstance(predictor, Model):
             points = operating_points(predictor, dataset)
             result |= _solver(predictor, points)
         return {

@@ -15,7 +15,7 @@ from odeform.errors import InputError
 from odeform.evaluation.metrics import evaluate
 from odeform.models.base import Predictor
 from odeform.models.frontier import EXACT
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.models.points.odeform_per_point import OdeformPerPoint
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load
@@ -42,7 +42,7 @@ def comparisons(
     """
     rows = {f"per-point latent ODE, {points:,} points": _per_point(predictor, points) for points in PER_POINT}
     rows |= _checkpoints(predictor, dataset)
-    if isinstance(predictor, IntegratedModel):
+    if isinstance(predictor, Model):
         rows["torchdiffeq, same field"] = torchdiffeq_comparison(predictor, operating_points[0])
         rows["mujoco, equal error"] = simulator(predictor, dataset)
     return rows
@@ -155,7 +155,7 @@ def _checkpoints(predictor: Predictor, dataset: Dataset | None) -> dict[str, Any
     return rows
 
 
-def torchdiffeq_comparison(model: IntegratedModel, point: OperatingPoint) -> dict[str, Any]:
+def torchdiffeq_comparison(model: Model, point: OperatingPoint) -> dict[str, Any]:
     """torchdiffeq on the same field, with the same method and step or tolerance, at the frames of the window."""
     try:
         import torch
@@ -164,7 +164,7 @@ def torchdiffeq_comparison(model: IntegratedModel, point: OperatingPoint) -> dic
         return {"skipped": f"{error.name} is not installed: pip install 'odeform[dev]'"}
     quality, times = model.qualities["balanced"], model.schema.window.times
     theta, evaluated = model.schema.vector(point.parameters), model.evaluate_basis(model.rest, 0.0)
-    field, start, decode = model.problem(theta, evaluated, np.float32)
+    field, start, decode, _ = model.problem(theta, evaluated, np.float32)
     # its `rk4` is the 3/8 rule, of the same order and cost; without a step size it steps on the queries (its issue 137)
     options = {} if quality.step is None else {"options": {"step_size": quality.step}}
     tolerance = quality.tolerance or 0.0
@@ -191,7 +191,7 @@ def torchdiffeq_comparison(model: IntegratedModel, point: OperatingPoint) -> dic
 
     states = solve()
     taken = evaluations
-    exact_field, exact_start, _ = model.problem(theta, evaluated, np.float64)
+    exact_field, exact_start, *_ = model.problem(theta, evaluated, np.float64)
     exact = integrate(exact_field, exact_start, EXACT, float(times[-1])).sample(times)
     off = motion_rmse(decode(times, states)[1:], decode(times, exact)[1:], model.space.gyration_radius)
     theirs = typical(lambda _: solve(), 10, warm=1)

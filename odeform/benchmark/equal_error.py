@@ -9,7 +9,7 @@ from odeform.benchmark.probes import nearest_sequences
 from odeform.benchmark.timing import typical
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.motion.basis import fit_basis
 from odeform.motion.reduced_space import decompose, rotation_of, to_canonical
 from odeform.schema import Window
@@ -45,7 +45,7 @@ def _on_frames(recorded: MotionSequence, window: Window) -> MotionSequence:
     return recorded.until(window.stop, round(1.0 / (window.rate * (recorded.times[1] - recorded.times[0]))))
 
 
-def _model_ms(model: IntegratedModel, truth: MotionSequence) -> float:
+def _model_ms(model: Model, truth: MotionSequence) -> float:
     """Milliseconds from parameters to all frames at the vertices of the truth."""
     times = model.schema.window.times
     return typical(lambda _: model.solve(truth.rest, truth.parameters).vertices(times), 15)
@@ -61,7 +61,7 @@ def coarser_settings(scene: Scene) -> list[tuple[float, int | None]]:
 
 
 def _attempt(
-    scene: Scene, model: IntegratedModel, truths: list[MotionSequence], step: float, resolution: int | None
+    scene: Scene, model: Model, truths: list[MotionSequence], step: float, resolution: int | None
 ) -> dict[str, Any]:
     """Mean time and pooled error of the simulator at one setting."""
     window, errors, ms = model.schema.window, [], []
@@ -81,7 +81,7 @@ def _attempt(
     return {**setting, "ms": float(np.mean(ms)), "error_mm": error_mm}
 
 
-def simulator(model: IntegratedModel, dataset: Dataset | None) -> dict[str, Any]:
+def simulator(model: Model, dataset: Dataset | None) -> dict[str, Any]:
     """The simulator at the cheapest setting whose error against the truth is at most the model's.
 
     The first setting is that of the truth: its error comes from packing and from other processors. `pays_off_after` is

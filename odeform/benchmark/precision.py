@@ -15,7 +15,7 @@ from odeform.benchmark.timing import milliseconds
 from odeform.dataset.index import Dataset
 from odeform.evaluation.metrics import evaluate
 from odeform.models.frontier import EXACT
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.motion.reduced_space import motion_rmse
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
@@ -43,7 +43,7 @@ class OperatingPoint:
     sequences: tuple[str, ...]
 
 
-def _reduced(model: IntegratedModel, parameters: Parameters, quality: SolverSettings) -> tuple[Floats, int]:
+def _reduced(model: Model, parameters: Parameters, quality: SolverSettings) -> tuple[Floats, int]:
     """(T, 6 + K) at the frames of the window, NaN where the integration failed, and the number of evaluations."""
     times = model.schema.window.times
     evaluated = model.evaluate_basis(model.rest, 0.0)
@@ -51,7 +51,7 @@ def _reduced(model: IntegratedModel, parameters: Parameters, quality: SolverSett
     return solved.reduced(times) + (0.0 if np.isinf(solved.last_good) else np.nan), solved.stats.evaluations
 
 
-def operating_points(model: IntegratedModel, dataset: Dataset | None) -> list[OperatingPoint]:
+def operating_points(model: Model, dataset: Dataset | None) -> list[OperatingPoint]:
     """The default parameters, and the corner of the trained box that takes the most evaluations.
 
     In a scene with objects, which has no corners, the latter is one of `DRAWS` random parameter sets.
@@ -81,9 +81,7 @@ def ladder(frame: float) -> list[SolverSettings]:
     return fixed + [SolverSettings(method, tolerance=t) for method, values in tolerances.items() for t in values]
 
 
-def measure(
-    model: IntegratedModel, point: OperatingPoint, quality: SolverSettings, repeats: int = REPEATS
-) -> dict[str, Any]:
+def measure(model: Model, point: OperatingPoint, quality: SolverSettings, repeats: int = REPEATS) -> dict[str, Any]:
     """One row: a parameter change on a known shape, timed from encoding to the solved trajectory."""
     reduced, evaluations = _reduced(model, point.parameters, quality)
     error = 1e3 * motion_rmse(reduced[1:], point.exact[1:], model.space.gyration_radius)
@@ -105,7 +103,7 @@ def measure(
     }
 
 
-def work_precision(model: IntegratedModel, points: list[OperatingPoint]) -> list[dict[str, Any]]:
+def work_precision(model: Model, points: list[OperatingPoint]) -> list[dict[str, Any]]:
     """Every setting of the ladder, in both precisions, at every operating point."""
     settings = ladder(1.0 / model.schema.window.rate)
     return [

@@ -16,7 +16,8 @@ from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.trust import Trust
 from odeform.schema import OBJECT, Parameters
-from odeform.simulation.scenes.registry import find_scene
+from odeform.simulation.contacts import complete_push
+from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 
@@ -50,6 +51,7 @@ class Predictor(ABC):
     Attributes:
         checkpoint: The file it was read from: provenance, scores, SHA-256.
         schema: Its parameters and window of time.
+        surroundings: Floor, gravity and contacts of its scene; None where they are not known.
         rest: The trained body at rest, N vertices in metres; that of the default object, if there are several.
 
     Examples:
@@ -101,6 +103,7 @@ class Predictor(ABC):
         try:
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
+            self.surroundings = surroundings_of(checkpoint.schema)
             self.rest = _rest(checkpoint.arrays)
             objects = {name: arrays_of_object(checkpoint.arrays, name) for name in self.schema.objects}
             self._rests = {name: _rest(arrays) for name, arrays in objects.items() if "rest.points" in arrays}
@@ -162,14 +165,15 @@ class Predictor(ABC):
         """All parameters, checked, with defaults for those not given (`Schema.complete`).
 
         In a scene in which a sphere pushes bodies, contacts and forces that are not given suit the object: see
-        `Contacts.complete`. Raises `InputError` for unknown names, and values that are not acceptable.
+        `odeform.simulation.contacts.complete_push`.
+
+        Raises `InputError` for unknown names, and values that are not acceptable.
         """
         given = self.schema.expanded(parameters)
-        scene = find_scene(self.schema.scene) if self.schema.objects else None
-        if scene is not None and scene.contacts is not None:
+        if self.surroundings is not None and self.surroundings.contacts is not None:
             name = self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))
             body = {OBJECT: name}
-            given = scene.contacts.complete({**body, **given}, self.rest_of(body), self.force_range(body))
+            given = complete_push({**body, **given}, self.rest_of(body), self.force_range(body))
         return self.schema.complete(given)
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
@@ -177,10 +181,9 @@ class Predictor(ABC):
 
         Raises `InputError` in scenes in which no sphere pushes.
         """
-        scene = find_scene(self.schema.scene)
-        if scene is None or scene.contacts is None:
+        if self.surroundings is None or self.surroundings.contacts is None:
             raise InputError(f"scene {self.schema.scene}: no sphere pushes its bodies")
-        return scene.contacts.forces(str(parameters.get(OBJECT, "")))
+        return self.surroundings.contacts.forces_on(str(parameters.get(OBJECT, "")))
 
     def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
         """The trained body at rest that `parameters` select in a scene with objects; `rest` in all other scenes."""
@@ -201,13 +204,13 @@ class Predictor(ABC):
     def trust(self) -> Trust:
         """The trained bodies, and the limits of motions in the scene. Nothing is known of an imported scene."""
         trust = Trust(self.bodies, error_band=self.error_band, knows_foreign_errors=self.knows_foreign_errors)
-        scene = find_scene(self.schema.scene)
-        if scene is None:
+        around = self.surroundings
+        if around is None:
             return replace(trust, limits=Limits(energy=np.inf))
         trained = self.checkpoint.arrays.get("trained.depth_m", np.zeros(1))
-        limits = Limits(scene.floor, max(DEPTH, DEEPER * float(trained.max())), scene.gravity)
+        limits = Limits(around.floor, max(DEPTH, DEEPER * float(trained.max())), around.gravity)
         if limits.floor is not None and self.rest.points[:, 2].min() < limits.floor - limits.depth:
-            limits = Limits(None, gravity=scene.gravity)
+            limits = Limits(None, gravity=around.gravity)
         return replace(trust, limits=limits)
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:

@@ -20,20 +20,20 @@ from jaxtyping import Float
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.locks import Lock
-from odeform.motion.changed_trajectory import ChangedTrajectory
-from odeform.motion.reduced_motion import Trajectory
+from odeform.models.kernels.regression import Kernel, KernelRegression
+from odeform.motion.base import SolveStats
 from odeform.motion.reduced_space import POSE
 from odeform.motion.splines import catmull_rom
+from odeform.motion.trajectory import Piecewise, Trajectory
 from odeform.schema import Window
 from odeform.types import Arrays, Floats
 
 __all__ = [
     "LATER_ERRORS",
-    "ContinuedTrajectory",
     "Dynamics",
-    "Regression",
+    "continued",
     "has_continuation",
-    "kernel",
+    "spread_regression",
     "without_continuation",
     "without_side",
 ]
@@ -45,24 +45,11 @@ LATER_ERRORS = "val.later_mm"
 """Validation errors of the continuation, by frames after the last that it was given."""
 
 
-def kernel(
-    features: Float[np.ndarray, "states features"], centers: Float[np.ndarray, "centers features"]
-) -> Float[np.ndarray, "states centers"]:
-    """Gaussian kernel exp(-|f - c|^2 / 2) between features and centres."""
-    squares = (features**2).sum(axis=-1)[:, None] + (centers**2).sum(axis=-1)
-    return np.exp(np.minimum(features @ centers.T - 0.5 * squares, 0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Regression:
-    """A sum of Gaussian kernels of features."""
-
-    centers: Float[np.ndarray, "centers features"]
-    weights: Float[np.ndarray, "centers outputs"]
-
-    def __call__(self, features: Float[np.ndarray, "states features"]) -> Float[np.ndarray, "states outputs"]:
-        """The sum at each of the features."""
-        return kernel(features, self.centers) @ self.weights
+def spread_regression(
+    centers: Float[np.ndarray, "centers features"], weights: Float[np.ndarray, "centers outputs"]
+) -> KernelRegression:
+    """A sum of Gaussian kernels of features that have unit length scales."""
+    return KernelRegression(Kernel(np.ones(centers.shape[1]), order=None), centers, weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +64,9 @@ class Dynamics:
     """Metres below `touch` over which contacts set in."""
     gains: Float[np.ndarray, "features"]
     """Of all features."""
-    pose: Regression
+    pose: KernelRegression
     """Its features are those without the side that is down."""
-    deformation: Regression
+    deformation: KernelRegression
 
     def flight(self, before: Float[np.ndarray, "*batch y"], now: Float[np.ndarray, "*batch y"]) -> Floats:
         """The next frame (..., 6 + K) of a body without contact."""
@@ -120,8 +107,8 @@ class Dynamics:
         """The float32 arrays of a checkpoint, by name; `from_arrays` reads them."""
         named = {"gravity": self.gravity, "ground": np.array([self.touch, self.width]), "gains": self.gains}
         for name in PARTS:
-            part: Regression = getattr(self, name)
-            named |= {f"{name}.centers": part.centers, f"{name}.weights": part.weights}
+            part: KernelRegression = getattr(self, name)
+            named |= {f"{name}.centers": part.inputs, f"{name}.weights": part.weights}
         return {PREFIX + name: value.astype(np.float32) for name, value in named.items()}
 
     @classmethod
@@ -137,9 +124,9 @@ class Dynamics:
                 raise ValueError(f"{PREFIX}{name}: expected a finite array of shape {shape}, got {array.shape}")
             return array
 
-        def regression(name: str, inputs: int, outputs: int) -> Regression:
+        def regression(name: str, inputs: int, outputs: int) -> KernelRegression:
             count = len(arrays[f"{PREFIX}{name}.weights"])
-            return Regression(read(f"{name}.centers", count, inputs), read(f"{name}.weights", count, outputs))
+            return spread_regression(read(f"{name}.centers", count, inputs), read(f"{name}.weights", count, outputs))
 
         touch, width = read("ground", 2).tolist()
         return cls(
@@ -169,47 +156,40 @@ def without_continuation(checkpoint: Checkpoint) -> Checkpoint:
     return replace(checkpoint, arrays=arrays, schema=replace(checkpoint.schema, window=window))
 
 
-class ContinuedTrajectory(ChangedTrajectory):
-    """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on.
+def continued(solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> Trajectory:
+    """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on."""
+    return Piecewise(solved, window.stop, lambda: _Frames(solved, dynamics, theta, window))
+
+
+class _Frames:
+    """What the dynamics make of the last two frames of a window.
 
     Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
     spline between them is exact for free flight.
     """
 
+    last_good = float("inf")
+
     def __init__(self, solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> None:
-        super().__init__(solved)
-        self._dynamics, self._theta = dynamics, theta
+        self._dynamics, self._theta, self._solved = dynamics, theta, solved
         self._stop, self._rate = window.stop, window.rate
-        self._frames: list[Floats] = []
+        # the first kept frame is one before the end of the window
+        self._frames = list(solved.reduced(window.stop - np.array([1.0, 0.0]) / window.rate))
         self._lock = Lock()
 
-    def reduced(self, times: Floats) -> Floats:
-        """(T,) seconds -> (T, 6 + K)."""
-        times = np.asarray(times, dtype=float)
-        later = times > self._stop
-        # a trajectory that failed within the window stays at its last state
-        if not later.any() or self.last_good < self._stop:
-            return self.own.reduced(np.minimum(times, self._stop))
-        after = self._between(self._rate * (times[later] - self._stop))
-        if later.all():
-            return after
-        y = np.empty((len(times), after.shape[1]))
-        y[~later], y[later] = self.own.reduced(times[~later]), after
-        return y
+    @property
+    def stats(self) -> SolveStats:
+        """Those of the window."""
+        return self._solved.stats
 
-    def _between(self, frames: Floats) -> Floats:
-        """(T, 6 + K) at (T,) frames after the end of the window, as fractions."""
+    def reduced(self, times: Floats) -> Floats:
+        """(T,) seconds after the window -> (T, 6 + K)."""
+        frames = self._rate * (times - self._stop)
         index = np.floor(frames).astype(int)
         with self._lock:
-            self._extend(int(index.max()) + 4)
-            # the first kept frame is one before the end of the window
+            while len(self._frames) < int(index.max()) + 4:
+                before, now = (frame[None] for frame in self._frames[-2:])
+                self._frames.append(self._dynamics.next(before, now, self._theta[None])[0])
             kept = np.stack(self._frames)
         four = [kept[index + k] for k in range(4)]
         return catmull_rom(*four, share=(frames - index)[:, None])
-
-    def _extend(self, count: int) -> None:
-        if not self._frames:
-            self._frames = list(self.own.reduced(self._stop - np.array([1.0, 0.0]) / self._rate))
-        while len(self._frames) < count:
-            before, now = (frame[None] for frame in self._frames[-2:])
-            self._frames.append(self._dynamics.next(before, now, self._theta[None])[0])

@@ -5,13 +5,13 @@ from functools import cached_property
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
-from odeform.models.continuation import ContinuedTrajectory, Dynamics, has_continuation, without_continuation
+from odeform.models.continuation import Dynamics, continued, has_continuation, without_continuation
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.recent import InUse
-from odeform.motion.reduced_motion import ReducedMotion, Trajectory
+from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import ReducedSpace
-from odeform.motion.rolled_trajectory import RolledTrajectory
+from odeform.motion.trajectory import Adjusted, Trajectory
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
@@ -27,8 +27,8 @@ class ReducedModel(Predictor):
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         """Motions of a checkpoint whose continuation is of an earlier version stop where the trained window ends."""
-        continued = self.continues_itself or has_continuation(checkpoint.arrays)
-        super().__init__(checkpoint if continued else without_continuation(checkpoint))
+        goes_on = self.continues_itself or has_continuation(checkpoint.arrays)
+        super().__init__(checkpoint if goes_on else without_continuation(checkpoint))
 
     def _read(self, checkpoint: Checkpoint) -> None:
         _ = self.space, self.dynamics  # damaged ones are found now, not when they are used
@@ -60,7 +60,7 @@ class ReducedModel(Predictor):
             return self.trajectory(theta, evaluated, settings, until)
         window = self.schema.window
         solved = self.trajectory(theta, evaluated, settings, min(until, window.stop))
-        return ContinuedTrajectory(solved, self.dynamics, theta, window)
+        return continued(solved, self.dynamics, theta, window)
 
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
         """The basis on a geometry at an azimuth in radians; kept while a motion uses it, or until the next one."""
@@ -83,7 +83,7 @@ class ReducedModel(Predictor):
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
         trajectory = self._continued(self.schema.inputs(parameters), evaluated, settings, until)
         if self.space.rolling is not None:
-            trajectory = RolledTrajectory(trajectory, self.space)
+            trajectory = Adjusted(trajectory, lambda _, y: self.space.with_modes(y))
         return ReducedMotion(
             self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
         )

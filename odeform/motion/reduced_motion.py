@@ -1,7 +1,6 @@
 """The motion of a reduced model: pose and coefficients at any time, and the points that they move."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -13,35 +12,17 @@ from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
 from odeform.motion.threads import thread_map
+from odeform.motion.trajectory import Trajectory
 from odeform.motion.trust import UNKNOWN, Trust
 from odeform.motion.watch import Sample, Watch
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
-__all__ = ["ReducedMotion", "Trajectory", "as_reduced"]
+__all__ = ["ReducedMotion", "as_reduced"]
 
 SEVERAL = 4  # points that are rotated as one: products with three rows leave most vector lanes unused
 BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are rotated
 MANY = 16  # from this number on, blocks are shared among the cores
-
-
-@runtime_checkable
-class Trajectory(Protocol):
-    """Reduced coordinates over time. The result for a time never depends on earlier requests."""
-
-    @property
-    def stats(self) -> SolveStats:
-        """How the trajectory was computed."""
-        ...
-
-    @property
-    def last_good(self) -> float:
-        """Seconds up to which the trajectory is valid; later times show the state at that time."""
-        ...
-
-    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) seconds -> (T, 6 + K)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,57 +1,42 @@
 """Scenes in which a sphere pushes a body: their parameters are `object`, `contact_x` to `_z`, `force_x` to `_z`."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from odeform.geometry.contact import RADIUS, nearest_on
+from odeform.geometry.contact import nearest_on
 from odeform.geometry.push import TOWARDS, Push, default_contact, push_of
-from odeform.schema import OBJECT, Parameters
+from odeform.schema import Parameters
 from odeform.types import Mesh, Vector
 
-__all__ = ["CONTACT", "FORCE", "Contacts", "contact_parameters", "push_from", "vector_of"]
+__all__ = ["CONTACT", "FORCE", "complete_push", "contact_parameters", "push_from", "vector_of"]
 
 MIDDLING = 0.7  # from the weakest to the strongest force of an object: that of a push that is not given
 CONTACT, FORCE = "contact", "force"
 
 
-@dataclass(frozen=True)
-class Contacts:
-    """What pushes, and how."""
+def complete_push(given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float]) -> dict[str, Any]:
+    """A contact and a force for those that are not given, on a body at rest.
 
-    forces: Callable[[str], tuple[float, float]]
-    """Weakest and strongest force on an object in newton."""
-    pulse: float
-    """Seconds from 0 on during which the sphere pushes."""
-    radius: float = RADIUS
-    """Of the sphere in metres."""
-
-    def complete(
-        self, given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float] | None = None
-    ) -> dict[str, Any]:
-        """A contact and a force for those that are not given, on a body at rest.
-
-        `forces` are the weakest and the strongest on it in newton, by default those of the object.
-
-        The contact is a visible point of its surface, on the side that a given force pushes from; the force is of
-        middling strength, straight into the surface. What is given only in part, or is not a number, is left alone.
-        """
-        try:
-            contact, force = (_given(given, name) for name in (CONTACT, FORCE))
-        except (TypeError, ValueError):
-            return dict(given)
-        if contact is not None and force is not None:
-            return dict(given)
-        if contact is None:
-            pushed = force is not None and force.any()
-            at = default_contact(rest, -force if pushed else TOWARDS)  # pyright: ignore[reportOptionalOperand]
-        else:
-            at = nearest_on(rest, contact)
-        weakest, strongest = forces or self.forces(str(given.get(OBJECT, "")))
-        push = Push(at, weakest + MIDDLING * (strongest - weakest))
-        return {**contact_parameters(push), **given}
+    `forces` are the weakest and the strongest on it in newton. The contact is a visible point of its surface, on the
+    side that a given force pushes from; the force is of middling strength, straight into the surface. What is given
+    only in part, or is not a number, is left alone.
+    """
+    try:
+        contact, force = (_given(given, name) for name in (CONTACT, FORCE))
+    except (TypeError, ValueError):
+        return dict(given)
+    if contact is not None and force is not None:
+        return dict(given)
+    if contact is None:
+        pushed = force is not None and force.any()
+        at = default_contact(rest, -force if pushed else TOWARDS)  # pyright: ignore[reportOptionalOperand]
+    else:
+        at = nearest_on(rest, contact)
+    weakest, strongest = forces
+    push = Push(at, weakest + MIDDLING * (strongest - weakest))
+    return {**contact_parameters(push), **given}
 
 
 def _given(given: Mapping[str, Any], name: str) -> Vector | None:

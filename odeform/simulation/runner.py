@@ -150,7 +150,8 @@ def simulate(
         raise InputError("simulate: expected count and workers of at least 1, seed of at least 0, and a positive rate")
     root, rate, step = Path(out), rate or known.schema.window.rate, step or known.step
     entries = plan(known, count, seed, objects, corners)
-    schema = replace(known.schema, window=replace(known.schema.window, rate=rate))
+    window = replace(known.schema.window, rate=rate)
+    schema = replace(known.schema, window=window, surroundings=known.surroundings)
     asked = counts(known, count, objects)
     provenance = {"scene": scene, "count": asked, "seed": seed, "rate_hz": rate, "step_s": step}
     provenance |= {"corners": True} if corners else {}

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from odeform.schema import OBJECT, Parameters, Schema
-from odeform.simulation.contacts import Contacts
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
+from odeform.surroundings import Contacts, Surroundings
 from odeform.types import Mesh, MotionSequence, Points
 
 __all__ = ["Scene"]
@@ -56,6 +56,11 @@ class Scene:
     sampler: Callable[[str, int, int], list[dict[str, Any]]] | None = None
     """`sampler(object, count, seed)` draws `count` parameter sets of one object ("" in a scene without any), for scenes
     whose parameters do not fill a box. A longer list starts with the shorter one. None: evenly over the box."""
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """Floor, gravity and contacts, as data sets and checkpoints keep them."""
+        return Surroundings(self.floor, self.gravity, self.contacts)
 
     def sample(self, count: int, seed: int, objects: Sequence[str] = ()) -> list[dict[str, Any]]:
         """`count` complete parameter sets; in a scene with objects, `count` of each of `objects` (default: all).

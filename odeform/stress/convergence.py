@@ -5,11 +5,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from odeform.dataset.index import Dataset
-from odeform.models.integrated_model import IntegratedModel
-from odeform.models.latent.inference import Field, make_field
+from odeform.models.latent.inference import make_field
 from odeform.models.latent.model import LatentModel
+from odeform.models.model import Model
 from odeform.solver.integrate import SolverSettings, integrate
-from odeform.solver.method import Method
+from odeform.solver.method import Field, Method
 from odeform.solver.registry import METHODS
 from odeform.stress.cases import inside, methods_of
 from odeform.stress.check import Check, Checks
@@ -57,7 +57,7 @@ def check_orders(model: LatentModel, seed: int = 0) -> Checks:
     off = dict.fromkeys(methods, 0.0)
     for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)
-        _, start, _ = model.problem(theta, evaluated, np.float64)
+        start = model.problem(theta, evaluated, np.float64).start
         for name in methods:
             method = METHODS[name]
             dtype = np.float64 if method.order <= DOUBLE else np.longdouble
@@ -66,7 +66,7 @@ def check_orders(model: LatentModel, seed: int = 0) -> Checks:
     return {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
 
 
-def check_refining(model: IntegratedModel, dataset: Dataset) -> Checks:
+def check_refining(model: Model, dataset: Dataset) -> Checks:
     """`refining_error_ratio`: largest ratio, of any method, between the pooled error on some test sequences and that at
     the next coarser step. The coarsest is one step per frame."""
     window = model.schema.window

@@ -5,13 +5,13 @@ import math
 import numpy as np
 from scipy.stats import rankdata
 
-from odeform.models.integrated_model import IntegratedModel
-from odeform.models.latent.inference import Field
 from odeform.models.latent.model import LatentModel
+from odeform.models.model import Model
 from odeform.motion.reduced_motion import as_reduced
 from odeform.motion.reduced_space import POSE, motion_rmse, small_motion
 from odeform.schema import LATER
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.method import Field
 from odeform.stress.cases import inside, methods_of, random_quality
 from odeform.stress.check import Check, Checks
 from odeform.types import Floats
@@ -24,7 +24,7 @@ SAMPLES = 2
 HALF_STEP = 0.005  # in halves of the trained range: half a slider step of 1/200 of the range
 
 
-def check_field(model: IntegratedModel, seed: int = 0) -> Checks:
+def check_field(model: Model, seed: int = 0) -> Checks:
     """Growth of differences and of the state.
 
     `lyapunov_per_s`: largest finite-time Lyapunov exponent over the window, from the derivative of the final state by
@@ -39,7 +39,7 @@ def check_field(model: IntegratedModel, seed: int = 0) -> Checks:
     last = window.stop if window.reach else float(window.soft_clamped(np.array(10.0 * window.stop)))
     exponent, within, ever, by = -math.inf, 0.0, 0.0, 1e-6
     for parameters in inside(schema, SAMPLES, seed):
-        field, start, _ = model.problem(schema.inputs(parameters), evaluated, np.float64)
+        field, start, *_ = model.problem(schema.inputs(parameters), evaluated, np.float64)
 
         def end(at: Floats, field: Field = field) -> Floats:
             return integrate(field, at, step, window.stop).at(window.stop)
@@ -60,7 +60,7 @@ def check_field(model: IntegratedModel, seed: int = 0) -> Checks:
     }
 
 
-def _divergence(model: IntegratedModel, seed: int) -> float:
+def _divergence(model: Model, seed: int) -> float:
     """Windows (at most 10) until a motion of the trained box deforms by more than twice the largest in the window."""
     schema, step = model.schema, SolverSettings("rk4", step=1.0 / model.schema.window.rate, dtype="float64")
     times = schema.window.stop * np.linspace(0.0, 10.0, 1001)
@@ -71,7 +71,7 @@ def _divergence(model: IntegratedModel, seed: int) -> float:
     return float(times[diverged.argmax() if diverged.any() else -1] / schema.window.stop)
 
 
-def check_calibration(model: IntegratedModel, seed: int = 0) -> Checks:
+def check_calibration(model: Model, seed: int = 0) -> Checks:
     """Reported solver errors against those measured with tolerance 1e-11: their rank correlation (Spearman), and the
     share of solves in which they are within a factor of 2.
 
@@ -119,7 +119,7 @@ def check_sensitivities(model: LatentModel, seed: int = 0) -> Checks:
     times, worst = schema.window.times, 0.0
 
     def ends(theta: Floats) -> Floats:
-        return model.integrate(theta, evaluated, finest, schema.window.stop).reduced(times)
+        return model.trajectory(theta, evaluated, finest, schema.window.stop).reduced(times)
 
     for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)

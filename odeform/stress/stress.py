@@ -12,8 +12,8 @@ import numpy as np
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.models.base import Predictor
-from odeform.models.integrated_model import IntegratedModel
 from odeform.models.latent.model import LatentModel
+from odeform.models.model import Model
 from odeform.models.registry import load_reduced
 from odeform.motion.base import Motion
 from odeform.parallel import parallel_map
@@ -105,7 +105,7 @@ def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAW
     checks |= watched
     if isinstance(predictor, LatentModel):  # others have contacts, at whose begin no method keeps its order
         checks |= check_orders(predictor, seed) | check_sensitivities(predictor, seed)
-    if isinstance(predictor, IntegratedModel):
+    if isinstance(predictor, Model):
         checks |= check_field(predictor, seed) | check_calibration(predictor, seed)
         if schema.scene in bundled_datasets():
             checks |= check_refining(predictor, open_dataset(schema.scene))

@@ -17,7 +17,7 @@ from odeform.evaluation.residuals import trained_depth, validation_residuals
 from odeform.identification.discrepancy import LEAST, calibrate
 from odeform.io import require_writable
 from odeform.models.base import Predictor
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.models.names import ALIASES
 from odeform.models.registry import load, model_class
 from odeform.models.training.body import body_arrays
@@ -136,7 +136,7 @@ def write_scored(
 
 def _calibration(predictor: Predictor, dataset: Dataset) -> Arrays:
     """What `identify` needs to know of the error of an ODE; of baselines it is measured when it is asked for."""
-    if not isinstance(predictor, IntegratedModel) or len(dataset.select("val")) < LEAST:
+    if not isinstance(predictor, Model) or len(dataset.select("val")) < LEAST:
         return {}
     return calibrate(predictor, dataset).arrays()
 

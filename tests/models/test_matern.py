@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import gamma, kv
 
-from odeform.models.matern import matern, matern_slope
+from odeform.models.kernels.functions import matern, matern_slope
 
 
 @pytest.mark.parametrize("order", [2, 6])

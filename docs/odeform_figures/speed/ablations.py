@@ -11,8 +11,9 @@ from odeform.benchmark.timing import typical
 from odeform.models.reduced_model import ReducedModel
 from odeform.motion.base import SolveStats
 from odeform.motion.evaluated_basis import STILL
-from odeform.motion.reduced_motion import ReducedMotion, Trajectory, as_reduced
+from odeform.motion.reduced_motion import ReducedMotion, as_reduced
 from odeform.motion.reduced_space import POSE
+from odeform.motion.trajectory import Trajectory
 from odeform.types import Floats
 
 __all__ = ["ablations", "with_modes"]

@@ -17,8 +17,8 @@ from odeform.models.baselines.frame_trajectory import FrameTrajectory
 from odeform.models.baselines.trajectory_pod import fit_trajectory_pod
 from odeform.models.contact.inputs import contact_inputs, has_contact
 from odeform.models.contact.regression import ContactRegression, fit_contact_regression
-from odeform.models.kernel_search import ORDERS, Ridge, search_ridge
-from odeform.models.matern import matern
+from odeform.models.kernels.regression import Kernel, KernelRegression
+from odeform.models.kernels.ridge import ORDERS, Ridge, search_ridge
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
@@ -39,14 +39,14 @@ class GaussianProcess(FittedModel):
             self._times = arrays["times"]
             return
         self._times, self._mean, self._modes = arrays["times"], arrays["pod.mean"], arrays["pod.modes"]
-        self._scales = np.array(checkpoint.config["length_scales"], dtype=float)
-        if not (np.isfinite(self._scales) & (self._scales > 0.0)).all():
-            raise ValueError(f"length_scales: expected positive numbers, got {self._scales}")
-        self._order = checkpoint.config.get("order", ORDERS[0])
-        if self._order not in ORDERS:
-            raise ValueError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {self._order!r}")
+        scales = np.array(checkpoint.config["length_scales"], dtype=float)
+        if not (np.isfinite(scales) & (scales > 0.0)).all():
+            raise ValueError(f"length_scales: expected positive numbers, got {scales}")
+        order = checkpoint.config.get("order", ORDERS[0])
+        if order not in ORDERS:
+            raise ValueError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {order!r}")
         self._check_inputs(arrays["theta"])
-        self._inputs, self._weights = arrays["theta"] / self._scales, arrays["gp.weights"]
+        self._regression = KernelRegression(Kernel(scales, order), arrays["theta"], arrays["gp.weights"])
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
@@ -57,7 +57,7 @@ class GaussianProcess(FittedModel):
         pod, theta = fit_trajectory_pod(data), data.theta
         val = (theta["val"], pod.project(data.reduced["val"]))
         found = search_ridge(theta["train"], pod.coefficients, val, orders=ORDERS)
-        weights = found[0].weights(theta["train"], pod.coefficients)
+        weights = found[0].fit(theta["train"], pod.coefficients).weights
         arrays = {"times": data.times, "theta": theta["train"], "gp.weights": weights, **pod.arrays()}
         trials = [{**_named(trial), "error": trial.error} for trial in found]
         return arrays, {**_named(found[0]), "modes": len(pod.modes), "trials": trials}
@@ -68,12 +68,11 @@ class GaussianProcess(FittedModel):
         def predict() -> Floats:
             if self._contact is not None:
                 return self._contact.predict(contact_inputs(self.schema, theta[None], self.space))[0]
-            coefficients = matern(theta[None] / self._scales, self._inputs, self._order)[0] @ self._weights
-            return (self._mean + coefficients @ self._modes).reshape(len(self._times), -1)
+            return (self._mean + self._regression(theta[None])[0] @ self._modes).reshape(len(self._times), -1)
 
         return FrameTrajectory("kernel ridge regression", self._times, predict)
 
 
 def _named(ridge: Ridge) -> dict[str, Any]:
     """The settings as a checkpoint holds them."""
-    return {"length_scales": ridge.scales.tolist(), "ridge": ridge.ridge, "order": ridge.order}
+    return {"length_scales": ridge.kernel.scales.tolist(), "ridge": ridge.ridge, "order": ridge.kernel.order}

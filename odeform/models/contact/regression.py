@@ -8,7 +8,6 @@ that fit the validation motions best, and each training motion from all others (
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,15 +15,15 @@ from jaxtyping import Float
 from scipy.optimize import nnls
 
 from odeform.models.contact.inputs import ContactInputs
-from odeform.models.contact.kernel import Kernel, fit_kernel
-from odeform.motion.reduced_space import POSE
+from odeform.models.kernels.likelihood import fit_kernel, ridge_of
+from odeform.models.kernels.regression import KernelRegression
+from odeform.models.residual import PARTS
 from odeform.types import Arrays, Floats, Rotations
 
-__all__ = ["PARTS", "ContactRegression", "fit_contact_regression"]
+__all__ = ["ContactRegression", "fit_contact_regression"]
 
 EXPERTS = (("body", False), ("body", True), ("azimuth", True), ("normal", True), ("normal", False))
 """Frame of inputs and outputs, and whether a term is linear in the force."""
-PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(POSE, None)}
 ENERGY = 0.99999  # of deformations, in the modes of their trajectories
 INPUTS = ("contact", "normal", "force")
 MOST = 400  # training motions from which a kernel is chosen; all of them are regressed
@@ -59,30 +58,25 @@ class _Scaling:
         """The number of first inputs that say where the contact is."""
         return 3 if self.frame == "body" else 6
 
-    def __call__(self, inputs: ContactInputs) -> tuple[Floats, Floats]:
-        """Inputs (S, D) and forces (S, 3)."""
+    def __call__(self, inputs: ContactInputs) -> Floats:
+        """(S, D + 3): inputs, and the force."""
         groups, force = inputs.features(self.frame)
-        return (np.concatenate(groups, axis=1) - self.shift) / self.scale, force / self.force
+        return np.concatenate([(np.concatenate(groups, axis=1) - self.shift) / self.scale, force / self.force], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Expert:
-    """One regression: outputs (M,) in its frame, `weights` (S, M) of the training motions `known`, and their `mean`
-    (M,)."""
+    """One regression of outputs (M,) in its frame: what they differ by from their `mean` (M,). `logs` are the settings
+    of its kernel, as `ridge_of` reads them."""
 
     scaling: _Scaling
-    known: ContactInputs
-    kernel: Kernel
-    weights: Floats
+    logs: Floats
+    regression: KernelRegression
     mean: Floats
-
-    @cached_property
-    def _scaled(self) -> tuple[Floats, Floats]:
-        return self.scaling(self.known)
 
     def predict(self, inputs: ContactInputs, turned: bool) -> Floats:
         """(R, M) outputs; with `turned`, three-vectors, carried from the expert's frame to the axes of the body."""
-        values = self.kernel(*self.scaling(inputs), *self._scaled) @ self.weights + self.mean
+        values = self.regression(self.scaling(inputs)) + self.mean
         return _turned_back(values, inputs.frames(self.scaling.frame)) if turned else values
 
 
@@ -98,12 +92,12 @@ def _fitted(
     scaling, frames = _Scaling.of(known, frame), known.frames(frame)
     given = _turned_back(outputs, frames.swapaxes(1, 2)) if turned else outputs
     mean = given.mean(axis=0)
-    x, force = scaling(known)
-    kernel = fit_kernel(x[:MOST], force[:MOST], (given - mean)[:MOST], scaling.places if linear else 0)
-    inverse = np.linalg.inv(kernel(x, force, x, force) + kernel.noise * np.eye(len(x)))
-    weights = inverse @ (given - mean)
-    others = given - weights / np.diag(inverse)[:, None]  # Rasmussen and Williams 2006, eq. 5.12
-    return _Expert(scaling, known, kernel, weights, mean), _turned_back(others, frames) if turned else others
+    x, places = scaling(known), scaling.places if linear else 0
+    size = x.shape[1] - 3
+    logs = fit_kernel(x[:MOST, :size], x[:MOST, size:], (given - mean)[:MOST], places)
+    left_out, regression = ridge_of(logs, size, places).leave_one_out(x, given - mean)
+    others = given - left_out
+    return _Expert(scaling, logs, regression, mean), _turned_back(others, frames) if turned else others
 
 
 class ContactRegression:
@@ -122,12 +116,10 @@ class ContactRegression:
 
     def _expert(self, arrays: Arrays, part: str, index: int) -> _Expert:
         (frame, linear), name = EXPERTS[index], f"gp.{part}.{index}"
-        scaling = _Scaling.of(self._known, frame)
-        logs = arrays[f"{name}.logs"].astype(float)
-        kernel = Kernel(logs, len(scaling.scale), scaling.places if linear else 0)
-        return _Expert(
-            scaling, self._known, kernel, arrays[f"{name}.weights"].astype(float), arrays[f"{name}.mean"].astype(float)
-        )
+        scaling, logs = _Scaling.of(self._known, frame), arrays[f"{name}.logs"].astype(float)
+        kernel = ridge_of(logs, len(scaling.scale), scaling.places if linear else 0).kernel
+        regression = KernelRegression(kernel, scaling(self._known), arrays[f"{name}.weights"].astype(float))
+        return _Expert(scaling, logs, regression, arrays[f"{name}.mean"].astype(float))
 
     def predict(self, inputs: ContactInputs) -> Float[np.ndarray, "sequences times y"]:
         """The motions of S contacts."""
@@ -182,7 +174,7 @@ def _blend(predicted: list[Floats], truth: Floats, errors: list[float]) -> list[
 
 
 def _expert_arrays(name: str, expert: _Expert) -> Arrays:
-    arrays = {"logs": expert.kernel.logs, "mean": expert.mean, "weights": expert.weights.astype(np.float32)}
+    arrays = {"logs": expert.logs, "mean": expert.mean, "weights": expert.regression.weights.astype(np.float32)}
     return {f"{name}.{key}": array for key, array in arrays.items()}
 
 

@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import CubicSpline
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.integrated_model import IntegratedModel
 from odeform.models.latent.config import ModelConfig
-from odeform.models.latent.correction import Correction
-from odeform.models.latent.inference import Decoder, Field, make_decoder, make_encoder, make_field, pool_shape
-from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.latent.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.latent.sensitivity import Sensitivities, make_sensitivities
 from odeform.models.latent.weights import check_weights
+from odeform.models.model import Model
+from odeform.models.residual import ParameterRegression, parameter_residual
+from odeform.models.solved import Problem
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
 from odeform.solver.integrate import SolverSettings
@@ -29,7 +30,7 @@ PREFIX = "net."
 """Prefix of the network's arrays in a checkpoint."""
 
 
-class LatentModel(IntegratedModel):
+class LatentModel(Model):
     """Latent neural ODEs for pose and deformation (the paper's model, one latent state per object)."""
 
     model = "latent"
@@ -57,7 +58,7 @@ class LatentModel(IntegratedModel):
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
-        self.correction = Correction.from_arrays(checkpoint.arrays, self.space.coordinates, self.config.parameters)
+        self.residual = parameter_residual(checkpoint.arrays, self.space.coordinates, self.config.parameters)
         self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
     def _pool(self, evaluated: EvaluatedBasis) -> list[Floats]:
@@ -67,29 +68,10 @@ class LatentModel(IntegratedModel):
 
         return self._pooled.get(id(evaluated), pooled)[1]
 
-    def trajectory(
-        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
-    ) -> LatentTrajectory:
-        assert settings is not None
-        return self.integrate(theta, evaluated, settings, until)
-
-    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
-        decode, correction = self._decoder(theta), self.correction
-        if correction is not None:
-            decode = _corrected(decode, correction, theta)
-        return self._fields[dtype](theta), self._encode(self._pool(evaluated), theta, dtype), decode
-
-    def integrate(
-        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float
-    ) -> LatentTrajectory:
-        """The latent motion for theta (P,) in [-1, 1], solved to `until` seconds."""
-        field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
-        fallback = SolverSettings("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
-
-        def precise() -> tuple[Field, Floats]:
-            return self.problem(theta, evaluated, np.float64)[:2]
-
-        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius, precise)
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
+        decode, start = self._decoder(theta), self._encode(self._pool(evaluated), theta, dtype)
+        origin = decode(np.zeros(1), start[None])
+        return Problem(self._fields[dtype](theta), start, lambda times, states: decode(times, states) - origin)
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Float[np.ndarray, "jet times y"]:
         """(1 + P, T, 6 + K): the motion y of the trained body under theta (P,) in [-1, 1] at (T,) seconds, and its
@@ -97,14 +79,12 @@ class LatentModel(IntegratedModel):
         body = self.evaluate_basis(self.rest, 0.0)
         clock = self.schema.window.soft_clamped(times)
         jet = self._sensitivities(self._pool(body), theta, quality, clock)
-        correction = self.correction
-        return jet if correction is None else correction.shares * jet + correction.jet(theta)(clock)
+        if self.residual is None:
+            return jet
+        assert isinstance(self.residual.regression, ParameterRegression)
+        spline = CubicSpline(self.residual.times, self.residual.regression.jet(theta), axis=1)
+        return self.residual.weight * jet + spline(np.clip(clock, 0.0, self.residual.stop))
 
     @cached_property
     def _sensitivities(self) -> Sensitivities:
         return make_sensitivities(self.weights, self.config)
-
-
-def _corrected(decode: Decoder, correction: Correction, theta: Floats) -> Decoder:
-    rest = correction.over_time(theta)
-    return lambda times, states: correction.shares * decode(times, states) + rest(times)

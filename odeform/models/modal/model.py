@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -13,19 +14,18 @@ from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
-from odeform.models.frontier import FrontierPoint
-from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
-from odeform.models.modal.correction import Correction
 from odeform.models.modal.elastic_body import ElasticBody
-from odeform.models.reduced_model import ReducedModel
-from odeform.motion.corrected_trajectory import CorrectedTrajectory
+from odeform.models.model import Model
+from odeform.models.solved import Problem
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.lifted_trajectory import LiftedTrajectory
-from odeform.motion.reduced_motion import Trajectory
+from odeform.motion.floor_projection import FloorProjection
+from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import ReducedSpace
+from odeform.motion.trajectory import Adjusted, Trajectory
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Basis, Floats
+from odeform.types import Basis, Floats, Times, Vector
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
@@ -41,16 +41,17 @@ QUALITIES = {
     "reference": SolverSettings("limex", step=2.5e-4, dtype="float64"),
 }
 """Of bodies whose solver errors were not measured."""
-FALLBACK = SolverSettings("limex", step=2.5e-3, dtype="float64")
 EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
 """The reference for solver errors."""
 
 
-class ModalModel(ReducedModel):
+class ModalModel(Model):
     """The motion of one elastic body on the floor that a projectile pushes."""
 
     model = "modal"
     rescales_input = False
+    fallback = SolverSettings("limex", step=2.5e-3, dtype="float64")
+    finer = MappingProxyType({EXACT: 0.0})
     knows_objects = True
     resumable = True
     ablations: ClassVar[Mapping[str, str]] = {"correction": "what is left unexplained is not regressed"}
@@ -68,10 +69,11 @@ class ModalModel(ReducedModel):
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest = float(shift), float(deformation)
-        chosen = {name: SolverSettings(**values) for name, values in config.get("qualities", {}).items()}
-        self.qualities = chosen or QUALITIES
-        self.frontier = tuple(FrontierPoint.from_json(row) for row in config.get("frontier", ()))
-        self.correction = Correction(checkpoint.arrays, config["correction"]) if "correction" in config else None
+        self._read_settings(config)
+        self.qualities = self.qualities or QUALITIES
+        if "correction" in config:
+            self.residual = contact_residual(checkpoint.arrays, config["correction"])
+        self._recent: Recent[tuple[ContactInputs, Vector]] = Recent(1)
 
     # these take a moment, and not every object of a checkpoint is looked at
 
@@ -94,39 +96,40 @@ class ModalModel(ReducedModel):
         """That of its coordinates."""
         return space_of(self.body, self._coordinates[1], self._largest)
 
+    def _pushed(self, theta: Floats) -> tuple[ContactInputs, Vector]:
+        """What pushes at theta (P,), relative to the mass centre, and the centre (3,) of the sphere."""
+
+        def found() -> tuple[ContactInputs, Vector]:
+            values = [p.denormalise(float(x)) for p, x in zip(self.schema.learned, theta, strict=True)]
+            contact, force = np.array(values[:3]), np.array(values[3:])
+            point, centre = checked_contact(self.rest, contact, force)
+            anchor = self.body.anchor
+            return ContactInputs(point.point[None] - anchor, point.normal[None], force[None]), centre - anchor
+
+        return self._recent.get(theta.tobytes(), found)
+
+    def residual_inputs(self, theta: Floats) -> ContactInputs:
+        return self._pushed(theta)[0]
+
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
+        """Of one push; always in double precision."""
+        inputs, centre = self._pushed(theta)
+        push = make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centre[None], inputs.force)
+        pushed, coordinates = PushedBody(self.mechanics, push, self.pulse), self.coordinates.along(push.modes[0])
+
+        def readout(times: Times, states: Floats) -> Floats:
+            return coordinates.reduced(*pushed.body_motion(states)[:3])
+
+        return Problem(pushed, pushed.start, readout)
+
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        assert settings is not None
-        values = [p.denormalise(float(x)) for p, x in zip(self.schema.learned, theta, strict=True)]
-        contact, force = np.array(values[:3]), np.array(values[3:])
-        point, centre = checked_contact(self.rest, contact, force)
-        anchor = self.body.anchor
-        push = make_push(
-            self.mechanics.body, self.body.dynamic, point.point[None] - anchor, centre[None] - anchor, force[None]
-        )
-        pushed = PushedBody(self.mechanics, push, self.pulse)
-        coordinates = self.coordinates.along(push.modes[0])
-
-        def decode(times: Floats, states: Floats) -> Floats:
-            return coordinates.reduced(*pushed.body_motion(states)[:3])
-
-        radius = self.space.gyration_radius
-        solved: Trajectory = LatentTrajectory(
-            pushed,
-            decode,
-            pushed.start,
-            settings,
-            FALLBACK,
-            until,
-            radius,
-            lambda: (pushed, pushed.start),
-            {EXACT: 0.0},
-        )
-        if self.correction is not None:
-            known = ContactInputs(point.point[None] - anchor, point.normal[None], force[None])
-            rest = self.correction.over_time(known)
-            solved = CorrectedTrajectory(solved, self.correction.kept, rest, self.correction.stop)
-        body, window = self.watched_body, self.schema.window
+        motion, body = super().trajectory(theta, evaluated, settings, until), self.watched_body
+        window = self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-        return LiftedTrajectory(solved, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)
+
+        def lowest(y: Floats) -> Floats:
+            return body.sample(y, np.ones(len(y))).lowest
+
+        return Adjusted(motion, FloorProjection(motion, lowest, body.limit + SPARE, grid))

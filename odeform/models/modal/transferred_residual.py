@@ -1,6 +1,6 @@
-"""The correction of a trained body, carried over to a body of similar shape."""
+"""The residual of a trained body, transferred to a body of similar shape."""
 
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -8,18 +8,19 @@ from jaxtyping import Float
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.likeness import compare_shapes
 from odeform.models.contact.inputs import ContactInputs
+from odeform.models.modal.contact_residual import PushRegression
 from odeform.models.modal.coordinates import coordinates_of
-from odeform.models.modal.correction import kept_of
 from odeform.models.modal.elastic_body import ElasticBody
 from odeform.models.modal.model import ModalModel
+from odeform.models.residual import Residual, weight_of
 from odeform.motion.reduced_space import POSE
 from odeform.types import Floats, Mesh, Vector
 
-__all__ = ["CarriedCorrection", "shape_distance", "share_at", "standing_offset"]
+__all__ = ["shape_distance", "standing_offset", "transfer_weight", "transferred_residual"]
 
-SHARE, FADES = 0.85, 0.1
-"""The share of a correction that the same shape gets, and the distance at which it has fallen to a third. The shares
-that fit other instances and scans best are 0.5 to 1.1 up to a distance of 0.05, 0.3 at 0.12 and none at 0.17."""
+MOST, FADES = 0.85, 0.1
+"""The weight of a residual on the same shape, and the distance at which it has fallen to a third. The weights that fit
+other instances and scans best are 0.5 to 1.1 up to a distance of 0.05, 0.3 at 0.12 and none at 0.17."""
 
 
 def standing_offset(shape: Mesh, body: Mesh) -> Vector:
@@ -39,40 +40,42 @@ def shape_distance(shape: Mesh, body: Mesh) -> float:
     return compare_shapes(moved, [body]).mean / float(np.ptp(body.points, axis=0).max())
 
 
-def share_at(distance: float) -> float:
-    """The share of a correction that is carried over to a shape at this distance."""
-    return SHARE * float(np.exp(-((distance / FADES) ** 2)))
+def transfer_weight(distance: float) -> float:
+    """The weight of a residual that is transferred to a shape at this distance."""
+    return MOST * float(np.exp(-((distance / FADES) ** 2)))
 
 
-class CarriedCorrection:
-    """Part of what the trained body's mechanics leaves unexplained, at the nearest point of its surface."""
+@dataclass(frozen=True, eq=False)
+class _Transferred:
+    """The regression of a trained body at the nearest point of its surface, in the coordinates of another body."""
 
-    def __init__(self, part: ModalModel, body: ElasticBody, share: float) -> None:
-        """`share` is the part of the correction of `part`, which has one, that is carried over to `body`.
+    part: ModalModel
+    known: Residual
+    weight: float
+    offset: Vector
+    """(3,) m: from the mass centre of the other body to the trained one's scene."""
+    coefficients: Float[np.ndarray, "known coefficients"]
 
-        `kept` (6 + K,) and `stop` are as those of `Correction`.
-        """
-        shape = Mesh(body.points.astype(np.float32), body.faces)
-        assert part.correction is not None
-        self._part, self._correction, self._share = part, part.correction, share
-        # a gain belongs to a stiffness, and modes of the same number need not be as stiff in both bodies
-        gains = np.interp(np.log(body.squares), np.log(part.body.squares), part.correction.gains)
-        self.kept = 1.0 - share * (1.0 - kept_of(part.correction.shares, gains))
-        self.stop = part.correction.stop
-        self._offset = standing_offset(shape, part.rest) + body.anchor
-        there = Mesh(shape.points + standing_offset(shape, part.rest).astype(np.float32), shape.faces)
-        values = part.evaluate_basis(there, 0.0).values.reshape(-1, len(body.points), 3)
-        _, basis = coordinates_of(body)
-        self._coefficients = np.einsum("kni,nij,n->kj", values, basis, body.weights)
+    def frames(self, inputs: ContactInputs) -> Floats:
+        """(T, 6 + K) of one push."""
+        near, anchor = nearest_on(self.part.rest, inputs.contact[0] + self.offset), self.part.body.anchor
+        there = ContactInputs(near.point[None] - anchor, near.normal[None], inputs.force)
+        found = self.weight * self.known.regression.frames(there)
+        return np.concatenate([found[:, :POSE], found[:, POSE:] @ self.coefficients], axis=1)
 
-    def over_time(self, push: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
-        """(T,) s -> (T, 6 + K), as that of `Correction`, in the coordinates of the other body."""
-        near = nearest_on(self._part.rest, push.contact[0] + self._offset)
-        anchor = self._part.body.anchor
-        known = self._correction.over_time(ContactInputs(near.point[None] - anchor, near.normal[None], push.force))
 
-        def carried(times: Floats) -> Floats:
-            found = self._share * known(times)
-            return np.concatenate([found[:, :POSE], found[:, POSE:] @ self._coefficients], axis=1)
-
-        return carried
+def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> Residual:
+    """A share `weight` of the residual of `part`, which has one, for another body."""
+    known, shape = part.residual, Mesh(body.points.astype(np.float32), body.faces)
+    assert known is not None
+    regression = known.regression
+    assert isinstance(regression, PushRegression)
+    # a scale belongs to a stiffness, and modes of the same number need not be as stiff in both bodies
+    scale = np.interp(np.log(body.squares), np.log(part.body.squares), regression.scale)
+    kept = 1.0 - weight * (1.0 - weight_of(regression.parts, scale))
+    standing = standing_offset(shape, part.rest)
+    there = Mesh(shape.points + standing.astype(np.float32), shape.faces)
+    values = part.evaluate_basis(there, 0.0).values.reshape(-1, len(body.points), 3)
+    _, basis = coordinates_of(body)
+    coefficients = np.einsum("kni,nij,n->kj", values, basis, body.weights)
+    return Residual(known.times, kept, _Transferred(part, known, weight, standing + body.anchor, coefficients))

@@ -17,7 +17,7 @@ from odeform.models.base import Predictor
 from odeform.models.modal.elastic_body import ElasticBody, elastic_body
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
-from odeform.models.modal.transferred_residual import CarriedCorrection, shape_distance, share_at
+from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
 from odeform.models.per_object import PerObject
 from odeform.motion.recent import Recent
 from odeform.motion.trust import Trust
@@ -153,8 +153,8 @@ class UserBodyPredictor(ModalModel):
                 arrays={**body.shown(), **body.arrays()},
             )
         )
-        if part.correction is not None:
-            self.correction = CarriedCorrection(part, body, share_at(self.distance))
+        if part.residual is not None:
+            self.residual = transferred_residual(part, body, transfer_weight(self.distance))
         band = trained.checkpoint.config.get(SHAPE_BAND)
         self._band = None if band is None else ShapeBand.from_json(band)
         self.knows_foreign_errors = self._band is not None

@@ -2,6 +2,7 @@
 contact."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -12,18 +13,16 @@ from odeform.mechanics.rolling.dynamics import MOVING, STATE
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
-from odeform.models.integrated_model import IntegratedModel
-from odeform.models.latent.correction import Correction
-from odeform.models.latent.inference import Decoder
-from odeform.models.latent.latent_trajectory import LatentTrajectory
-from odeform.models.rolling.phases import Begun, Resumed
+from odeform.models.model import Model
+from odeform.models.residual import parameter_residual
+from odeform.models.rolling.phases import Push, rising
 from odeform.models.rolling.readout import Readout, inputs_of
-from odeform.models.rolling.start import Start, push_inputs
-from odeform.motion.corrected_trajectory import CorrectedTrajectory
+from odeform.models.rolling.start import push_inputs, read_start
+from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.lifted_trajectory import LiftedTrajectory
-from odeform.motion.reduced_motion import Trajectory
+from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.reduced_space import POSE
+from odeform.motion.trajectory import Adjusted, Piecewise, Trajectory
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
 from odeform.types import Floats, Times, Vector
@@ -36,7 +35,6 @@ __all__ = ["UNTURNED", "RollingModel", "placed"]
 FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
 """What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
 later on a corner amplifies what coarser solutions leave."""
-FALLBACK = SolverSettings("rk4", step=1e-3, dtype="float64")
 UP = np.array([0.0, 0.0, 1.0])
 UNTURNED = np.array([0.0, 1.0, 0.0])
 """The axis of a body that does not turn: any level one."""
@@ -49,11 +47,13 @@ def placed(moved: Float[np.ndarray, "rows 3"], axis: Vector) -> Float[np.ndarray
     return np.concatenate([moved[:, :1] * ahead + moved[:, 1:2] * UP, moved[:, 2:] * axis], axis=1)
 
 
-class RollingModel(IntegratedModel):
+class RollingModel(Model):
     """The motion of one round body in a plane, or up and down."""
 
     model = "rolling"
     continues_itself = True
+    fallback = SolverSettings("rk4", step=1e-3, dtype="float64")
+    finer = MappingProxyType(FINER)
     ablations: ClassVar[Mapping[str, str]] = {
         "network": "coefficients of the contact law depend on the material alone",
         "corners": "the body rolls over a smooth floor on a smooth rim",
@@ -80,27 +80,35 @@ class RollingModel(IntegratedModel):
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
         self.law = RollingLaw.from_arrays(arrays, len(self._materials))
-        self._start = Start.from_arrays(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
+        self._start = read_start(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.space.coordinates - POSE)
-        self.correction = Correction.from_arrays(arrays, self.space.coordinates, len(learned))
+        self.residual = parameter_residual(arrays, self.space.coordinates, len(learned))
         # the body that viewers show is smoother than the one whose corners it rolls over
         self._support = support_of(self.space.basis.scale * self.space.basis.centers, self._axis)
 
-    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
-        """The initial value problem for theta (P,) in [-1, 1] from when the push is over: the field, the state (8,)
-        there, and the decoder of states (R, 8) to coordinates (R, 6 + S).
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
+        """The state (8,) begins when the push is over; the push itself is a cubic to there.
 
-        Angle and spin of its states are the way and the speed of the rim (`units_of`).
+        Angle and spin of states are the way and the speed of the rim (`units_of`).
         """
         material = theta[self._materials]
-        field = make_field(self.law, self._support, self._radius, material)
         start = np.zeros(STATE)
-        start[: 2 * MOVING] = self._start.at(push_inputs(self.schema, theta[None]))[0]
+        start[: 2 * MOVING] = self._start(push_inputs(self.schema, theta[None]))[0]
+        pose = self._decoded(start[None], material)[0, :POSE]
+        push = Push(self.begin, pose, placed(start[None, MOVING : 2 * MOVING], self._axis)[0], self.space.coordinates)
 
-        def decode(_: Times, states: Floats) -> Floats:
-            return self._decoded(states / self._units, material)
+        def readout(times: Times, states: Floats) -> Floats:
+            y = self._decoded(states / self._units, material)
+            # how the push deforms the body does not follow from the motion: it is regressed
+            y[:, POSE:] *= rising(times - self.begin)[:, None]
+            early = times < self.begin
+            y[early] = push(times[early])
+            return y
 
-        return field, (start * self._units).astype(dtype), decode
+        return Problem(self._field(material), (start * self._units).astype(dtype), readout, self.begin)
+
+    def _field(self, material: Floats) -> Field:
+        return make_field(self.law, self._support, self._radius, material)
 
     def _decoded(self, states: Float[np.ndarray, "rows states"], material: Floats) -> Float[np.ndarray, "rows y"]:
         """States (R, 8) of a body of this material (Q,) -> (R, 6 + S)."""
@@ -110,62 +118,49 @@ class RollingModel(IntegratedModel):
         moved = states[:, :MOVING] - [0.0, self._clearance, 0.0]
         return np.concatenate([placed(moved, self._axis), deformation], axis=1)
 
-    def integrate(self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float) -> Begun:
-        """The motion for theta (P,) in [-1, 1], without its correction, solved to `until` seconds."""
-        field, start, decode = self.problem(theta, evaluated, _precision(quality))
-        solved = self._solved(field, start, decode, quality, until - self.begin)
-        exact = start.astype(float)
-        first = decode(np.zeros(1), exact[None])[0]
-        rate = placed((exact / self._units)[None, MOVING : 2 * MOVING], self._axis)[0]
-        return Begun(solved, self.begin, first, rate)
-
-    def _solved(
-        self, field: Field, start: Floats, decode: Decoder, quality: SolverSettings, seconds: float
-    ) -> LatentTrajectory:
-        exact, least = start.astype(float), 1.0 / self.schema.window.rate
-        arm, seconds = self.space.gyration_radius, max(seconds, least)
-        return LatentTrajectory(field, decode, start, quality, FALLBACK, seconds, arm, lambda: (field, exact), FINER)
-
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
-        known, window = self.correction, self.schema.window
-        if known is None:
-            return self._lifted(self.integrate(theta, evaluated, settings, until))
-        resumed = known.stop >= window.stop
-        begun = self.integrate(theta, evaluated, settings, min(until, known.stop) if resumed else until)
-        corrected = CorrectedTrajectory(begun, known.shares, known.over_time(theta), known.stop)
-        if not resumed:
-            return self._lifted(corrected)
+        stop, window = np.inf if self.residual is None else self.residual.stop, self.schema.window
+        restarts = window.stop <= stop < np.inf
+        motion = super().trajectory(theta, evaluated, settings, min(until, stop) if restarts else until)
+        if restarts:
+            assert isinstance(motion, Adjusted)
+            corrected = motion
+            motion = Piecewise(motion, stop, lambda: self._restarted(theta, corrected, settings, stop, until))
+        return Adjusted(motion, FloorProjection(motion, self._lowest_points, self._lowest))
 
-        def resume() -> tuple[Trajectory, Floats]:
-            field, _, decode = self.problem(theta, evaluated, _precision(settings))
-            start = begun.state(known.stop) + self._units * self._added(begun, corrected, known.stop)
-            start = start.astype(_precision(settings))
-            solved = self._solved(field, start, decode, settings, until - known.stop)
-            return solved, decode(np.zeros(1), start[None])[0, POSE:]
+    def _restarted(
+        self, theta: Floats, corrected: Adjusted, settings: SolverSettings, stop: float, until: float
+    ) -> Trajectory:
+        """What is solved from `stop` seconds on, from where the corrected motion is, and as it moves there."""
+        solved, material = corrected.own, theta[self._materials]
+        assert isinstance(solved, SolvedTrajectory)
+        added = self._units * self._added(solved, corrected, stop)
+        start = (solved.states(np.array([stop]))[0] + added).astype(settings.dtype)
+        end, first = corrected.reduced(np.array([stop]))[0], self._decoded(start[None] / self._units, material)[0]
+        # what the residual adds to the deformation gives way to what follows from the motion
+        given_up = np.concatenate([np.zeros(POSE), end[POSE:] - first[POSE:]])
 
-        return self._lifted(Resumed(corrected, known.stop, resume))
+        def readout(times: Times, states: Floats) -> Floats:
+            moved = self._decoded(states / self._units, material) - first
+            return end + moved - rising(times - stop)[:, None] * given_up
 
-    def _added(self, own: Trajectory, corrected: Trajectory, time: float) -> Float[np.ndarray, "8"]:
-        """What the correction adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
+        problem = Problem(self._field(material), start, readout, stop)
+        return self._solved(problem, lambda: problem._replace(start=start.astype(float)), settings, until)
+
+    def _added(self, solved: Trajectory, corrected: Trajectory, time: float) -> Float[np.ndarray, "8"]:
+        """What the residual adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
         so short that corrected frames do not tell the velocity."""
         frame = 1.0 / self.schema.window.rate
         times = np.array([time - frame, time])
-        added = corrected.reduced(times)[:, :POSE] - own.reduced(times)[:, :POSE]
+        added = corrected.reduced(times)[:, :POSE] - solved.reduced(times)[:, :POSE]
         moved = np.stack([added[:, :3] @ np.cross(self._axis, UP), added[:, 2], added[:, 3:] @ self._axis], axis=1)
         if self.space.rolling is None:
             moved[:, [0, 2]] = 0.0
         return np.concatenate([moved[1], (moved[1] - moved[0]) / frame, np.zeros(STATE - 2 * MOVING)])
 
-    def _lifted(self, motion: Trajectory) -> LiftedTrajectory:
-        return LiftedTrajectory(motion, self._lowest_points, self._lowest)
-
     def _lowest_points(self, y: Float[np.ndarray, "times y"]) -> Times:
         """(T, 6 + S) -> (T,) heights in m of the body's lowest point."""
         return self.watched_body.sample(self.space.with_modes(y), np.ones(len(y))).lowest
-
-
-def _precision(quality: SolverSettings) -> type:
-    return np.float32 if quality.dtype == "float32" else np.float64

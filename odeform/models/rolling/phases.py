@@ -1,107 +1,37 @@
-"""The phases of a rolling body's motion: the push, what is solved from there on, and how a corrected motion goes on."""
+"""The push that precedes the ODE of a rolling body, and how its deformation sets in."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from odeform.models.latent.latent_trajectory import LatentTrajectory
-from odeform.motion.changed_trajectory import ChangedTrajectory
-from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
-from odeform.types import Floats, Times
+from odeform.types import Times
 
-__all__ = ["Begun", "Resumed"]
+__all__ = ["Push", "rising"]
 
 RISING = 0.04  # s
 
 
 @dataclass(frozen=True, eq=False)
-class _Push:
-    """The motion during the push: from rest to where the ODE begins, with its velocity there."""
+class Push:
+    """The motion during the push: from rest to where the ODE begins, with its velocity there; cubic in time."""
 
     begin: float
+    """s."""
     pose: Float[np.ndarray, "6"]
     rate: Float[np.ndarray, "6"]
+    coordinates: int
 
-    def at(self, times: Times) -> Float[np.ndarray, "times 6"]:
-        """(T,) s from 0 to `begin` -> (T, 6): cubic in time."""
-        share = (times / self.begin)[:, None]
-        ramp = share**2 * (3.0 - 2.0 * share) * self.pose
-        return ramp + share**2 * (share - 1.0) * self.begin * self.rate
-
-
-class Begun(ChangedTrajectory):
-    """A motion that is solved from the end of the push on.
-
-    How the push deforms the body does not follow from the motion: it is regressed (`Correction`). What contacts do
-    takes its place in `RISING` seconds.
-    """
-
-    def __init__(self, own: LatentTrajectory, begin: float, y: Floats, rate: Floats) -> None:
-        """`y` (6 + S,) and the pose's `rate` (6,) per second are those at `begin` seconds."""
-        super().__init__(own)
-        self._solved, self._push, self._first = own, _Push(begin, y[:POSE], rate), y
-
-    def state(self, time: float) -> Float[np.ndarray, "8"]:
-        """That of the ODE at `time` seconds, after the push."""
-        return self._solved.states(np.array([time - self._push.begin]))[0]
-
-    @property
-    def last_good(self) -> float:
-        """Seconds up to which it is valid."""
-        return self._push.begin + self.own.last_good
-
-    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + S), zero at time 0."""
-        times = np.asarray(times, dtype=float)
-        push, later = self._push, times > self._push.begin
-        out = np.zeros((len(times), len(self._first)))
-        out[~later, :POSE] = push.at(times[~later])
-        if later.any():
-            after = times[later] - push.begin
-            out[later] = self._first + self.own.reduced(after)
-            out[later, POSE:] *= _risen(after)[:, None]
+    def __call__(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) s from 0 to `begin` -> (T, 6 + S), without deformation."""
+        part = (times / self.begin)[:, None]
+        out = np.zeros((len(times), self.coordinates))
+        out[:, :POSE] = part**2 * (3.0 - 2.0 * part) * self.pose + part**2 * (part - 1.0) * self.begin * self.rate
         return out
 
 
-class Resumed(ChangedTrajectory):
-    """A motion that is corrected up to `stop` seconds, and from there on solved from where it is, as it moves there."""
-
-    def __init__(self, own: Trajectory, stop: float, resume: Callable[[], tuple[Trajectory, Floats]]) -> None:
-        """`resume` returns what is solved from `stop` on, and its deformation (S,) there; called when it is needed."""
-        super().__init__(own)
-        self._stop, self._resume = stop, resume
-
-    @cached_property
-    def _later(self) -> tuple[Trajectory, Floats, Floats]:
-        """What is solved from `stop` on, the coordinates (6 + S,) that are added to it, and what these give up."""
-        solved, deformation = self._resume()
-        end = self.own.reduced(np.array([self._stop]))[0]
-        return solved, end, np.concatenate([np.zeros(POSE), end[POSE:] - deformation])
-
-    @property
-    def last_good(self) -> float:
-        """Seconds up to which it is valid."""
-        if self.own.last_good < self._stop or "_later" not in self.__dict__:
-            return self.own.last_good
-        return self._stop + self._later[0].last_good
-
-    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + S)."""
-        times = np.asarray(times, dtype=float)
-        out, later = self.own.reduced(np.minimum(times, self._stop)), times > self._stop
-        if later.any() and self.own.last_good >= self._stop:
-            (solved, end, given_up), after = self._later, times[later] - self._stop
-            out = out.copy()
-            # what the correction adds to the deformation gives way to what follows from the motion
-            out[later] = end + solved.reduced(after) - _risen(after)[:, None] * given_up
-        return out
-
-
-def _risen(after: Times) -> Times:
-    """(T,) from 0 to 1, in `RISING` s."""
-    share = np.minimum(after / RISING, 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+def rising(after: Times) -> Times:
+    """(T,) s -> (T,) from 0 to 1, in `RISING` seconds: what contacts do to the body takes its place."""
+    part = np.minimum(after / RISING, 1.0)
+    return part**2 * (3.0 - 2.0 * part)

@@ -12,12 +12,13 @@ from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.continuation import (
     LATER_ERRORS,
-    ContinuedTrajectory,
     Dynamics,
-    Regression,
-    kernel,
+    continued,
+    spread_regression,
     without_side,
 )
+from odeform.models.kernels.functions import gaussian
+from odeform.models.kernels.regression import KernelRegression
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load_model
 from odeform.motion.reduced_space import POSE, small_motion
@@ -66,7 +67,7 @@ def _spread(features: Floats, count: int) -> Floats:
     unexplained, factor, chosen = np.ones(len(features)), np.zeros((len(features), count)), []
     while len(chosen) < count and unexplained.max(initial=0.0) > 1e-7:
         pivot, rank = int(unexplained.argmax()), len(chosen)
-        column = kernel(features, features[pivot : pivot + 1])[:, 0]
+        column = gaussian(features, features[pivot : pivot + 1])[:, 0]
         column -= factor[:, :rank] @ factor[pivot, :rank]
         factor[:, rank] = column / np.sqrt(unexplained[pivot])
         unexplained -= factor[:, rank] ** 2
@@ -75,14 +76,14 @@ def _spread(features: Floats, count: int) -> Floats:
     return features[chosen]
 
 
-def _regression(features: Floats, near: Floats, outputs: Floats, rng: np.random.Generator) -> Regression:
+def _regression(features: Floats, near: Floats, outputs: Floats, rng: np.random.Generator) -> KernelRegression:
     """What fits outputs (S, O) best as `near` (S, 1) times a sum of kernels of features (S, F)."""
     touching = rng.permutation(np.flatnonzero(near[:, 0]))[:CANDIDATES]
     centers = _spread(features[touching], CENTERS)
-    values = near * kernel(features, centers)
-    normal = values.T @ values + RIDGE * len(features) * kernel(centers, centers)
+    values = near * gaussian(features, centers)
+    normal = values.T @ values + RIDGE * len(features) * gaussian(centers, centers)
     normal[np.diag_indices_from(normal)] += 1e-10 * np.trace(normal) / max(len(normal), 1)  # against rounding
-    return Regression(centers, np.linalg.solve(normal, values.T @ outputs))
+    return spread_regression(centers, np.linalg.solve(normal, values.T @ outputs))
 
 
 def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: int = 0) -> Dynamics:
@@ -94,7 +95,7 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     speed = _largest((now - before)[:, :3])
     sizes = [(1.0 / depth, 2), (1.0 / speed, 3), (gyration_radius / speed, 3), (PARAMETERS, theta.shape[1]), (SIDE, 3)]
     gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
-    empty = Regression(np.zeros((0, 0)), np.zeros((0, 0)))
+    empty = spread_regression(np.zeros((0, 0)), np.zeros((0, 0)))
     dynamics = Dynamics(gravity, touch, WIDTH * depth, gains, empty, empty)
     features, near = dynamics.features(before, now, conditions)
     missed, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
@@ -122,15 +123,13 @@ def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
         return None
     window = replace(data.schema.window, stop=float(data.times[kept - 1]))
     evaluated, later = model.evaluate_basis(model.rest, 0.0), data.times[kept:]
-    continued, stopped = [], []
+    moving, stopped = [], []
     for theta in data.theta["val"]:
         motion = model.trajectory(theta, evaluated, model.qualities.get("reference"), window.stop)
-        continued.append(ContinuedTrajectory(motion, dynamics, theta, window).reduced(later))
+        moving.append(continued(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
     truth, gyration_radius = data.reduced["val"][:, kept:], data.space.gyration_radius
-    moved, held = (
-        small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (continued, stopped)
-    )
+    moved, held = (small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (moving, stopped))
     return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
 
 

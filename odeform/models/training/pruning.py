@@ -10,6 +10,7 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.latent.model import PREFIX, LatentModel
+from odeform.models.residual import ParameterRegression
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
 
@@ -26,7 +27,7 @@ hide others."""
 def needed_modes(model: LatentModel, data: TrainingData) -> int:
     """The fewest modes whose error of large validation deformations is at most `WORSE` times that of all modes."""
     evaluated, times = model.evaluate_basis(model.rest, 0.0), data.times
-    motions = [model.integrate(theta, evaluated, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
+    motions = [model.trajectory(theta, evaluated, FINE, float(times[-1])).reduced(times) for theta in data.theta["val"]]
     truth = data.reduced["val"][..., POSE:]
     size = np.linalg.norm(truth, axis=2)
     weights = data.observed["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
@@ -45,8 +46,9 @@ def without_modes(checkpoint: Checkpoint, data: TrainingData) -> tuple[Checkpoin
     reduced = {split: y[..., : POSE + count] for split, y in data.reduced.items()}
     readout, gains = f"{PREFIX}local_decoder.readout.weight", f"{PREFIX}gains"
     kept = {readout: checkpoint.arrays[readout][:count], gains: checkpoint.arrays[gains][: POSE + count]}
-    if model.correction is not None:
-        kept |= model.correction.first(count).arrays()
+    if model.residual is not None:
+        assert isinstance(model.residual.regression, ParameterRegression)
+        kept |= model.residual.regression.first(count).arrays(model.residual.times)
     config = {**checkpoint.config, "network": {**checkpoint.config["network"], "modes": count}}
     arrays = {**checkpoint.arrays, **kept, **space.arrays()}
     return replace(checkpoint, config=config, arrays=arrays), replace(data, space=space, reduced=reduced)

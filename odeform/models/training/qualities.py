@@ -9,11 +9,11 @@ import numpy as np
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.models.frontier import EXACT, FrontierPoint, cheapest_within_error, non_dominated
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.model import Model
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load_model
-from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE, motion_rmse
+from odeform.motion.trajectory import Trajectory
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Bools, Floats, Times
 
@@ -71,7 +71,7 @@ def measure_frontier(
     on beyond the window, the solver's error is that of its own motion: a correction may hide it, but it ends there.
     """
     evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(known.times[-1])
-    alone = model.integrate if isinstance(model, IntegratedModel) and model.continues_itself else model.trajectory
+    alone = model.integrate if isinstance(model, Model) and model.continues_itself else model.trajectory
 
     def motions(quality: SolverSettings, solve: Callable[..., Trajectory] = alone) -> tuple[Floats, float]:
         """(S, T, y), NaN where the integration failed, and the mean number of evaluations."""

@@ -8,21 +8,21 @@ from scipy.stats import t as student
 
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
-from odeform.models.kernel_search import ORDERS, search_ridge
-from odeform.models.latent.correction import PARTS, CorrectedPart, Correction
+from odeform.models.kernels.ridge import ORDERS, search_ridge
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load_model
+from odeform.models.residual import PARTS, ParameterRegression, RegressedPart
 from odeform.models.training.pruning import FINE
 from odeform.types import Floats
 
-__all__ = ["with_correction"]
+__all__ = ["with_residual"]
 
 LEFT_OUT = 1e-3
 CHANCE = 0.05  # most that the probability may be that a share of the ODE gains on validation by chance
 EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
 
 
-def with_correction(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
+def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
     """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
 
     Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the correction fades from
@@ -56,10 +56,10 @@ def with_correction(checkpoint: Checkpoint, data: TrainingData, fading: tuple[in
             parts[name] = part
     if not parts:
         return checkpoint
-    correction = Correction(times, data.space.coordinates, parts)
-    shares = {name: round(part.share, 3) for name, part in parts.items()}
-    config = {**checkpoint.config, "correction": {"share_of_ode": shares}}
-    return replace(checkpoint, config=config, arrays={**checkpoint.arrays, **correction.arrays()})
+    regression = ParameterRegression((len(times), data.space.coordinates), parts)
+    weights = {name: round(part.weight, 3) for name, part in parts.items()}
+    config = {**checkpoint.config, "correction": {"share_of_ode": weights}}
+    return replace(checkpoint, config=config, arrays={**checkpoint.arrays, **regression.arrays(times)})
 
 
 def _left(fading: tuple[int, int]) -> Floats:
@@ -79,7 +79,7 @@ def _fitted(
     motion: Mapping[str, Floats],
     searched: int,
     given: float | None,
-) -> tuple[CorrectedPart, float]:
+) -> tuple[RegressedPart, float]:
     """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
 
     Length scales, ridge and order are those of the first `searched` entries of the motions themselves: residuals on
@@ -96,8 +96,8 @@ def _fitted(
     # without validation, where what it predicts is compared with the ODE
     ridge = search_ridge(known, outputs, orders=ORDERS)[0]
 
-    alone = mean + ridge.predict(asked, known, truth["train"] - mean) - truth["val"]
-    added = motion["val"] - own - ridge.predict(asked, known, motion["train"] - own)
+    alone = mean + ridge.fit(known, truth["train"] - mean)(asked) - truth["val"]
+    added = motion["val"] - own - ridge.fit(known, motion["train"] - own)(asked)
     left = motion["val"] - truth["val"]
     weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
     share = given
@@ -115,9 +115,8 @@ def _fitted(
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
     count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
-    coefficients = ridge.weights(known, (u * sizes)[:, :count])
-    fitted = (known / ridge.scales, ridge.scales, coefficients, modes[:count], rest.mean(axis=0), share, ridge.order)
-    return CorrectedPart(*fitted), float(explained)
+    regression = ridge.fit(known, (u * sizes)[:, :count])
+    return RegressedPart(regression, modes[:count], rest.mean(axis=0), share), float(explained)
 
 
 def _chance(gained: Floats) -> float:

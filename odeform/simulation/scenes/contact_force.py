@@ -9,7 +9,7 @@ import numpy as np
 from odeform.geometry.contact import RADIUS, checked_contact
 from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
 from odeform.simulation.contact_draws import contact_draws
-from odeform.simulation.contacts import Contacts, vector_of
+from odeform.simulation.contacts import vector_of
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.objects.catalog import OBJECTS, get_object
@@ -18,6 +18,7 @@ from odeform.simulation.objects.tetrahedra import inside_out
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
 from odeform.simulation.stepping import run
+from odeform.surroundings import Contacts
 from odeform.types import Mesh, MotionSequence, Points, Vector
 
 __all__ = ["PULSE", "SCENE", "contact_and_force", "glyphs", "simulate", "simulate_object"]
@@ -150,11 +151,6 @@ def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
     return (Arrow(contact - 2.0 * RADIUS * direction - vector, vector, f"{strength:.1f} N", 0.0, PULSE),)
 
 
-def forces(name: str) -> tuple[float, float]:
-    """Weakest and strongest force on an object in newton; those of the first for an unknown one."""
-    return get_object(name if name in OBJECTS else OBJECTS[0]).forces
-
-
 def rest_mesh(name: str = OBJECTS[0]) -> Mesh:
     """The settled surface of an object."""
     return get_object(name).rest_mesh()
@@ -169,6 +165,6 @@ SCENE = Scene(
     fixed={"pulse_s": PULSE, "projectile_radius_m": RADIUS, "projectile_mass_kg": 0.020, "gravity_m_s2": GRAVITY},
     gravity=GRAVITY,
     glyphs=glyphs,
-    contacts=Contacts(forces, PULSE),
+    contacts=Contacts({name: get_object(name).forces for name in OBJECTS}, PULSE, RADIUS),
     sampler=sample,
 )

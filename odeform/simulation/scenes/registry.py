@@ -3,9 +3,11 @@
 from importlib import import_module
 
 from odeform.errors import InputError
+from odeform.schema import Schema
 from odeform.simulation.scene import Scene
+from odeform.surroundings import Surroundings
 
-__all__ = ["SCENES", "find_scene", "get_scene", "known_scenes"]
+__all__ = ["SCENES", "find_scene", "get_scene", "known_scenes", "surroundings_of"]
 
 SCENES: dict[str, str] = {
     "mass-elastic": "odeform.simulation.scenes.mass_elastic:SCENE",
@@ -40,3 +42,14 @@ def get_scene(name: str) -> Scene:
     if scene is None:
         raise InputError(f"unknown scene {name!r}: expected one of {', '.join(SCENES)}")
     return scene
+
+
+def surroundings_of(schema: Schema) -> Surroundings | None:
+    """What is around the bodies of a schema; None where it is not known, as for imported data.
+
+    Files of before schemas had surroundings have those of the scene of their name.
+    """
+    if schema.surroundings is not None:
+        return schema.surroundings
+    scene = find_scene(schema.scene)
+    return None if scene is None else scene.surroundings

@@ -12,7 +12,7 @@ from odeform.models.latent.training.start import build_network
 from odeform.models.training.continuation import with_continuation
 from odeform.models.training.pruning import without_modes
 from odeform.models.training.qualities import Validation, with_qualities
-from odeform.models.training.residual_fit import with_correction
+from odeform.models.training.residual_fit import with_residual
 from odeform.models.training.run import Run
 
 __all__ = ["train_latent"]
@@ -24,7 +24,7 @@ def train_latent(run: Run) -> Checkpoint:
     modes = data.space.basis.modes
     checkpoint = _trained_network(run, data)
     if "correction" not in run.request.without:
-        checkpoint = with_correction(checkpoint, data)
+        checkpoint = with_residual(checkpoint, data)
     checkpoint, data = without_modes(checkpoint, data)
     run.report(f"{data.space.basis.modes} of {modes} modes are needed")
     checkpoint = with_qualities(checkpoint, Validation.of(data))

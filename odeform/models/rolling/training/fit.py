@@ -17,17 +17,18 @@ from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, STATE
 from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.continuation import LATER_ERRORS
-from odeform.models.kernel_search import search_ridge
+from odeform.models.kernels.regression import KernelRegression
+from odeform.models.kernels.ridge import search_ridge
 from odeform.models.rolling.model import UNTURNED, RollingModel
 from odeform.models.rolling.readout import inputs_of
-from odeform.models.rolling.start import PUSHES, Start, push_inputs
+from odeform.models.rolling.start import PUSHES, push_inputs, start_arrays
 from odeform.models.rolling.training.contact_fit import ROBUST, STEP, Motions, fit_law, law_error_mm, roll_out
 from odeform.models.rolling.training.readout_fit import ReadoutRows, fit_readout
 from odeform.models.training.continuation import HELD_OUT
 from odeform.models.training.pruning import LARGE
 from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.request import TrainRequest
-from odeform.models.training.residual_fit import with_correction
+from odeform.models.training.residual_fit import with_residual
 from odeform.models.training.run import Run
 from odeform.motion.body import watched_body
 from odeform.motion.reduced_space import POSE, small_motion
@@ -89,7 +90,7 @@ def train_rolling(run: Run) -> Checkpoint:
     if "correction" not in run.request.without:
         free = data.first_free
         fading = (free + WHOLE, min(free + RINGING, len(data.times) - 1)) if free else None
-        checkpoint = with_correction(checkpoint, data, fading)
+        checkpoint = with_residual(checkpoint, data, fading)
     checkpoint = with_qualities(checkpoint, Validation.of(data), WITH_KINKS)
     if (later := later_errors(RollingModel(checkpoint), data)) is None:
         return checkpoint
@@ -133,7 +134,7 @@ def fit_rolling_body(
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "clearance_m": _clearance(data), "radius_m": radius}
     settings |= {"lowest_m": _lowest(data), "val": val, "qualities": {}}
-    return {**law.arrays(), **start.arrays(), **readout.arrays()}, settings
+    return {**law.arrays(), **start_arrays(start), **readout.arrays()}, settings
 
 
 def _steps(stages: Sequence[Stage], total: int | None) -> list[int]:
@@ -211,14 +212,15 @@ def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int
     return Motions(data.theta[split][:, materials], start, later, seen, frame)
 
 
-def _start(data: TrainingData, motions: dict[str, Motions]) -> Start:
+def _start(data: TrainingData, motions: dict[str, Motions]) -> KernelRegression:
     known, asked = (push_inputs(data.schema, data.theta[split]) for split in ("train", "val"))
     scale = np.repeat([1.0, RATES], MOVING) * np.tile([1.0, 1.0, data.space.gyration_radius], 2)
     states = {split: of.start[: 2 * MOVING].T for split, of in motions.items()}
     linear = np.linalg.lstsq(_with_one(known), states["train"], rcond=None)[0]
     rest = scale * (states["train"] - _with_one(known) @ linear)
     ridge = search_ridge(known, rest, (asked, scale * (states["val"] - _with_one(asked) @ linear)))[0]
-    return Start(known / ridge.scales, ridge.scales, ridge.weights(known, rest) / scale, linear)
+    regression = ridge.fit(known, rest)
+    return replace(regression, weights=regression.weights / scale, trend=linear)
 
 
 def _with_one(inputs: Floats) -> Float[np.ndarray, "motions rows"]:

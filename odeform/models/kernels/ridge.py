@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.linalg import cho_factor, cho_solve, get_lapack_funcs
 from scipy.optimize import minimize
 
-from odeform.models.matern import matern
+from odeform.models.kernels.regression import Kernel, KernelRegression
 from odeform.types import Floats
 
 __all__ = ["ORDERS", "Ridge", "search_ridge"]
@@ -22,50 +22,45 @@ SMOOTHER = 0.85  # share of the error of the first order that another may have a
 EVALUATIONS = 150  # of the error, from each start
 BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
 
-Parameters = Float[np.ndarray, "sequences parameters"]
+Inputs = Float[np.ndarray, "known inputs"]
 
 
 @dataclass(frozen=True, eq=False)
 class Ridge:
-    """The settings of a kernel ridge regression, and the `error` that they were chosen by."""
+    """A kernel and the ridge of a regression with it, and the `error` that they were chosen by."""
 
-    scales: Float[np.ndarray, " parameters"]
-    """Length scales, in units of the normalised parameters."""
+    kernel: Kernel
     ridge: float
     """Relative to the kernel's value at distance 0."""
-    order: int = ORDERS[0]
-    """Of the Matern kernel."""
     error: float = float("inf")
 
-    def weights(self, theta: Parameters, outputs: Float[np.ndarray, "sequences outputs"]) -> Floats:
-        """(S, outputs): what training outputs at `theta` (S, P) weigh in a prediction."""
-        return cho_solve(self._factor(theta), outputs)
+    def fit(self, x: Inputs, outputs: Float[np.ndarray, "known outputs"]) -> KernelRegression:
+        """The regression of outputs (S, M) on inputs (S, D)."""
+        return KernelRegression(self.kernel, x, cho_solve(self._factor(x), outputs))
 
-    def predict(self, asked: Floats, theta: Parameters, outputs: Floats) -> Float[np.ndarray, "asked outputs"]:
-        """Predictions at `asked` (A, P) from outputs at `theta` (S, P)."""
-        return self._kernel(asked, theta) @ self.weights(theta, outputs)
-
-    def rms(self, theta: Parameters, outputs: Floats, asked: Floats, expected: Floats) -> float:
-        """RMS error, over sequences, of outputs (S, outputs) at `theta` (S, P), each predicted from all the others
-        (Rasmussen and Williams 2006, 5.12), and of those `expected` (A, outputs) at `asked` (A, P)."""
-        factor, lower = self._factor(theta)
+    def leave_one_out(self, x: Inputs, outputs: Floats) -> tuple[Floats, KernelRegression]:
+        """(S, M) what each output differs by from what all the others predict (Rasmussen and Williams 2006, 5.12), and
+        the regression on all."""
+        factor, lower = self._factor(x)
         (invert,) = get_lapack_funcs(("potri",), (factor,))
         inverse = invert(factor, lower=lower)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         weights = inverse @ outputs
-        left_out = weights / np.diag(inverse)[:, None]
-        missed = self._kernel(asked, theta) @ weights - expected
-        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(theta) + len(asked)))
+        return weights / np.diag(inverse)[:, None], KernelRegression(self.kernel, x, weights)
 
-    def _kernel(self, one: Floats, other: Floats) -> Floats:
-        return matern(one / self.scales, other / self.scales, self.order)
+    def rms(self, x: Inputs, outputs: Floats, asked: Floats, expected: Floats) -> float:
+        """RMS error, over sequences, of outputs (S, M) at `x` (S, D), each predicted from all the others, and of those
+        `expected` (A, M) at `asked` (A, D)."""
+        left_out, regression = self.leave_one_out(x, outputs)
+        missed = regression(asked) - expected
+        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(x) + len(asked)))
 
-    def _factor(self, theta: Parameters) -> tuple[Floats, bool]:
-        return cho_factor(self._kernel(theta, theta) + self.ridge * np.eye(len(theta)), lower=True)
+    def _factor(self, x: Inputs) -> tuple[Floats, bool]:
+        return cho_factor(self.kernel(x, x) + self.ridge * np.eye(len(x)), lower=True)
 
 
 def search_ridge(
-    known: Parameters,
+    known: Inputs,
     outputs: Floats,
     val: tuple[Floats, Floats] | None = None,
     start: Ridge | None = None,
@@ -80,10 +75,10 @@ def search_ridge(
     """
     asked, expected = (known[:0], outputs[:0]) if val is None else val
 
-    def ridge(settings: Floats, order: int) -> Ridge:
-        return Ridge(np.exp(settings[:-1]), float(np.exp(settings[-1])), order)
+    def ridge(settings: Floats, order: int | None) -> Ridge:
+        return Ridge(Kernel(np.exp(settings[:-1]), order), float(np.exp(settings[-1])))
 
-    def objective(settings: Floats, order: int) -> float:
+    def objective(settings: Floats, order: int | None) -> float:
         try:
             return ridge(settings, order).rms(known, outputs, asked, expected)
         except np.linalg.LinAlgError:
@@ -92,11 +87,11 @@ def search_ridge(
     length, noise = BOUNDS
     limits = {"maxfev": EVALUATIONS, "xatol": 1e-2, "fatol": 1e-9}
     same = [np.full(known.shape[1], scale) for scale in STARTS]
-    starts = (start,) if start else [Ridge(scales, RIDGE, order) for order in orders for scales in same]
+    starts = (start,) if start else [Ridge(Kernel(scales, order), RIDGE) for order in orders for scales in same]
     found = []
     for one in starts:
-        begin = np.log([*one.scales, one.ridge])
+        begin, order = np.log([*one.kernel.scales, one.ridge]), one.kernel.order
         bounds = [*[length] * known.shape[1], noise]
-        trial = minimize(objective, begin, (one.order,), method="Nelder-Mead", bounds=bounds, options=limits)
-        found.append(replace(ridge(trial.x, one.order), error=float(trial.fun)))
-    return tuple(sorted(found, key=lambda trial: trial.error / (1.0 if trial.order == orders[0] else SMOOTHER)))
+        trial = minimize(objective, begin, (order,), method="Nelder-Mead", bounds=bounds, options=limits)
+        found.append(replace(ridge(trial.x, order), error=float(trial.fun)))
+    return tuple(sorted(found, key=lambda trial: trial.error / (1.0 if trial.kernel.order == orders[0] else SMOOTHER)))

@@ -12,10 +12,12 @@ from jaxtyping import Float
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import minimize
 
-from odeform.models.matern import matern, scaled_distance
+from odeform.models.kernels.functions import matern, scaled_distance
+from odeform.models.kernels.regression import Kernel, LinearTerm
+from odeform.models.kernels.ridge import Ridge
 from odeform.types import Floats
 
-__all__ = ["Kernel", "fit_kernel"]
+__all__ = ["MarginalLikelihood", "fit_kernel", "ridge_of"]
 
 STARTS = (1.0, 3.0)  # length scales that the search starts from, in standard deviations of the inputs
 NOISE = 1e-2  # where it starts, relative to the signal
@@ -28,39 +30,17 @@ Forces = Float[np.ndarray, "rows 3"]
 Outputs = Float[np.ndarray, "rows outputs"]
 
 
-@dataclass(frozen=True, eq=False)
-class Kernel:
-    """Logarithms of the settings: scales l (D,), noise, and for a linear term m (P,) of the first inputs, and v."""
-
-    logs: Float[np.ndarray, " settings"]
-    inputs: int
-    places: int
-    """P, the inputs that a linear term varies with; 0 without one."""
-
-    @property
-    def noise(self) -> float:
-        """Relative to the signal."""
-        return float(np.exp(self.logs[self.inputs]))
-
-    def __call__(
-        self,
-        x: Inputs,
-        force: Forces,
-        other: Float[np.ndarray, "columns inputs"],
-        other_force: Float[np.ndarray, "columns 3"],
-    ) -> Floats:
-        """(rows, columns) covariances between two sets of inputs and forces, in units of the signal."""
-        scales = np.exp(self.logs[: self.inputs])
-        out = matern(x / scales, other / scales)
-        if self.places:
-            places = np.exp(self.logs[self.inputs + 1 : -1])
-            near = matern(x[:, : self.places] / places, other[:, : self.places] / places)
-            out = out + np.exp(self.logs[-1]) * near * (force @ other_force.T)
-        return out
+def ridge_of(logs: Float[np.ndarray, " settings"], inputs: int, places: int) -> Ridge:
+    """The kernel and ridge of settings as files hold them: logarithms of the length scales (D,) and the ridge; with a
+    linear term, of its length scales (P,) and its variance as well."""
+    values = np.exp(logs.astype(float))
+    linear = LinearTerm(values[inputs + 1 : -1], float(values[-1])) if places else None
+    return Ridge(Kernel(values[:inputs], linear=linear), float(values[inputs]))
 
 
-def fit_kernel(x: Inputs, force: Forces, outputs: Outputs, linear: int) -> Kernel:
-    """The kernel of inputs x (S, D), forces (S, 3) and outputs (S, M), of the best of several starts.
+def fit_kernel(x: Inputs, force: Forces, outputs: Outputs, linear: int) -> Floats:
+    """The settings, as `ridge_of` reads them, for inputs x (S, D), forces (S, 3) and outputs (S, M): the best that
+    several starts find.
 
     `linear` is the number of first inputs that a term linear in the force varies with; 0 for none.
     """
@@ -70,14 +50,14 @@ def fit_kernel(x: Inputs, force: Forces, outputs: Outputs, linear: int) -> Kerne
     found = []
     for start in np.log(STARTS):
         begin = [*[start] * size, np.log(NOISE), *([*[start] * places, 0.0] if places else [])]
-        objective = _Objective(x, force, outputs, size, places)
+        objective = MarginalLikelihood(x, force, outputs, size, places)
         found.append(minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS}))
     best = min(found, key=lambda trial: trial.fun)
-    return Kernel(best.x, size, places)
+    return best.x
 
 
 @dataclass(frozen=True, eq=False)
-class _Objective:
+class MarginalLikelihood:
     """log |K| / S + log tr(Y' K^-1 Y), which is the negative log likelihood per output, and its gradient."""
 
     x: Inputs
@@ -87,18 +67,18 @@ class _Objective:
     places: int
 
     def __call__(self, logs: Floats) -> tuple[float, Floats]:
-        kernel, count = Kernel(logs, self.size, self.places), len(self.x)
-        covariance = kernel(self.x, self.force, self.x, self.force)
+        fit, count = ridge_of(logs, self.size, self.places), len(self.x)
+        both = np.concatenate([self.x, self.force], axis=1)
         try:
-            factor = cho_factor(covariance + kernel.noise * np.eye(count), lower=True)
+            factor = cho_factor(fit.kernel(both, both) + fit.ridge * np.eye(count), lower=True)
         except LinAlgError:
             return 1e9, np.zeros(len(logs))
         inverse = cho_solve(factor, np.eye(count))
         weights = inverse @ self.outputs
-        fit = float((self.outputs * weights).sum())
-        value = 2.0 * float(np.log(np.diag(factor[0])).mean()) + np.log(fit)
-        slope = inverse / count - weights @ weights.T / fit
-        gradient = [self._by_scales(logs[: self.size], self.x, slope), [kernel.noise * np.trace(slope)]]
+        power = float((self.outputs * weights).sum())
+        value = 2.0 * float(np.log(np.diag(factor[0])).mean()) + np.log(power)
+        slope = inverse / count - weights @ weights.T / power
+        gradient = [self._by_scales(logs[: self.size], self.x, slope), [fit.ridge * np.trace(slope)]]
         if self.places:
             where, places = self.x[:, : self.places], logs[self.size + 1 : -1]
             linear = np.exp(logs[-1]) * (self.force @ self.force.T) * slope

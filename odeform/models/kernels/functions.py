@@ -1,4 +1,5 @@
-"""Matern kernels of half-integer order (Rasmussen and Williams 2006, eq. 4.16), of inputs divided by length scales.
+"""Kernel functions of inputs divided by length scales: Gaussian, and Matern of half-integer order (Rasmussen and
+Williams 2006, eq. 4.16).
 
 The order p is the number of times that a function drawn from the Gaussian process can be differentiated: the kernel is
 Matern (p + 1/2), a polynomial of degree p times an exponential.
@@ -10,9 +11,15 @@ from math import factorial
 import numpy as np
 from jaxtyping import Float
 
-__all__ = ["matern", "matern_slope", "scaled_distance"]
+__all__ = ["gaussian", "matern", "matern_slope", "scaled_distance"]
 
 Inputs = Float[np.ndarray, "rows inputs"]
+
+
+def gaussian(one: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[np.ndarray, "rows columns"]:
+    """exp(-d^2 / 2), where d is the Euclidean distance."""
+    squares = (one**2).sum(axis=-1)[:, None] + (other**2).sum(axis=-1)
+    return np.exp(np.minimum(one @ other.T - 0.5 * squares, 0.0))
 
 
 def matern(

@@ -1,23 +1,23 @@
-"""The latent state of an object over time: integrated once, decoded at any time."""
+"""The state of an ODE over time: integrated once, read out at any time."""
 
 import time
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from odeform.cancellation import check_cancelled
-from odeform.models.latent.inference import Decoder
 from odeform.motion.base import SolveStats
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import motion_rmse
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Field
 from odeform.solver.solution import Solution, Status
-from odeform.types import Floats
+from odeform.types import Floats, Times
 
-__all__ = ["LatentTrajectory"]
+__all__ = ["Problem", "SolvedTrajectory"]
 
 MOMENTS = 128  # times at which the error of the solver is measured
 FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in ((1e-6, 1e-4), (1e-9, 0.0))}
@@ -25,48 +25,57 @@ FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in
 RECENT = 4  # results that are kept: pose, deformation and gradient of a time are evaluated one after the other
 
 
-class LatentTrajectory:
-    """A solved state z(t), decoded at the requested times. Later times extend it; nothing solved ever changes.
+class Problem(NamedTuple):
+    """An initial value problem dz/dt = field(t, z) of one motion, and what its states mean."""
+
+    field: Field
+    start: Floats
+    """(S,) the state at `begin`; its dtype is the precision."""
+    readout: Callable[[Times, Floats], Floats]
+    """(T,) seconds and states (T, S) there -> coordinates (T, 6 + K) in metres and radians."""
+    begin: float = 0.0
+    """Seconds; at times before it, the readout is given the state at it."""
+
+
+class SolvedTrajectory:
+    """A solved state z(t), read out at the requested times. Later times extend it; nothing solved ever changes.
 
     Where adaptive steps fail, the fixed steps of `fallback` take over from the last good state.
     """
 
     def __init__(
         self,
-        field: Field,
-        decode: Decoder,
-        start: Floats,
-        quality: SolverSettings,
+        problem: Problem,
+        settings: SolverSettings,
         fallback: SolverSettings,
         until: float,
         gyration_radius: float,
-        precise: Callable[[], tuple[Field, Floats]],
+        precise: Callable[[], Problem],
         finer: Mapping[SolverSettings, float] = MappingProxyType(FINER),
     ) -> None:
-        """Integrate from `start` (state,) at time 0 to `until` seconds.
+        """Integrate to `until` seconds.
 
-        `precise` returns the field and the start in double precision, to measure the error of the solution by `finer`
-        ones (`FINER`).
+        `precise` returns the problem in double precision, to measure the error of the solution by `finer` ones
+        (`FINER`).
         """
-        self._precise, self._finer = precise, finer
-        self._field, self._decode, self._gyration_radius = field, decode, gyration_radius
-        self._quality, self._fallback = quality, fallback
+        self._problem, self._precise, self._finer = problem, precise, finer
+        self._gyration_radius, self._settings, self._fallback = gyration_radius, settings, fallback
         begin = time.perf_counter()
         with np.errstate(all="ignore"):  # an overflow ends the integration with a status
-            self._solution, self._rest = integrate(field, start, quality, until), None
+            self._solution = integrate(problem.field, problem.start, settings, until, begin=problem.begin)
+            self._rest: Solution | None = None
             self._extend(until)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
-        self._origin = decode(np.zeros(1), start[None])
         self._span = until
         self._recent: Recent[Floats] = Recent(RECENT)
 
     def _extend(self, until: float) -> None:
         """Solve at least to `until` seconds, as far as possible."""
         with self._solution.lock:
-            first = integrate(self._field, self._solution.states[0], self._quality, until, begin=self._solution)
-            if first.status is not Status.OK and self._quality.tolerance is not None:
+            first = integrate(self._problem.field, self._problem.start, self._settings, until, begin=self._solution)
+            if first.status is not Status.OK and self._settings.tolerance is not None:
                 begin = first.end if self._rest is None else self._rest
-                self._rest = integrate(self._field, first.states[-1], self._fallback, until, begin=begin)
+                self._rest = integrate(self._problem.field, first.states[-1], self._fallback, until, begin=begin)
 
     def _sample(self, times: Floats) -> Floats:
         """(T, state) at `times` that are solved."""
@@ -92,13 +101,13 @@ class LatentTrajectory:
     def reduced(self, times: Floats) -> Floats:
         """(T,) seconds -> (T, 6 + K), read-only; zero at time 0."""
         requested = np.asarray(times, dtype=float)
-        return self._recent.get(requested.tobytes(), lambda: self._decoded(requested))
+        return self._recent.get(requested.tobytes(), lambda: self._read_out(requested))
 
-    def _decoded(self, times: Floats) -> Floats:
+    def _read_out(self, times: Floats) -> Floats:
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))
         # y(0) = 0 bit-exactly: a product over many rows rounds differently from that over one
-        y = (self._decode(times, self._sample(times)) - self._origin) * (times > 0.0)[:, None]
+        y = self._problem.readout(times, self._sample(times)) * (times > 0.0)[:, None]
         y.flags.writeable = False
         return y
 
@@ -110,16 +119,18 @@ class LatentTrajectory:
         """
         if self._last.status is not Status.OK or self._rest is not None:
             return None
-        field, start = self._precise()
-        times = np.linspace(0.0, self._span, MOMENTS + 1)[1:]
-        mine = self._decode(times, self._solution.sample(times))
+        problem = self._precise()
+        times = np.linspace(problem.begin, self._span, MOMENTS + 1)[1:]
+        mine = self._problem.readout(times, self._solution.sample(times))
         error = None
         for finer, enough in self._finer.items():
             with np.errstate(all="ignore"):
-                other = integrate(field, start, finer, self._span, before_step=check_cancelled)
+                other = integrate(
+                    problem.field, problem.start, finer, self._span, problem.begin, before_step=check_cancelled
+                )
             if other.status is not Status.OK:
                 break
-            truth = self._decode(times, other.sample(times))
+            truth = problem.readout(times, other.sample(times))
             error = 1e3 * motion_rmse(mine, truth, self._gyration_radius)
             if error >= enough:
                 break
@@ -129,7 +140,7 @@ class LatentTrajectory:
     def stats(self) -> SolveStats:
         """Solver, steps and elapsed time; if the solver failed, where, and the fixed steps computed instead."""
         first, rest = self._solution, self._rest
-        solver, status = _describe(self._quality), self._last.status.value
+        solver, status = _describe(self._settings), self._last.status.value
         steps, evaluations = first.steps, first.evaluations
         if rest is not None:
             failed = f"{solver} failed at t = {first.end:.3f} s: {first.status.value}"

@@ -1,0 +1,55 @@
+"""Keeps a motion out of the floor."""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.motion.trajectory import Trajectory
+from odeform.types import Floats, Times
+
+__all__ = ["FloorProjection"]
+
+MOST = 0.01  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
+
+
+class FloorProjection:
+    """Raises a body where its motion takes it deeper into the floor than it may be: an `Adjustment`.
+
+    Springs of the floor stand for the compression of what rests on it, so a leg under load sinks. Where that is more
+    than the floor allows, the rest of the motion is nevertheless right: the body is raised by what is too much.
+    """
+
+    def __init__(
+        self,
+        own: Trajectory,
+        lowest: Callable[[Floats], Floats],
+        limit: float,
+        grid: Float[np.ndarray, " grid"] | None = None,
+    ) -> None:
+        """`lowest` maps coordinates (T, 6 + K) of `own` to the height of the lowest point (T,) in m, which may be
+        `limit`.
+
+        With `grid`, in s, the change is linear between these times, and stays as it is after them.
+        """
+        self._own, self._lowest, self._limit, self._grid = own, lowest, limit, grid
+
+    def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "times y"]:
+        """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K)."""
+        by = self._by(y) if self._grid is None else np.interp(times, self._grid, self._on_grid)
+        if by.any():
+            y = y.copy()
+            y[:, 2] += by
+        return y
+
+    @cached_property
+    def _on_grid(self) -> Floats:
+        """(G,) m at the times of the grid."""
+        assert self._grid is not None
+        return self._by(self._own.reduced(self._grid))
+
+    def _by(self, y: Floats) -> Floats:
+        """(T,) m by which coordinates (T, 6 + K) are raised."""
+        deeper = self._limit - self._lowest(y)
+        return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite

@@ -1,0 +1,96 @@
+"""Reduced coordinates over time, and trajectories that are made of others."""
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.locks import Lock
+from odeform.motion.base import SolveStats
+from odeform.types import Floats, Times
+
+__all__ = ["Adjusted", "Adjustment", "Piecewise", "Trajectory"]
+
+Adjustment = Callable[[Times, Floats], Floats]
+"""(T,) seconds and coordinates (T, n) there -> coordinates (T, m)."""
+
+
+@runtime_checkable
+class Trajectory(Protocol):
+    """Reduced coordinates over time. The result for a time never depends on earlier requests."""
+
+    @property
+    def stats(self) -> SolveStats:
+        """How the trajectory was computed."""
+        ...
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which the trajectory is valid; later times show the state at that time."""
+        ...
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) seconds -> (T, 6 + K)."""
+        ...
+
+
+class Adjusted:
+    """The coordinates of another trajectory, changed moment by moment."""
+
+    def __init__(self, own: Trajectory, adjust: Adjustment) -> None:
+        self.own, self._adjust = own, adjust
+
+    @property
+    def stats(self) -> SolveStats:
+        """How `own` was computed."""
+        return self.own.stats
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which `own` is valid."""
+        return self.own.last_good
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) s -> (T, 6 + K)."""
+        return self._adjust(times, self.own.reduced(times))
+
+
+class Piecewise:
+    """One trajectory up to `stop` seconds, and from there on another, which is made when it is first asked for."""
+
+    def __init__(self, own: Trajectory, stop: float, make_later: Callable[[], Trajectory]) -> None:
+        """`make_later` is called at most once, and not if `own` fails before `stop`: it then stays at its last state.
+
+        The later trajectory is asked for times after `stop` only.
+        """
+        self.own, self._stop, self._make_later = own, stop, make_later
+        self._later: Trajectory | None = None
+        self._lock = Lock()
+
+    @property
+    def stats(self) -> SolveStats:
+        """How `own` was computed."""
+        return self.own.stats
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which it is valid, as far as it is known."""
+        good = self.own.last_good
+        return good if good < self._stop or self._later is None else self._later.last_good
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) s -> (T, 6 + K)."""
+        times = np.asarray(times, dtype=float)
+        later = times > self._stop
+        if not later.any() or self.own.last_good < self._stop:
+            return self.own.reduced(np.minimum(times, self._stop))
+        with self._lock:
+            if self._later is None:
+                self._later = self._make_later()
+        after = self._later.reduced(times[later])
+        if later.all():
+            return after
+        y = np.empty((len(times), after.shape[1]))
+        y[~later], y[later] = self.own.reduced(times[~later]), after
+        return y
