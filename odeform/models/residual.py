@@ -6,7 +6,7 @@ with the ODE in place of the cheap simulation. The regression is that of the tra
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +25,7 @@ PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(
 """Columns of y that are regressed together."""
 
 
+@runtime_checkable
 class FrameRegression(Protocol):
     """A regression of whole motions."""
 

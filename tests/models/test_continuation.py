@@ -8,7 +8,7 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
 from odeform.models.base import Predictor
-from odeform.models.continuation import PREFIX, ContinuedTrajectory, Dynamics
+from odeform.models.continuation import PREFIX, Dynamics, continued
 from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load
 from odeform.models.training.continuation import fit_dynamics
@@ -70,26 +70,26 @@ def pair(dataset: Dataset, predictors: dict[str, Predictor]) -> tuple[LatentMode
 
 def test_free_flight_goes_on_exactly(flying: Dynamics) -> None:
     assert np.allclose(flying.gravity, GRAVITY / RATE**2, rtol=1e-9)
-    motion = ContinuedTrajectory(Given(), flying, np.zeros(1), WINDOW)
+    motion = continued(Given(), flying, np.zeros(1), WINDOW)
     times = np.linspace(0.0, 1.3, 97)
     assert np.abs(motion.reduced(times) - flight(times)).max() < 1e-9
 
 
 def test_a_motion_that_failed_stays(flying: Dynamics) -> None:
-    motion = ContinuedTrajectory(Given(last_good=0.4), flying, np.zeros(1), WINDOW)
+    motion = continued(Given(last_good=0.4), flying, np.zeros(1), WINDOW)
     assert motion.last_good == 0.4
     assert np.array_equal(motion.reduced(np.array([0.45, 0.7, 1.0])), flight(np.full(3, 0.4)))
 
 
 def test_the_window_is_as_it_was(pair: tuple[LatentModel, LatentModel]) -> None:
-    stopped, continued = (model.solve(None, {"mass": 0.6}) for model in pair)
+    stopped, moving = (model.solve(None, {"mass": 0.6}) for model in pair)
     window = pair[0].schema.window
     inside = np.linspace(0.0, window.stop, 333)
-    assert np.array_equal(continued.vertices(inside), stopped.vertices(inside))
+    assert np.array_equal(moving.vertices(inside), stopped.vertices(inside))
     # together with later times too
     later = np.append(inside, window.stop * np.array([1.2, 3.0]))
-    assert np.array_equal(continued.vertices(later)[:333], stopped.vertices(later)[:333])
-    assert np.abs(continued.vertices(later)[-2:] - stopped.vertices(later)[-2:]).max() > 1e-5
+    assert np.array_equal(moving.vertices(later)[:333], stopped.vertices(later)[:333])
+    assert np.abs(moving.vertices(later)[-2:] - stopped.vertices(later)[-2:]).max() > 1e-5
 
 
 def test_it_goes_on_without_a_jump(pair: tuple[LatentModel, LatentModel]) -> None:

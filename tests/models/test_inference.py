@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.solver import integrate as solver
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Status
@@ -26,7 +26,7 @@ def pole(_: float, state: Floats) -> Floats:
 
 
 def decode(times: Floats, states: Floats) -> Floats:
-    return np.concatenate([np.zeros((len(times), 6)), states], axis=1)
+    return np.concatenate([np.zeros((len(times), 6)), states - 1.0], axis=1)
 
 
 @pytest.fixture(autouse=True)
@@ -34,9 +34,9 @@ def _few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solver, "MAX_STEPS", 400)
 
 
-def solve(field: Field, quality: SolverSettings, until: float) -> LatentTrajectory:
-    start = np.array([1.0])
-    return LatentTrajectory(field, decode, start, quality, FIXED, until, 0.1, lambda: (field, start))
+def solve(field: Field, quality: SolverSettings, until: float) -> SolvedTrajectory:
+    problem = Problem(field, np.array([1.0]), decode)
+    return SolvedTrajectory(problem, quality, FIXED, until, 0.1, lambda: problem)
 
 
 @pytest.mark.parametrize("method", ["bosh3", "dopri5"])

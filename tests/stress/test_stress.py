@@ -17,9 +17,9 @@ from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.models.base import Predictor
 from odeform.models.continuation import without_continuation
-from odeform.models.latent.latent_trajectory import LatentTrajectory
 from odeform.models.latent.model import LatentModel
 from odeform.models.registry import load
+from odeform.models.solved import SolvedTrajectory
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.simulation.physics import energy_gained
 from odeform.solver import registry
@@ -161,12 +161,12 @@ def test_non_finite_frames_are_not_shown_but_counted_without_the_watch(
     # motions that nothing else stops before
     cases = [c for c, outcome in zip(_some_cases(model), outcomes, strict=True) if "stopped" not in outcome.status]
     assert len(cases) > 1
-    sound = LatentTrajectory.reduced
+    sound = SolvedTrajectory.reduced
 
-    def broken(self: LatentTrajectory, times: np.ndarray) -> np.ndarray:
+    def broken(self: SolvedTrajectory, times: np.ndarray) -> np.ndarray:
         return sound(self, times) * np.where(times > 1.02, np.nan, 1.0)[:, None]
 
-    monkeypatch.setattr(LatentTrajectory, "reduced", broken)
+    monkeypatch.setattr(SolvedTrajectory, "reduced", broken)
     outcomes = _outcomes(model, cases)
     assert [outcome.non_finite for outcome in outcomes] == [0] * len(cases)
     assert all("stopped: it is not finite" in outcome.status for outcome in outcomes)
@@ -244,7 +244,7 @@ def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, m
             assert plot.sound[:, i, j].tolist() == sound
     picture = np.asarray(map_image(plot))
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
-    monkeypatch.setattr(LatentTrajectory, "last_good", property(lambda _: 1.02))
+    monkeypatch.setattr(SolvedTrajectory, "last_good", property(lambda _: 1.02))
     failed = stability_map(model, reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert failed.sound[:2].any()
     assert not failed.sound[2].any()

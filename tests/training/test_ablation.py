@@ -23,9 +23,9 @@ def trained(dataset: Dataset, out: Path, *without: str) -> LatentModel:
 def test_without_an_ode_the_state_stays(dataset: Dataset, tmp_path: Path) -> None:
     model = trained(dataset, tmp_path / "a.safetensors", "ode", "correction")
     theta = np.zeros(model.config.parameters)
-    field, start, _ = model.problem(theta, model.evaluate_basis(model.rest, 0.0), np.float64)
+    field, start, *_ = model.problem(theta, model.evaluate_basis(model.rest, 0.0), np.float64)
     assert not field(0.1, start + 1.0).any()
-    assert model.correction is None
+    assert model.residual is None
 
 
 @pytest.mark.slow

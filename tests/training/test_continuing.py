@@ -12,7 +12,7 @@ from odeform.dataset.store import open_dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
 from odeform.models.base import Predictor
-from odeform.models.continuation import Dynamics, Regression, without_continuation
+from odeform.models.continuation import Dynamics, spread_regression, without_continuation
 from odeform.models.latent.model import LatentModel
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load, load_model
@@ -75,8 +75,8 @@ def test_what_does_not_foretell_is_not_kept(
     def falling(theta: Floats, reduced: Floats, gyration_radius: float) -> Dynamics:
         counts.append(reduced.shape[1])
         width = 2 + 6 + theta.shape[1] + 3
-        pose = Regression(np.zeros((0, width - 3)), np.zeros((0, 6)))
-        deformation = Regression(np.zeros((0, width)), np.zeros((0, reduced.shape[2] - 6)))
+        pose = spread_regression(np.zeros((0, width - 3)), np.zeros((0, 6)))
+        deformation = spread_regression(np.zeros((0, width)), np.zeros((0, reduced.shape[2] - 6)))
         return Dynamics(np.array([0.0, 0.0, -1.0]), 0.0, 1.0, np.ones(width), pose, deformation)
 
     monkeypatch.setattr(continuation, "fit_dynamics", falling)

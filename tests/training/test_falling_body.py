@@ -78,7 +78,7 @@ def test_a_corrected_motion_goes_on_without_a_jump(seen: Predictor) -> None:
         seen.qualities["reference"],
         seen.schema.window.stop,
     )
-    assert seen.correction is None or seen.correction.stop == stop
+    assert seen.residual is None or seen.residual.stop == stop
     for mass in (-0.9, 0.0, 0.9):
         motion = seen.trajectory(np.array([mass]), evaluated, settings, stop + 0.2)
         times = stop + np.linspace(-0.02, 0.02, 81)

@@ -125,7 +125,7 @@ def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, mo
     part = predictor.parts["donut"]
     assert isinstance(part, ModalModel)
     assert part.law == LAW
-    assert part.correction is None
+    assert part.residual is None
     assert not laws.path.exists(), "it is of no use any more"
 
 

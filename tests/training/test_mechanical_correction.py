@@ -6,11 +6,11 @@ import pytest
 from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.step import Projectile
 from odeform.models.contact.inputs import ContactInputs
-from odeform.models.contact.regression import PARTS
-from odeform.models.modal.correction import Correction
+from odeform.models.modal.contact_residual import PushRegression, contact_residual
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.training.pushes import Pushes, _projection
 from odeform.models.modal.training.residual_fit import fit_correction
+from odeform.models.residual import PARTS
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
 from odeform.types import Floats
@@ -53,13 +53,14 @@ def test_each_part_is_predicted_by_what_knows_it() -> None:
     arrays, settings = fit_correction(train, val, MechanicalLaw(), 0.04)
     assert settings["shares"]["shift"] == 0.0
     assert settings["shares"]["deformation"] == 1.0
-    correction = Correction({"times": train.times, **arrays}, settings)
-    np.testing.assert_allclose(correction.gains, GAINS, rtol=0.15)
-    assert correction.gains[2] > 1.7
-    np.testing.assert_array_equal(correction.kept[:POSE], np.repeat([0.0, settings["shares"]["rotation"]], 3))
-    np.testing.assert_array_equal(correction.kept[POSE:], correction.gains)
+    residual = contact_residual({"times": train.times, **arrays}, settings)
+    assert isinstance(residual.regression, PushRegression)
+    np.testing.assert_allclose(residual.regression.scale, GAINS, rtol=0.15)
+    assert residual.regression.scale[2] > 1.7
+    np.testing.assert_array_equal(residual.weight[:POSE], np.repeat([0.0, settings["shares"]["rotation"]], 3))
+    np.testing.assert_array_equal(residual.weight[POSE:], residual.regression.scale)
     push = ContactInputs(val.contacts[:1], val.normals[:1], val.forces[:1])
-    rest = correction.over_time(push)(val.times)
+    rest = residual.over_time(push)(val.times)
     error = rest[:, :3] - val.reduced[0, :, :3]
     assert np.abs(error).max() < 0.1 * np.abs(val.reduced[0, :, :3]).max()
     tried = {(trial["part"], trial["share"]): trial["error"] for trial in settings["trials"]}
@@ -69,13 +70,13 @@ def test_each_part_is_predicted_by_what_knows_it() -> None:
 
 def test_a_share_that_is_none_is_refused() -> None:
     arrays, settings = fit_correction(pushes(0), pushes(1), MechanicalLaw(), 0.04)
-    with pytest.raises(ValueError, match="expected shares from 0 to 1"):
-        Correction(arrays, {**settings, "shares": {**settings["shares"], "shift": 1.5}})
+    with pytest.raises(ValueError, match="expected ODE weights from 0 to 1"):
+        contact_residual(arrays, {**settings, "shares": {**settings["shares"], "shift": 1.5}})
     with pytest.raises(ValueError, match="expected 3 gains"):
-        Correction({**arrays, "gains": np.ones(2)}, settings)
+        contact_residual({**arrays, "gains": np.ones(2)}, settings)
     # files of before shares and gains were fitted have none
     old = {key: array for key, array in arrays.items() if key != "gains"}
-    np.testing.assert_array_equal(Correction(old, {"blend": settings["blend"]}).kept, np.ones(POSE + MODES))
+    np.testing.assert_array_equal(contact_residual(old, {"blend": settings["blend"]}).weight, np.ones(POSE + MODES))
 
 
 def test_vertices_without_weight_do_not_count() -> None:

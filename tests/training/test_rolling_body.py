@@ -110,8 +110,8 @@ def test_damaged_checkpoints_are_refused(predictor: Predictor, damaged: str) -> 
 @pytest.mark.slow
 def test_later_motions_are_those_of_the_ode_alone(predictor: Predictor) -> None:
     assert isinstance(predictor, RollingModel)
-    assert predictor.correction is not None
-    end, theta = predictor.correction.stop, np.array([0.2, -0.3, 0.5])
+    assert predictor.residual is not None
+    end, theta = predictor.residual.stop, np.array([0.2, -0.3, 0.5])
     assert 0.1 < end < 0.5 * predictor.schema.window.stop
     evaluated, quality = predictor.evaluate_basis(predictor.rest, 0.0), predictor.qualities["reference"]
     corrected = predictor.trajectory(theta, evaluated, quality, 1.0)

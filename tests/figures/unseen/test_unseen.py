@@ -16,7 +16,7 @@ from odeform.models.contact.regression import PARTS
 from odeform.models.error_band import NOMINAL
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.model import ModalModel
-from odeform.models.modal.transferred_residual import CarriedCorrection, shape_distance, share_at
+from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
 from odeform.models.modal.user_body import UserBodyPredictor, resting_body
 from odeform.models.per_object import PerObject, joined
 from odeform.simulation.contacts import vector_of
@@ -114,7 +114,7 @@ def test_distance_does_not_depend_on_where_a_shape_stands_and_less_is_carried_ov
     aside = Mesh(body.points + np.float32([0.1, 0.0, 0.0]), body.faces)
     taller = Mesh(body.points * np.float32([1.0, 1.0, 1.5]), body.faces)
     assert shape_distance(aside, body) < 1e-3 < shape_distance(taller, body)
-    assert 1.0 >= share_at(0.0) > share_at(0.1) > 0.0
+    assert 1.0 >= transfer_weight(0.0) > transfer_weight(0.1) > 0.0
 
 
 def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: UserBodyPredictor) -> None:
@@ -123,11 +123,11 @@ def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: User
     part = PerObject(_corrected(checkpoint, gains, times), ModalModel).parts["donut"]
     assert isinstance(part, ModalModel)
     body = donut.own.body
-    same = CarriedCorrection(part, body, 0.5)
-    np.testing.assert_allclose(same.kept[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
-    np.testing.assert_allclose(same.kept[18:], 1.5)  # its other modes are stiffer than all of the trained body
-    stiffer = CarriedCorrection(part, replace(body, squares=1e9 * body.squares), 0.5)
-    np.testing.assert_allclose(stiffer.kept[6:], 1.5)
+    same = transferred_residual(part, body, 0.5)
+    np.testing.assert_allclose(same.weight[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
+    np.testing.assert_allclose(same.weight[18:], 1.5)  # its other modes are stiffer than all of the trained body
+    stiffer = transferred_residual(part, replace(body, squares=1e9 * body.squares), 0.5)
+    np.testing.assert_allclose(stiffer.weight[6:], 1.5)
 
 
 def _corrected(checkpoint: Checkpoint, gains: Floats, times: Floats) -> Checkpoint:

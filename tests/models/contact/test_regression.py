@@ -8,8 +8,9 @@ from scipy.optimize import approx_fprime
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.baselines.gp import GaussianProcess
 from odeform.models.contact.inputs import FRAMES, ContactInputs, contact_inputs, has_contact
-from odeform.models.contact.kernel import _Objective, fit_kernel
-from odeform.models.contact.regression import EXPERTS, PARTS, ContactRegression
+from odeform.models.contact.regression import EXPERTS, ContactRegression
+from odeform.models.kernels.likelihood import MarginalLikelihood, fit_kernel
+from odeform.models.residual import PARTS
 from odeform.simulation.scenes.registry import get_scene
 
 
@@ -61,7 +62,7 @@ def test_what_turns_with_the_push_about_the_vertical_axis_keeps_its_inputs(frame
 def test_the_gradient_of_the_likelihood(linear: int) -> None:
     rng = np.random.default_rng(1)
     x, force = rng.normal(size=(20, 6)), rng.normal(size=(20, 3))
-    objective = _Objective(x, force, x[:, :4] + 0.1 * rng.normal(size=(20, 4)), 6, linear)
+    objective = MarginalLikelihood(x, force, x[:, :4] + 0.1 * rng.normal(size=(20, 4)), 6, linear)
     logs = 0.3 * rng.normal(size=7 + (linear + 1 if linear else 0))
     numeric = approx_fprime(logs, lambda at: objective(at)[0], 1e-6)
     assert np.allclose(objective(logs)[1], numeric, atol=1e-6)
@@ -70,8 +71,8 @@ def test_the_gradient_of_the_likelihood(linear: int) -> None:
 def test_an_input_without_effect_gets_a_long_length_scale() -> None:
     rng = np.random.default_rng(2)
     x = rng.normal(size=(60, 2))
-    kernel = fit_kernel(x, np.zeros((60, 3)), np.sin(2.0 * x[:, :1]), 0)
-    assert kernel.logs[1] > kernel.logs[0] + np.log(2.0)
+    logs = fit_kernel(x, np.zeros((60, 3)), np.sin(2.0 * x[:, :1]), 0)
+    assert logs[1] > logs[0] + np.log(2.0)
 
 
 def test_a_scene_with_contacts_is_regressed_in_their_frame(data: TrainingData, fitted: tuple) -> None:

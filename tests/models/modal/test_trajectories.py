@@ -1,19 +1,20 @@
 """What is done to motions of the mechanics: a share of them, a regression of the rest, and a lift out of the floor."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
-from odeform.models.modal.correction import kept_of
+from odeform.models.residual import Residual, weight_of
 from odeform.motion.base import SolveStats
-from odeform.motion.corrected_trajectory import CorrectedTrajectory
-from odeform.motion.lifted_trajectory import MOST, LiftedTrajectory
+from odeform.motion.floor_projection import MOST, FloorProjection
+from odeform.motion.trajectory import Adjusted
 from odeform.types import Floats
 
 STOP = 0.2  # s
 SPEED = np.array([1.0, 2.0, -3.0, 0.1, 0.2, 0.3, 0.01, 0.02])
-KEPT = kept_of({"shift": 0.5, "rotation": 1.0, "deformation": 0.8}, np.array([1.0, 2.5]))
+KEPT = weight_of({"shift": 0.5, "rotation": 1.0, "deformation": 0.8}, np.array([1.0, 2.5]))
 
 
 STATS = SolveStats("none", 0, 0, 0, "ok", 0.0, lambda: None)
@@ -30,8 +31,21 @@ class Steady:
         return times[:, None] * SPEED
 
 
-def corrected() -> CorrectedTrajectory:
-    return CorrectedTrajectory(Steady(), KEPT, lambda times: 1.0 + 0.0 * times[:, None] * SPEED, STOP)
+class Constant:
+    """Adds one to every coordinate."""
+
+    def frames(self, inputs: None) -> Floats:
+        return np.ones((5, len(SPEED)))
+
+
+def corrected() -> Adjusted:
+    own, residual = Steady(), Residual(np.linspace(0.0, STOP, 5), KEPT, Constant())
+    return Adjusted(own, residual.adjustment(own, None))
+
+
+def projected(lowest: Callable[[Floats], Floats], limit: float, grid: Floats) -> Adjusted:
+    own = Steady()
+    return Adjusted(own, FloorProjection(own, lowest, limit, grid))
 
 
 def test_a_part_has_its_share_of_the_mechanics_and_each_coefficient_its_gain() -> None:
@@ -57,7 +71,7 @@ def test_a_body_is_lifted_by_what_is_too_deep(grid: float) -> None:
     def lowest(y: Floats) -> Floats:
         return 0.05 * y[:, 2]  # a leg that sinks at 0.15 m/s
 
-    lifted = LiftedTrajectory(Steady(), lowest, limit, knots)
+    lifted = projected(lowest, limit, knots)
     times = np.array([0.01, 0.1])
     below, deep = lowest(Steady().reduced(times)) - limit
     assert below > 0.0 > deep > -MOST
@@ -71,6 +85,6 @@ def test_what_is_lost_is_not_lifted() -> None:
     def nowhere(y: Floats) -> Floats:
         return np.where(np.arange(len(y)) % 2, -1.0, np.nan)
 
-    lifted = LiftedTrajectory(Steady(), nowhere, 0.0, np.linspace(0.0, STOP, 9))
+    lifted = projected(nowhere, 0.0, np.linspace(0.0, STOP, 9))
     times = np.linspace(0.0, STOP, 5)
     np.testing.assert_array_equal(lifted.reduced(times), Steady().reduced(times))
