@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
-from odeform.formats.ply import columns, ply_properties, read_ply_tables
+from odeform.formats.ply import Table, columns, ply_properties, read_header
+from odeform.formats.ply_data import read_tables
+
+
+def read_ply_tables(path: Path) -> dict[str, Table]:
+    return read_tables(path, read_header(path))
+
 
 ROWS = np.array([[1.5, -2.0, 3.25], [0.1, 1e-3, -7.0]])
 

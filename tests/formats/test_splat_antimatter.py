@@ -70,7 +70,7 @@ def test_refuses(tmp_path: Path) -> None:
     header = b"ply\nformat ascii 1.0\n%s\nend_header\n"
     files = {
         ("a.splat", "32 bytes a splat, got 153"): drawn().tobytes()[:-7],
-        ("b.splat", "at least 2 points, got 0"): b"",
+        ("b.splat", "an empty file"): b"",
         ("c.splat", "at least 2 points, got 1"): drawn(1).tobytes(),
         ("d.splat", "3 of 5 points are not finite"): mostly.tobytes(),
         ("e.splat", "coincide"): together.tobytes(),
