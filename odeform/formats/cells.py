@@ -1,5 +1,6 @@
 """Finite elements as a surface: the faces of solid cells that no other cell shares, or the cells that are faces."""
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,9 @@ SOLID: dict[str, tuple[tuple[int, ...], ...]] = {
     "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
     "voxel": ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (1, 3, 7, 5), (3, 2, 6, 7), (2, 0, 4, 6)),
     "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
-    "prism": ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     "pyramid": ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
-"""Faces of solid cells, counter-clockwise from outside. VTK's wedge and Gmsh's prism are turned differently."""
+"""Faces of solid cells, all counter-clockwise from outside, or all from inside where a cell is turned inside out."""
 FLAT = {"triangle": (0, 1, 2), "quad": (0, 1, 2, 3), "pixel": (0, 1, 3, 2)}
 """Corners of flat cells, around the cell."""
 
@@ -64,7 +64,7 @@ def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) ->
     if solid and flat:
         notes.append(f"{sum(len(group.counts) for group in flat):,} faces beside the solid cells left out")
     if solid:
-        corners, counts = _boundary(solid)
+        corners, counts = _boundary(points, solid)
     elif flat:
         corners, counts = _faces(flat)
     else:
@@ -73,19 +73,33 @@ def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) ->
     return Mesh(points, corners[triangles], None, tuple(notes))
 
 
-def _boundary(groups: list[Cells]) -> tuple[Ints, Ints]:
-    """Corners and sizes of the faces that belong to one cell alone."""
+def _boundary(points: Floats, groups: list[Cells]) -> tuple[Ints, Ints]:
+    """Corners and sizes of the faces that belong to one cell alone, counter-clockwise from outside."""
     rows = []
     for group in groups:
         nodes = group.corners.reshape(len(group.counts), -1)
+        inside_out = _volumes(points, nodes, SOLID[group.kind]) < 0.0  # programs number wedges in two ways
         for face in SOLID[group.kind]:
             corners = nodes[:, face]
+            corners[inside_out] = corners[inside_out][:, ::-1]
             # -1 fills the rows of triangles up to those of quads
             rows.append(np.pad(corners, ((0, 0), (0, 4 - len(face))), constant_values=-1))
     faces = np.concatenate(rows)
     _, first, number = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     outer = faces[np.sort(first[number == 1])]
     return outer[outer >= 0], (outer >= 0).sum(axis=1)
+
+
+def _volumes(points: Floats, nodes: Ints, faces: tuple[tuple[int, ...], ...]) -> Floats:
+    """(C,) six times the volumes of cells, whose corners are `nodes` (C, K)."""
+    places = np.asarray(points, dtype=float)[nodes]
+    places = places - places.mean(axis=1, keepdims=True)
+    total = np.zeros(len(nodes))
+    for first, *others in faces:
+        for one, two in itertools.pairwise(others):
+            a, b, c = (places[:, corner] for corner in (first, one, two))
+            total += np.einsum("ci,ci->c", a, np.cross(b, c))
+    return total
 
 
 def _faces(groups: list[Cells]) -> tuple[Ints, Ints]:

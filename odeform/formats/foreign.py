@@ -16,7 +16,8 @@ UNREAD = {
 }
 """Formats that are not read -> what to convert them to."""
 ARCHIVES = {b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"7z\xbc\xaf\x27\x1c": "7z", b"Rar!": "rar", b"BZh": "bzip2"}
-ARCHIVED = (".sog", ".spz")  # formats that are archives themselves
+ARCHIVED = {".sog": "zip", ".spz": "gzip"}
+"""Formats that are archives themselves."""
 PAGES = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
@@ -39,5 +40,5 @@ def require_content(head: bytes, suffix: str, where: str) -> None:
     if start[:20].lower().startswith(PAGES):
         raise InputError(f"{where}: expected {suffix}, got a page of HTML: download the file itself")
     kind = next((name for magic, name in ARCHIVES.items() if head.startswith(magic)), "")
-    if kind and suffix not in ARCHIVED:
+    if kind and ARCHIVED.get(suffix) != kind:
         raise InputError(f"{where}: expected {suffix}, got a {kind} archive: unpack it first")

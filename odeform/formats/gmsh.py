@@ -30,7 +30,7 @@ KINDS = {
     **dict.fromkeys((3, 10, 16, 36, 37), ("quad", 4)),
     **dict.fromkeys((4, 11, 29, 30, 31), ("tetrahedron", 4)),
     **dict.fromkeys((5, 12, 17, 92, 93), ("hexahedron", 8)),
-    **dict.fromkeys((6, 13, 18), ("prism", 6)),
+    **dict.fromkeys((6, 13, 18), ("wedge", 6)),
     **dict.fromkeys((7, 14, 19), ("pyramid", 5)),
     15: ("vertex", 1),
 }

@@ -40,7 +40,7 @@ def read_off(path: Path, merge: bool) -> Mesh:
         raise InputError(f"{where}: expected OFF in the first line, got an empty file")
     first = rows[lines[0]].strip()
     # the keyword may be missing, or share its line with the numbers
-    found = KEYWORD.fullmatch(b"OFF " + first if first[:1].isdigit() else first)
+    found = KEYWORD.fullmatch(first) or (KEYWORD.fullmatch(b"OFF " + first) if first[:1].isdigit() else None)
     if found is None or b"BINARY" in found[6] or found[4] or found[5]:
         raise InputError(
             f"{where}: expected text that starts with OFF, COFF, NOFF or STOFF, got {first[:40].decode('latin-1')!r}"

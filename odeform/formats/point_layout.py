@@ -57,7 +57,7 @@ class Layout:
 
     def spaced(self, line: bytes) -> bytes:
         """A line with spaces between its words, and decimal points. An empty cell counts as not a number."""
-        line = line.replace(b'"', b"").partition(b"#")[0]
+        line = line.replace(b'"', b"").partition(b" #")[0]
         if self.comma:
             line = line.replace(b",", b".")
         if self.separator == b" ":

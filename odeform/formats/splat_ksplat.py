@@ -76,11 +76,12 @@ def read_ksplat(path: Path, merge: bool) -> GaussianSplats:
         raise InputError(f"{where}: expected {room:,} headers of sections, got {len(data):,} bytes: truncated?")
     require_memory(where, f"{int(head['splats']):,} splats", SPLAT_BYTES * int(head["splats"]))
     level, parts = LEVELS[head["level"]], []
+    limits = float(head["low"]) or -RANGE, float(head["high"]) or RANGE
     for part in np.frombuffer(data, PART, room, HEADER):
         if part["degree"] > 3:
             raise InputError(f"{where}: expected harmonics of degree 3 at most, got {part['degree']}")
         if part["splats"]:
-            parts.append(_section(data, start, part, level, (head["low"] or -RANGE, head["high"] or RANGE), where))
+            parts.append(_section(data, start, part, level, limits, where))
         row = level.row(int(part["degree"]))
         start += (
             row.itemsize * int(part["room"]) + int(part["stored"]) * int(part["buckets"]) + 4 * int(part["partial"])
