@@ -47,13 +47,13 @@ def read_corners(lines: Lines, is_vertex: NDArray[np.bool_], where: str) -> Corn
         raise InputError(f"{where}: line {where_faces[-1] + 1}: a face of {counts[-1]} corners: truncated?")
     written, texture = _references(text, counts, where, where_faces + 1)
     face = np.repeat(np.arange(len(counts)), counts)
-    vertex = _absolute(written, np.cumsum(is_vertex)[where_faces][face])
+    vertex = _absolute(written, np.cumsum(is_vertex, dtype=np.int64)[where_faces][face])
     wrong = np.flatnonzero((vertex < 0) | (vertex >= is_vertex.sum()))
     if len(wrong):
         line = where_faces[face[wrong[0]]] + 1
         raise InputError(f"{where}: line {line}: refers to vertex {written[wrong[0]]}, of {is_vertex.sum()}")
     if texture is not None:
-        before = np.cumsum(lines.starting(b"vt"))[where_faces][face]
+        before = np.cumsum(lines.starting(b"vt"), dtype=np.int64)[where_faces][face]
         texture = np.where(texture == NONE, -1, _absolute(texture, before))
     whole = counts >= 3
     if whole.all():

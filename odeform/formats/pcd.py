@@ -48,7 +48,7 @@ def read_pcd(path: Path, merge: bool) -> PointCloud:
     else:
         table = _binary(content[header.start :], header, where)
     xyz = np.stack([table[name].reshape(len(table)) for name in "xyz"], axis=1)
-    known = np.isfinite(xyz).all(axis=1)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(xyz).all(axis=1))
     colors = _colors(table)
     notes = [] if known.all() else [f"{(~known).sum():,} of {len(known):,} points left out, not finite"]
     others = [

@@ -100,7 +100,7 @@ def _binary_lists(data: NDArray[np.uint8], start: int, element: Element, order: 
     if len(places) < element.rows:
         raise _short(path, element, len(data) - start)
     counts = np.zeros_like(places)
-    position, end, raw = start, len(data), memoryview(data)
+    position, end, raw = start, len(data), data.data
     kinds = [order.replace("=", "<") + entry.count if entry.count else "" for entry in element.properties]
     byteorder = "little" if order == "<" else "big"
     for row in range(element.rows):

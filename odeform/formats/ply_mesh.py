@@ -77,9 +77,9 @@ def _numbers(rows: Rows, name: str) -> NDArray[Any] | None:
 def _triangles(rows: dict[str, Rows], points: Floats, where: str) -> tuple[Ints, Faces, Ints]:
     """Corners (C,), triangles (F, 3) of them, and the face (F,) of each; of strips, -1."""
     faces, strips = rows.get("face", {}), rows.get("tristrips", {})
-    lists = next((faces[name] for name in CORNERS if isinstance(faces.get(name), Lists)), None)
+    lists = _corner_lists(faces)
     if lists is None:
-        strip = next((strips[name] for name in CORNERS if isinstance(strips.get(name), Lists)), None)
+        strip = _corner_lists(strips)
         if strip is None:
             if any(isinstance(entry, Lists) and len(entry.counts) for entry in faces.values()):
                 raise InputError(f"{where}: expected faces with a list {CORNERS[0]}, got {', '.join(faces)[:100]}")
@@ -92,6 +92,10 @@ def _triangles(rows: dict[str, Rows], points: Floats, where: str) -> tuple[Ints,
     _require_vertices(corners, len(points), where)
     triangles, polygon = triangulated(points, corners, lists.counts)
     return corners, triangles, polygon
+
+
+def _corner_lists(rows: Rows) -> Lists | None:
+    return next((found for name in CORNERS if isinstance(found := rows.get(name), Lists)), None)
 
 
 def _whole(values: NDArray[Any], where: str) -> Ints:
@@ -154,8 +158,8 @@ def _coordinates(rows: dict[str, Rows], corners: Ints, triangles: Faces, polygon
     """(F, 3, 2) texture coordinates of the corners; None without."""
     lists = rows.get("face", {}).get("texcoord")
     if isinstance(lists, Lists):
-        faces = next(found for name in CORNERS if isinstance(found := rows["face"].get(name), Lists))
-        if np.array_equal(lists.counts, 2 * faces.counts):
+        faces = _corner_lists(rows["face"])
+        if faces is not None and np.array_equal(lists.counts, 2 * faces.counts):
             return lists.values.reshape(-1, 2)[triangles].astype(float)
     for names in COORDINATES:
         found = [_numbers(rows["vertex"], name) for name in names]

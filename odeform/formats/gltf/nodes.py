@@ -3,7 +3,7 @@
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.5, and the extension EXT_mesh_gpu_instancing.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -100,10 +100,10 @@ class Scene:
             document.item("nodes", root)
         self.world = self._descend({root: np.eye(4) for root in roots}, self._hidden)
 
-    def _descend(self, roots: dict[int, Floats], hidden: set[int]) -> dict[int, Floats]:
+    def _descend(self, roots: Mapping[int, Floats], hidden: set[int]) -> dict[int, Floats]:
         """The places of `roots`, whose parents are at the given ones, and of all nodes below them."""
         out: dict[int, Floats] = {}
-        waiting = [(index, matrix, False) for index, matrix in reversed(roots.items())]
+        waiting = [(index, matrix, False) for index, matrix in reversed([*roots.items()])]
         while waiting:
             index, parent, unseen = waiting.pop()
             if index in out:
