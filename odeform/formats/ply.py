@@ -95,7 +95,9 @@ def read_header(path: Path) -> Header:
             case ["element", name, rows, *_] if rows.isascii() and rows.isdigit() and len(rows) < 16:
                 properties = []
                 elements.append((name, int(rows), properties))
-            case ["property", "list", count, kind, name] if elements and {count, kind} <= {*TYPES}:
+            case ["property", "list", count, kind, name] if (
+                elements and kind in TYPES and TYPES.get(count, "f")[0] != "f"
+            ):
                 properties.append(Property(name, TYPES[kind], TYPES[count]))
             case ["property", kind, name] if elements and kind in TYPES:
                 properties.append(Property(name, TYPES[kind]))

@@ -13,7 +13,7 @@ __all__ = ["Layout", "find_layout"]
 COMMENTS = (b"#", b"//", b"%", b"!")
 MOST_HEADER = 100  # lines that are looked at
 NUMBER = re.compile(rb"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
-COMMA_NUMBER = re.compile(rb"[+-]?\d+,\d+([eE][+-]?\d+)?|[+-]?\d+")
+COMMA_NUMBER = re.compile(rb"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 NAMES = {
     **{
         f"{prefix}{axis}": axis
@@ -59,7 +59,7 @@ class Layout:
         """A line with spaces between its words, and decimal points. An empty cell counts as not a number."""
         line = line.replace(b'"', b"").partition(b" #")[0]
         if self.comma:
-            line = line.replace(b",", b".")
+            line = line.replace(b", ", b" ").rstrip(b",").replace(b",", b".")
         if self.separator == b" ":
             return line
         words = [word.strip() or b"nan" for word in line.rstrip(b" " + self.separator).split(self.separator)]
@@ -73,7 +73,7 @@ def find_layout(text: bytes, where: str) -> Layout:
     for index, raw in enumerate(text.split(b"\n", MOST_HEADER)[:MOST_HEADER]):
         line = raw.strip()
         bare = line.lstrip(b"#/%! ")
-        if not line:
+        if not line or line.lower().startswith(b"sep="):
             continue
         separator, comma = _separator(bare)
         words = _words(bare, separator)
@@ -106,9 +106,9 @@ def _first(names: tuple[str, ...], words: list[bytes], where: str) -> tuple[str,
 def _separator(line: bytes) -> tuple[bytes, bool]:
     """What separates the columns of a line, and whether its numbers have decimal commas."""
     if b";" in line:
-        return b";", b"," in line and b"." not in line
-    words = line.split()
-    if b"," in line and len(words) >= 2 and all(COMMA_NUMBER.fullmatch(word) for word in words):
+        return b";", b"." not in line
+    words = _words(line, b" ")
+    if len(words) >= 2 and all(map(COMMA_NUMBER.fullmatch, words)) and any(b"," in word for word in words):
         return b" ", True
     return (b",", False) if b"," in line else (b" ", False)
 
@@ -116,7 +116,7 @@ def _separator(line: bytes) -> tuple[bytes, bool]:
 def _words(line: bytes, separator: bytes) -> list[bytes]:
     line = line.replace(b'"', b"")
     if separator == b" ":
-        return line.split()
+        return [word.rstrip(b",") for word in line.split()]
     return [word.strip() for word in line.rstrip(b" " + separator).split(separator)]
 
 

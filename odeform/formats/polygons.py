@@ -88,13 +88,17 @@ def _ears(shape: Floats, normal: Floats) -> Faces | None:
 def _with_straight_corners(faces: Ints, count: int) -> Ints:
     """Triangles of all `count` corners of a polygon: ear clipping leaves out those at which it goes straight on."""
     used = np.unique(faces)
-    out = [tuple(face) for face in faces.tolist()]
+    if len(used) == count:
+        return faces
+    third = {(face[k], face[k - 2]): face[k - 1] for face in faces.tolist() for k in range(3)}
+    out = {tuple(sorted(face)): face for face in faces.tolist()}
     for corner, following in zip(used.tolist(), np.roll(used, -1).tolist(), strict=True):
         between = [(corner + step) % count for step in range(1, (following - corner) % count)]
-        edges = [(face, k) for face in out for k in range(3) if (face[k], face[k - 2]) == (corner, following)]
-        if between and edges:
-            face, k = edges[0]
+        apex = third.get((corner, following))
+        if between and apex is not None:
+            # a fan in place of the triangle at that edge; its other edges now belong to the outer triangles of the fan
             chain = [corner, *between, following]
-            out.remove(face)
-            out += [(a, b, face[k - 1]) for a, b in itertools.pairwise(chain)]
-    return np.array(out)
+            out.pop(tuple(sorted((corner, following, apex))), None)
+            out |= {tuple(sorted((a, b, apex))): [a, b, apex] for a, b in itertools.pairwise(chain)}
+            third[apex, corner], third[following, apex] = chain[1], chain[-2]
+    return np.array([*out.values()])

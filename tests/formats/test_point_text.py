@@ -34,6 +34,8 @@ HABITS = {
     "semicolons": (ROWS.replace(" ", ";"), None),
     "decimal commas and semicolons": (ROWS.replace(" ", ";").replace(".", ","), None),
     "decimal commas and tabs": (ROWS.replace(" ", "\t").replace(".", ","), None),
+    "decimal commas, commas and spaces": (ROWS.replace(".", ",").replace(" ", ", "), None),
+    "Excel's first line": ("sep=;\n" + ROWS.replace(" ", ";").replace(".", ","), None),
     "decimal commas and spaces": (ROWS.replace(".", ","), None),
     "a count": ("3\n" + ROWS, None),
     "comments": ("# made here\n% or there\n" + ROWS, None),
@@ -91,3 +93,8 @@ REFUSED = {
 def test_refused_with_its_line(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError, match=REFUSED[text]):
         _read(tmp_path / "a.xyz", text)
+
+
+def test_whole_numbers_before_decimal_commas(tmp_path: Path) -> None:
+    cloud = _read(tmp_path / "a.csv", "0;0;0\n1,5;2;3\n1e2;0;,5\n")
+    np.testing.assert_array_equal(cloud.points, np.array([[0, 0, 0], [1.5, 2, 3], [100, 0, 0.5]], np.float32))

@@ -121,11 +121,11 @@ class Document:
         item = self.item("buffers", index)
         assert isinstance(index, int)
         if index not in self._buffers:
-            for name in COMPRESSED:
-                if self.extension(item, name):  # a place for what the extension would unpack
-                    raise InputError(self._compressed(name))
             uri = item.get("uri")
             data = self._binary if uri is None and index == 0 else None
+            for name in COMPRESSED:
+                if uri is None and data is None and self.extension(item, name):  # a place for what it would unpack
+                    raise InputError(self._compressed(name))
             if isinstance(uri, str):
                 data = self.read_beside(uri)
             if data is None:

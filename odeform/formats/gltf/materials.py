@@ -22,6 +22,8 @@ __all__ = ["Materials"]
 
 WRAPS = {33071: CLAMP, 33648: MIRROR, 10497: REPEAT}
 OTHER_SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "KHR_texture_basisu", "MSFT_texture_dds")
+TOPS = {5121: 255.0, 5123: 65535.0}
+"""Largest colors by the type of their components."""
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
 
 
@@ -62,7 +64,10 @@ class Materials:
             return None
         document, index = self._document, attributes["COLOR_0"]
         width = 4 if document.item("accessors", index).get("type") == "VEC4" else 3
-        return read_floats(document, index, width, count)[:, :3]
+        colors = read_floats(document, index, width, count)[:, :3]
+        # bytes that are not said to be fractions are those of a program that forgot to
+        top = TOPS.get(document.number(document.item("accessors", index), "componentType"), 1.0)
+        return colors / top if colors.max(initial=0.0) > 1.0 else colors
 
     def _sampled(self, use: Tree, attributes: Tree, count: int) -> Floats | None:
         """(N, 3) linear colors of a texture at the vertices; None, with a note, where there are none."""
