@@ -1,11 +1,14 @@
 """Files that lie beside a shape: materials and textures that it names."""
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
-__all__ = ["file_beside", "read_image"]
+__all__ = ["file_beside", "pixels_of", "read_image"]
 
 
 def file_beside(path: Path, name: str) -> Path | None:
@@ -25,10 +28,13 @@ def file_beside(path: Path, name: str) -> Path | None:
     return None
 
 
-def read_image(paths: Sequence[Path], name: str, notes: list[str]) -> Image.Image | None:
-    """The texture `name` beside the first of `paths` that has it. Where it cannot be read, `notes` say so, once."""
+def read_image(paths: Sequence[Path], name: str, notes: list[str]) -> NDArray[np.uint8] | None:
+    """The texture `name` beside the first of `paths` that has it, (H, W, 3) in sRGB.
+
+    Where it cannot be read, `notes` say so, once.
+    """
     file = next((file for path in paths if (file := file_beside(path, name))), None)
-    image = _image(file) if file else None
+    image = pixels_of(file) if file else None
     if image is None:
         note = f"the texture {name[:100]} left out: {'its image cannot be read' if file else 'no such file'}"
         if note not in notes:
@@ -36,11 +42,10 @@ def read_image(paths: Sequence[Path], name: str, notes: list[str]) -> Image.Imag
     return image
 
 
-def _image(file: Path) -> Image.Image | None:
+def pixels_of(file: Path | BytesIO) -> NDArray[np.uint8] | None:
+    """An image as (H, W, 3) in sRGB; None where it cannot be read."""
     try:
-        image = Image.open(file)
-        image.load()
+        return np.asarray(Image.open(file).convert("RGB"))
     except Exception:
         # Pillow raises anything on a broken file
         return None
-    return image

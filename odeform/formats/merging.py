@@ -3,14 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
-import trimesh
+from jaxtyping import Int
 
-from odeform.types import Geometry, Mesh
+from odeform.types import Geometry, Ints, Mesh
 
 __all__ = ["centred", "merged"]
 
 UNIT = (1e-3, 1e6)
-"""Largest coordinates for which trimesh merges vertices as they are."""
+"""Largest coordinates that are rounded as they are."""
+STEPS = 1e8  # of a unit
+MIX = tuple(np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64))
+SHIFT = np.uint64(31)
 LOSS = 1e-5  # of the extent; single precision may round coordinates by as much
 
 
@@ -34,12 +37,42 @@ def centred(geometry: Geometry) -> Geometry:
 
 
 def merged(mesh: Mesh) -> Mesh:
-    """Vertices that coincide become one, and those of no face are left out.
+    """Vertices that coincide become one, and those of no face are left out. The others keep their order.
 
-    trimesh compares vertices as integers, which overflow far from the unit scale.
+    Coordinates coincide where they are equal after rounding to 1e-8, in units of the largest one where that is far from
+    the unit scale.
     """
     scale = float(np.abs(mesh.points).max(initial=0.0)) or 1.0
     scale = 1.0 if UNIT[0] < scale < UNIT[1] else scale
-    made = trimesh.Trimesh(mesh.points / scale, mesh.faces, process=False)
-    made.merge_vertices()
-    return replace(mesh, points=np.asarray(made.vertices) * scale, faces=np.asarray(made.faces))
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[mesh.faces] = True
+    points = mesh.points if used.all() else mesh.points[used]
+    first, same = _distinct(np.rint(np.asarray(points, dtype=float) * (STEPS / scale)).astype(np.int64))
+    if used.all():
+        return mesh if len(first) == len(points) else replace(mesh, points=points[first], faces=same[mesh.faces])
+    place = np.cumsum(used) - 1
+    return replace(mesh, points=points[first], faces=same[place[mesh.faces]])
+
+
+def _distinct(rows: Int[np.ndarray, "rows 3"]) -> tuple[Ints, Ints]:
+    """The first (M,) of all equal rows, in order, and the place (N,) of each row among them."""
+    hashes = np.zeros(len(rows), np.uint64)
+    for column, factor in zip(rows.view(np.uint64).T, MIX, strict=True):
+        hashes = (hashes + column) * factor
+        hashes ^= hashes >> SHIFT  # else the mirror image of a point has the same one
+    order = np.argsort(hashes, kind="stable")
+    fresh = np.ones(len(rows), dtype=bool)
+    fresh[1:] = hashes[order[1:]] != hashes[order[:-1]]
+    if fresh.all():
+        return np.arange(len(rows)), np.arange(len(rows))
+    equal = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    if not (fresh[1:] | equal).all():  # two rows of one hash
+        _, first, same = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+        same = same.reshape(-1)
+    else:
+        first, same = order[fresh], np.empty(len(rows), np.int64)
+        same[order] = np.cumsum(fresh) - 1
+    in_file = np.argsort(first)
+    rank = np.empty(len(first), np.int64)
+    rank[in_file] = np.arange(len(first))
+    return first[in_file], rank[same]

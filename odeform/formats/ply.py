@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["Element", "Header", "Property", "Table", "columns", "ply_properties", "read_header"]
+__all__ = ["Element", "Header", "Property", "Table", "columns", "read_header"]
 
 Table = NDArray[Any]
 """(rows,) structured array with one named column per property."""
@@ -73,12 +73,6 @@ class Header:
     textures: tuple[str, ...]
     start: int
     lines: int
-
-
-def ply_properties(path: Path) -> set[str]:
-    """Names of the properties of all elements; empty if this is not a PLY file."""
-    lines, _ = _header(path)
-    return {words[-1] for words in map(str.split, lines) if words and words[0] == "property"}
 
 
 def read_header(path: Path) -> Header:

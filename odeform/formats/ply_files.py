@@ -6,7 +6,7 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.formats.meshes import exported_bytes, mesh_bytes
-from odeform.formats.ply import ply_properties, read_header
+from odeform.formats.ply import read_header
 from odeform.formats.ply_data import read_tables
 from odeform.formats.ply_mesh import read_ply_mesh
 from odeform.formats.splat_compressed import compressed_splats
@@ -22,7 +22,8 @@ SPLAT_PROPERTIES = {"f_dc_0", "rot_0", "packed_position"}
 def read_ply(path: Path, merge: bool) -> Geometry:
     """Splats where the properties of the file say so, else a mesh, or points where it has no faces."""
     header = read_header(path)
-    if not ply_properties(path) & SPLAT_PROPERTIES:
+    names = {entry.name for element in header.elements for entry in element.properties}
+    if not names & SPLAT_PROPERTIES:
         return read_ply_mesh(path, header, merge)
     tables = read_tables(path, header)
     if "vertex" not in tables:

@@ -10,7 +10,7 @@ import numpy as np
 
 from odeform.budget import MEMORY, read_limited, require_memory
 from odeform.errors import InputError
-from odeform.formats.text import numbers_of, plain_text, words_per_line
+from odeform.formats.text import Lines, numbers_of, plain_text, words_per_line
 from odeform.types import Floats, Mesh
 
 __all__ = ["read_stl"]
@@ -63,28 +63,24 @@ def _binary_corners(data: bytes, count: int, where: str) -> tuple[Floats, list[s
 
 
 def _text_corners(data: bytes, where: str) -> Floats:
-    text = plain_text(data)
-    lower = text.lower()
-    # a number of triangles in the header, and names of solids, may hold any word
-    lines = [line.strip() for line in lower.split(b"\n")]
-    chosen = [index for index, line in enumerate(lines) if line.startswith(b"vertex")]
-    numbers = b"\n".join(lines[index][6:] for index in chosen) + b"\n"
-    facets = sum(line.startswith(b"facet") for line in lines)
-    if not chosen and b"vertex" not in lower:
+    text = plain_text(data).lower()
+    lines = Lines(text)
+    chosen, facets = lines.starting(b"vertex"), int(lines.starting(b"facet").sum())
+    count, at = int(chosen.sum()), np.flatnonzero(chosen) + 1
+    if b"vertex" not in text:
         raise InputError(f"{where}: expected facets of a text STL, got none")
-    if len(re.findall(rb"\bvertex\b", lower)) != len(chosen):  # several in a line
-        return _loose_corners(lower, where)
-    at = np.array(chosen) + 1
-    counts = words_per_line(numbers)
-    values = numbers_of(numbers, where, at)
+    if text.count(b"vertex") != count and len(re.findall(rb"\bvertex\b", text)) != count:  # several in a line
+        return _loose_corners(text, where)
+    numbers = lines.without(chosen, b"vertex")
+    counts, values = words_per_line(numbers), numbers_of(numbers, where, at)
     if (counts != 3).any():
         odd = int(np.argmax(counts != 3))
         cut = ": truncated?" if odd == len(counts) - 1 else ""
         raise InputError(f"{where}: line {at[odd]}: expected three numbers of a vertex, got {counts[odd]}{cut}")
-    if len(chosen) != 3 * facets or not any(line.startswith(b"endsolid") for line in lines):
-        missing = "" if len(chosen) != 3 * facets else " and no endsolid"
+    if count != 3 * facets or not lines.starting(b"endsolid").any():
+        missing = "" if count != 3 * facets else " and no endsolid"
         raise InputError(
-            f"{where}: expected three vertices for each facet, got {len(chosen)} for {facets}{missing}: truncated?"
+            f"{where}: expected three vertices for each facet, got {count} for {facets}{missing}: truncated?"
         )
     return values.reshape(-1, 3, 3)
 

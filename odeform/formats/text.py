@@ -76,17 +76,23 @@ class Lines:
         self.data = np.frombuffer(self.text, np.uint8)
         self.stops = np.flatnonzero(self.data == NEWLINE)
         self.starts = np.concatenate([[0], self.stops[:-1] + 1])
+        self._first = self.data[self.starts]
 
     def __len__(self) -> int:
         return len(self.starts)
 
     def starting(self, word: bytes) -> NDArray[np.bool_]:
         """(L,) whether each line starts with `word` and a space or its end follows."""
-        found = self.starts + len(word) <= self.stops
-        for offset, letter in enumerate(word):
-            found &= self.data[np.minimum(self.starts + offset, len(self.data) - 1)] == letter
-        following = self.data[np.minimum(self.starts + len(word), len(self.data) - 1)]
-        return found & ((following == SPACE) | (following == NEWLINE))
+        at = np.flatnonzero(self._first == word[0])
+        for offset, letter in enumerate(word[1:], 1):
+            at = at[self._byte(self.starts[at] + offset) == letter]
+        following = self._byte(self.starts[at] + len(word))
+        found = np.zeros(len(self), dtype=bool)
+        found[at[(following == SPACE) | (following == NEWLINE)]] = True
+        return found
+
+    def _byte(self, places: Ints) -> NDArray[np.uint8]:
+        return self.data[np.minimum(places, len(self.data) - 1)]
 
     def line(self, index: int) -> str:
         """A line as text."""
@@ -111,8 +117,7 @@ def words_per_line(text: bytes) -> Ints:
     first = ~gap
     first[1:] &= gap[:-1]
     stops = np.flatnonzero(data == NEWLINE)
-    total = np.cumsum(first)[stops]
-    return np.diff(total, prepend=0)
+    return np.diff(np.searchsorted(np.flatnonzero(first), stops), prepend=0)
 
 
 def require_words(counts: Ints, expected: Sequence[int], where: str, lines: Ints, what: str) -> None:

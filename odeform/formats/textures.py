@@ -1,8 +1,7 @@
 """Images as colors of a surface."""
 
 import numpy as np
-from jaxtyping import Float, Int
-from PIL import Image
+from jaxtyping import Float, Int, UInt8
 
 from odeform.types import Floats, Ints
 
@@ -12,14 +11,15 @@ REPEAT, CLAMP, MIRROR = "repeat", "clamp", "mirror"
 
 
 def sampled(
-    image: Image.Image, uv: Float[np.ndarray, "vertices 2"], wraps: tuple[str, str] = (REPEAT, REPEAT)
+    pixels: UInt8[np.ndarray, "height width 3"],
+    uv: Float[np.ndarray, "vertices 2"],
+    wraps: tuple[str, str] = (REPEAT, REPEAT),
 ) -> Float[np.ndarray, "vertices 3"]:
-    """sRGB colors, 0 to 255, of an image at coordinates (N, 2) from 0 at its lower left to 1 at its upper right.
+    """sRGB colors, 0 to 255, of an image (H, W, 3) at coordinates (N, 2): 0 at its lower left, 1 at its upper right.
 
     Colors are interpolated between the four nearest pixels. Beyond 0 and 1 the image is repeated, mirrored or held, in
     each direction as `wraps` says. Coordinates that are not finite count as 0.
     """
-    pixels = np.asarray(image.convert("RGB"))
     uv = np.where(np.isfinite(uv), uv, 0.0)
     u, v = _wrapped(uv[:, 0], wraps[0]), _wrapped(uv[:, 1], wraps[1])
     left, right, across = _between(u, pixels.shape[1])

@@ -8,9 +8,10 @@ import io
 
 import numpy as np
 from jaxtyping import UInt8
-from PIL import Image
+from numpy.typing import NDArray
 
 from odeform.errors import InputError
+from odeform.formats.beside import pixels_of
 from odeform.formats.colors import to_linear, to_srgb
 from odeform.formats.gltf.accessors import read_floats
 from odeform.formats.gltf.document import Document, Tree
@@ -32,7 +33,7 @@ class Materials:
 
     def __init__(self, document: Document) -> None:
         self._document = document
-        self._images: dict[int, Image.Image | None] = {}
+        self._images: dict[int, NDArray[np.uint8] | None] = {}
 
     def colors(self, primitive: Tree, count: int) -> UInt8[np.ndarray, "vertices 3"] | None:
         """sRGB colors of `count` vertices; None where neither they nor a material have any."""
@@ -100,7 +101,7 @@ class Materials:
         cos, sin = np.cos(angle), np.sin(angle)
         return (uv * scale) @ np.array([[cos, -sin], [sin, cos]]) + offset
 
-    def _image(self, texture: Tree) -> Image.Image | None:
+    def _image(self, texture: Tree) -> NDArray[np.uint8] | None:
         document = self._document
         index, kind = texture.get("source"), ""
         for name in OTHER_SOURCES:
@@ -116,7 +117,7 @@ class Materials:
             self._images[index] = self._read(source, kind)
         return self._images[index]
 
-    def _read(self, source: Tree, kind: str) -> Image.Image | None:
+    def _read(self, source: Tree, kind: str) -> NDArray[np.uint8] | None:
         document, uri = self._document, source.get("uri")
         if isinstance(uri, str):
             data, name = document.read_beside(uri), "" if uri.startswith("data:") else f" {uri[:100]}"
@@ -125,11 +126,7 @@ class Materials:
         if data is None:
             document.note(f"the texture{name} left out: no such file")
             return None
-        try:
-            image = Image.open(io.BytesIO(data))
-            image.load()
-            return image
-        except Exception:
-            # Pillow raises anything on a broken file
+        pixels = pixels_of(io.BytesIO(data))
+        if pixels is None:
             document.note(f"the texture{name}{kind} left out: its image cannot be read")
-            return None
+        return pixels
