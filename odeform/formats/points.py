@@ -66,7 +66,7 @@ def _plain(path: Path) -> Floats | None:
 
 def _cloud(table: Floats, layout: Layout, notes: list[str]) -> PointCloud:
     names = layout.names
-    places = [names.index(name) for name in "xyz"] if names else [0, 1, 2]
+    places = [names.index(name) for name in "xyz"] if names else slice(3)
     colors = (
         [names.index(name) for name in ("red", "green", "blue")] if "red" in names else _unnamed_colors(table, names)
     )

@@ -113,7 +113,7 @@ def _validated(geometry: Geometry, path: Path) -> Geometry:
     points = geometry.points
     if len(points) < 2:
         raise InputError(f"geometry {path}: expected at least 2 points, got {len(points)}")
-    extent = float(np.ptp(points.astype(float), axis=0).max())
+    extent = float(max(np.ptp(column.astype(float)) for column in points.T))
     if extent <= 0.0:
         raise InputError(f"geometry {path}: all {len(points)} points coincide")
     if not EXTENT[0] <= extent <= np.abs(points).max(initial=extent) <= EXTENT[1]:

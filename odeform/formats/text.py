@@ -17,6 +17,7 @@ __all__ = ["Lines", "numbers_of", "plain_text", "read_text", "require_words", "w
 
 
 SPACE, NEWLINE = 32, 10
+DEEPEST = 16  # spaces before a word
 
 
 def read_text(path: Path) -> bytes:
@@ -68,22 +69,34 @@ class Lines:
 
     Attributes:
         data: The text, as bytes (M,).
-        starts: (L,) where each line starts; `stops` where its line feed is.
+        starts: (L,) where the first word of each line starts; `stops` where its line feed is.
     """
 
     def __init__(self, text: bytes) -> None:
-        self.text = re.sub(rb"(?m)^ +", b"", text) if text[:1] == b" " or b"\n " in text else text
-        self.data = np.frombuffer(self.text, np.uint8)
+        self._take(text)
+        indented = np.flatnonzero(self._first() == SPACE)
+        for _ in range(DEEPEST):
+            if not len(indented):
+                return
+            self.starts[indented] += 1
+            indented = indented[self.data[self.starts[indented]] == SPACE]
+        self._take(re.sub(rb"(?m)^ +", b"", text))
+
+    def _take(self, text: bytes) -> None:
+        self.text, self.data = text, np.frombuffer(text, np.uint8)
         self.stops = np.flatnonzero(self.data == NEWLINE)
-        self.starts = np.concatenate([[0], self.stops[:-1] + 1])
-        self._first = self.data[self.starts]
+        self._begins = np.concatenate([[0], self.stops[:-1] + 1])
+        self.starts = self._begins.copy()
+
+    def _first(self) -> NDArray[np.uint8]:
+        return self.data[self.starts]
 
     def __len__(self) -> int:
         return len(self.starts)
 
     def starting(self, word: bytes) -> NDArray[np.bool_]:
         """(L,) whether each line starts with `word` and a space or its end follows."""
-        at = np.flatnonzero(self._first == word[0])
+        at = np.flatnonzero(self._first() == word[0])
         for offset, letter in enumerate(word[1:], 1):
             at = at[self._byte(self.starts[at] + offset) == letter]
         following = self._byte(self.starts[at] + len(word))
@@ -100,9 +113,9 @@ class Lines:
 
     def without(self, chosen: NDArray[np.bool_], word: bytes) -> bytes:
         """The chosen lines, which start with `word`, without it and without comments."""
-        out = self.data[np.repeat(chosen, self.stops + 1 - self.starts)].copy()
-        lengths = (self.stops + 1 - self.starts)[chosen]
-        starts = np.cumsum(lengths) - lengths
+        lengths = self.stops + 1 - self._begins
+        out = self.data[np.repeat(chosen, lengths)].copy()
+        starts = np.cumsum(lengths[chosen]) - lengths[chosen] + (self.starts - self._begins)[chosen]
         for offset in range(len(word)):
             out[starts + offset] = SPACE
         text = out.tobytes()
