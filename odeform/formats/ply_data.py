@@ -1,7 +1,7 @@
 """The data of PLY files, binary or text, in tables and lists."""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ def read_tables(path: Path, header: Header) -> dict[str, Table]:
     tables: dict[str, Table] = {}
     plain = list(itertools.takewhile(lambda element: not element.lists, header.elements))
     if header.order == "=":
-        for element, rows in zip(plain, _text_rows(path, header, plain), strict=True):
+        for element, rows in zip(plain, _text_rows(path, header, plain, []), strict=True):
             layout = _layout(element, header.order)
             tables[element.name] = np.empty(element.rows, layout)
             for name in layout.names or ():
@@ -51,10 +51,13 @@ def read_tables(path: Path, header: Header) -> dict[str, Table]:
     return tables
 
 
-def read_rows(path: Path, header: Header) -> dict[str, Rows]:
-    """Element -> its properties, of all elements. Raises `InputError` for missing rows and damaged lists."""
+def read_rows(path: Path, header: Header, notes: list[str]) -> dict[str, Rows]:
+    """Element -> its properties, of all elements. What follows the last row is left out, and `notes` say so.
+
+    Raises `InputError` for missing rows and damaged lists.
+    """
     if header.order == "=":
-        rows = _text_rows(path, header, header.elements)
+        rows = _text_rows(path, header, header.elements, notes)
         return {element.name: found for element, found in zip(header.elements, rows, strict=True)}
     out: dict[str, Rows] = {}
     start = header.start
@@ -67,6 +70,8 @@ def read_rows(path: Path, header: Header) -> dict[str, Rows]:
             continue
         data = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
         out[element.name], start = _binary_lists(data, start, element, header.order, path)
+    if (extra := path.stat().st_size - start) > 0:
+        notes.append(f"{extra:,} bytes after the last row left out")
     return out
 
 
@@ -161,7 +166,7 @@ def _even_lists(data: NDArray[np.uint8], start: int, element: Element, order: st
     return out, stop
 
 
-def _text_rows(path: Path, header: Header, elements: Any) -> Iterator[Rows]:
+def _text_rows(path: Path, header: Header, elements: Sequence[Element], notes: list[str]) -> Iterator[Rows]:
     """The rows of elements, one line each; blank lines do not count."""
     with path.open("rb") as file:
         file.seek(header.start)
@@ -185,6 +190,8 @@ def _text_rows(path: Path, header: Header, elements: Any) -> Iterator[Rows]:
         lines = header.lines + 1 + chosen
         values = numbers_of(part, f"geometry {path}", range(lines[0], lines[-1] + 1))
         yield _split_rows(values, counts[chosen], element, path, lines)
+    if used < len(filled):
+        notes.append(f"{len(filled) - used:,} lines after the last row left out")
 
 
 def _split_rows(values: NDArray[np.float64], counts: Ints, element: Element, path: Path, lines: Ints) -> Rows:

@@ -31,7 +31,8 @@ def read_ply_mesh(path: Path, header: Header, merge: bool) -> Geometry:
     """
     where, size = f"geometry {path}", path.stat().st_size
     require_memory(where, f"{size:,} bytes of .ply", BYTES_PER_BYTE * size)
-    rows = read_rows(path, header)
+    notes: list[str] = []
+    rows = read_rows(path, header, notes)
     vertices = rows.get("vertex", {})
     xyz = [_numbers(vertices, name) for name in "xyz"]
     if any(values is None for values in xyz):
@@ -39,7 +40,7 @@ def read_ply_mesh(path: Path, header: Header, merge: bool) -> Geometry:
         raise InputError(f"{where}: expected an element vertex with x, y and z, got {found}")
     double = any(np.asarray(values).dtype.itemsize > 4 for values in xyz)
     points = np.stack([np.asarray(values, np.float64 if double else np.float32) for values in xyz], axis=1)
-    notes = [
+    notes += [
         f"{element.rows} {element.name}s left out"
         for element in header.elements
         if element.name == "edge" and element.rows

@@ -184,3 +184,12 @@ def test_splats_far_away_keep_their_places(tmp_path: Path) -> None:
     rows = [(4e6 + 0.25 * k, 5e6, 0, 0, -1, -1, -1, 1, 0, 0, 0) for k in range(3)]
     splats = _splats(tmp_path / "a.ply", SPLAT, dict.fromkeys("xyz", "double"), rows)
     np.testing.assert_allclose(np.diff(splats.points[:, 0]), 0.25, atol=1e-6)
+
+
+def test_what_follows_the_last_row_is_noted(tmp_path: Path) -> None:
+    text = _read(tmp_path / "a.ply", _head(VERTEX + FACE) + ROWS + LISTS + "3 0 1 2\n")
+    assert (len(text.faces), text.notes) == (4, ("1 lines after the last row left out",))
+    faces = b"".join(struct.pack("<B3i", 3, *face) for face in FACES)
+    data = _head(VERTEX + FACE, "binary_little_endian").encode() + np.array(XYZ, "<f4").tobytes() + faces
+    assert _read(tmp_path / "b.ply", data).notes == ()
+    assert _read(tmp_path / "b.ply", data + bytes(12)).notes == ("12 bytes after the last row left out",)
