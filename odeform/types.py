@@ -22,6 +22,7 @@ __all__ = [
     "Matrices",
     "Mesh",
     "MotionSequence",
+    "Offset",
     "Perpoint",
     "PointCloud",
     "Points",
@@ -50,6 +51,7 @@ Matrices = Float[np.ndarray, "points 3 3"]
 Pose = Float[np.ndarray, "*batch 4 4"]
 Basis = Float[np.ndarray, "points 3 modes"]
 Harmonics = Float[np.ndarray, "points harmonics 3"]
+Offset = tuple[float, float, float]
 
 SH0 = 0.28209479177387814  # zeroth real spherical harmonic, 1 / (2 sqrt(pi))
 
@@ -60,6 +62,10 @@ class PointCloud:
 
     Attributes:
         points: (N, 3) positions in metres.
+        colors: (N, 3) red, green and blue in sRGB, 0 to 255; None for plain points.
+        notes: What was dropped or changed when a file was read.
+        up: The axis that points up, as "+y", where a file says so; empty otherwise.
+        offset: Where the origin of `points` is in the coordinates of the file.
 
     Examples:
         >>> import numpy as np
@@ -70,6 +76,10 @@ class PointCloud:
     """
 
     points: Points
+    colors: UInt8[np.ndarray, "points 3"] | None = None
+    notes: tuple[str, ...] = ()
+    up: str = ""
+    offset: Offset = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +90,9 @@ class Mesh:
         points: (N, 3) vertices in metres.
         faces: (F, 3) indices of vertices, counter-clockwise when seen from outside.
         colors: (F, 3, 3) red, green and blue in sRGB at the corners of each face, 0 to 255; None for a plain mesh.
+        notes: What was dropped or changed when a file was read.
+        up: The axis that points up, as "+y", where a file says so; empty otherwise.
+        offset: Where the origin of `points` is in the coordinates of the file.
 
     Examples:
         >>> import numpy as np
@@ -93,6 +106,9 @@ class Mesh:
     points: Points
     faces: Faces
     colors: UInt8[np.ndarray, "faces 3 3"] | None = None
+    notes: tuple[str, ...] = ()
+    up: str = ""
+    offset: Offset = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +122,8 @@ class GaussianSplats:
             first; `odeform.geometry.harmonics` documents their order and signs.
         opacities: (N,) in [0, 1].
         notes: What was dropped when a file was read: unsupported properties, or splats that are not finite.
+        up: The axis that points up, as "+y", where a file says so; empty otherwise.
+        offset: Where the origin of `points` is in the coordinates of the file.
 
     Examples:
         >>> import numpy as np
@@ -123,6 +141,8 @@ class GaussianSplats:
     harmonics: Harmonics
     opacities: Perpoint
     notes: tuple[str, ...] = ()
+    up: str = ""
+    offset: Offset = (0.0, 0.0, 0.0)
 
     @cached_property
     def colors(self) -> Points:

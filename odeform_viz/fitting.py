@@ -11,8 +11,7 @@ from odeform.geometry.likeness import Likeness
 from odeform.geometry.parts import most_visible
 from odeform.geometry.region import Region, region_from_json, region_to_json
 from odeform.geometry.shape import FittedShape, fit_to
-from odeform.geometry.similarity import UPRIGHT, Similarity
-from odeform.geometry.upright import guess_up
+from odeform.geometry.similarity import Similarity
 from odeform.types import GaussianSplats, Geometry, Mesh
 
 __all__ = ["MOST_POINTS", "describe_fit", "fit_from_json", "fit_to_json", "readable_shape", "shape_from"]
@@ -40,18 +39,7 @@ def readable_shape(name: str | Path) -> tuple[Geometry, Region | None]:
 def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None) -> FittedShape:
     """Read a shape (`readable_shape`), and fit it to the body, or place it by `transform`."""
     geometry, region = readable_shape(name)
-    up, reason = _up(Path(name), geometry) if region is None and transform is None else ("+z", "")
-    rotation = UPRIGHT[up] if reason else None
-    return replace(fit_to(geometry, body, region, rotation, transform), origin=str(name), upright=reason)
-
-
-def _up(path: Path, geometry: Geometry) -> tuple[str, str]:
-    """The axis that points up, and why, if it is not z."""
-    if path.suffix.lower() in (".glb", ".gltf"):
-        return "+y", "y is up, as glTF specifies"
-    if isinstance(geometry, Mesh) and guess_up(geometry) == "+y":
-        return "+y", "**y was taken for up**, a guess: the shape stands better on it"
-    return "+z", ""
+    return replace(fit_to(geometry, body, region, transform=transform), origin=str(name))
 
 
 def fit_to_json(fit: FittedShape) -> dict[str, Any]:
@@ -80,4 +68,4 @@ def describe_fit(fit: FittedShape, name: str, likeness: Likeness | None) -> str:
         text += f"; {fit.upright}"
     if likeness is not None:
         text += f"; {likeness.describe()}"
-    return "; ".join([text, *(fit.source.notes if isinstance(fit.source, GaussianSplats) else ())])
+    return "; ".join([text, *fit.source.notes])

@@ -54,11 +54,10 @@ def run(args: argparse.Namespace) -> None:
     from odeform.formats.times import parse_times
     from odeform.formats.writing import motion_files, write_motion
     from odeform.geometry.shape import fit_to
-    from odeform.geometry.similarity import Similarity
-    from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
+    from odeform.geometry.similarity import UPRIGHT, Similarity
+    from odeform.models.modal.user_body import UserBodyPredictor, own_body, takes_user_bodies
     from odeform.models.registry import load, observations
     from odeform.motion.caveats import caveats
-    from odeform.types import GaussianSplats
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
@@ -73,9 +72,12 @@ def run(args: argparse.Namespace) -> None:
         _note(f"{args.geometry}: its material and forces are those of the {predictor.own.like}")
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
-        fit = fit_to(shape, predictor.rest, region, transform=None if predictor.rescales_input else Similarity())
+        as_it_is = None if predictor.rescales_input else Similarity(rotation=UPRIGHT[shape.up or "+z"])
+        fit = fit_to(shape, predictor.rest, region, transform=as_it_is)
+        if fit.upright:
+            _note(f"{args.geometry}: {fit.upright.replace('*', '')}")
     geometry = fit.geometry if fit else truth and predictor.to_body_frame(truth.geometry, settings)
-    for note in geometry.notes if isinstance(geometry, GaussianSplats) else ():
+    for note in fit.source.notes if fit else ():
         _note(f"{args.geometry}: {note}")
     observed = truth and observations(predictor.schema, truth.sequence)
     motion = predictor.solve(geometry, settings, args.quality, until=float(times[-1]), observed=observed)

@@ -2,8 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from odeform.formats.reading import read_geometry
 from odeform.geometry.region import Region, read_region
+from odeform.geometry.similarity import Similarity
 from odeform.io import bundled
 from odeform.types import Geometry
 
@@ -30,4 +33,7 @@ def read_shape(name: str | Path) -> tuple[Geometry, Region | None]:
         path = bundled_shapes().get(str(name), path)
     geometry = read_geometry(path)
     beside = region_beside(path)
-    return geometry, read_region(beside) if beside.is_file() else None
+    if not beside.is_file():
+        return geometry, None
+    # a region is in the coordinates of the file, also where those of the points are relative to an offset
+    return geometry, read_region(beside).transformed(Similarity(shift=-np.array(geometry.offset)))

@@ -10,9 +10,9 @@ import numpy as np
 
 from odeform.budget import MEMORY
 from odeform.errors import InputError
+from odeform.formats.colors import to_linear
 from odeform.formats.glb import INDICES, VERTICES, GlbBuffer
 from odeform.formats.keyframes import Keyframes, keyframes, quaternions
-from odeform.formats.mesh_colors import to_linear
 from odeform.geometry.normals import vertex_normals
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import UPRIGHT, Similarity

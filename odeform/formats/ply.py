@@ -1,4 +1,4 @@
-"""PLY files as tables of numbers, one per element. Meshes, whose faces are lists, are read by trimesh instead.
+"""PLY files as tables of numbers, one per element, with lists of any length.
 
 This is not plyfile, which is no faster and needs the whole file to tell whether it contains splats: the header alone
 decides that here, also where it has comments that are not ASCII.
@@ -6,8 +6,8 @@ decides that here, also where it has comments that are not ASCII.
 Greg Turk, "The PLY Polygon File Format" (1994).
 """
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,60 +17,96 @@ from numpy.typing import NDArray
 from odeform.errors import InputError
 from odeform.types import Floats
 
-__all__ = ["Table", "columns", "ply_properties", "read_ply_tables"]
+__all__ = ["Element", "Header", "Property", "Table", "columns", "read_header"]
 
 Table = NDArray[Any]
 """(rows,) structured array with one named column per property."""
 
 MAX_HEADER = 1 << 20  # bytes
 BLOCK = 8192  # rows at a time: a wide table is then read from memory once, not once per column
+BOM = b"\xef\xbb\xbf"
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
-    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8", "int64": "i8", "uint64": "u8"},
 }
 
 
-def ply_properties(path: Path) -> set[str]:
-    """Names of the properties of all elements; empty if this is not a PLY file."""
-    lines, _ = _header(path)
-    return {line[-1] for line in lines if line[0] == "property"}
+@dataclass(frozen=True)
+class Property:
+    """A column of an element: numbers of a NumPy type, or with `count` lists of them, whose lengths are of that one."""
+
+    name: str
+    kind: str
+    count: str = ""
 
 
-def read_ply_tables(path: Path) -> dict[str, Table]:
-    """Element -> table, up to the first element with lists; binary ones are memory-mapped.
+@dataclass(frozen=True)
+class Element:
+    """`rows` rows of some properties."""
 
-    Raises `InputError` for an unknown format and for missing rows, `ValueError` or `KeyError` for other damage.
+    name: str
+    rows: int
+    properties: tuple[Property, ...]
+
+    @property
+    def lists(self) -> bool:
+        """Whether rows differ in length."""
+        return any(entry.count for entry in self.properties)
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a file says of itself.
+
+    Attributes:
+        order: "<" or ">" for binary data, "=" for text.
+        elements: In the order of the data.
+        textures: Names of image files, from comments.
+        start: Where the data begins, in bytes.
+        lines: How many lines the header has.
     """
+
+    order: str
+    elements: tuple[Element, ...]
+    textures: tuple[str, ...]
+    start: int
+    lines: int
+
+
+def read_header(path: Path) -> Header:
+    """The header of a file. Raises `InputError` where it is missing or damaged."""
     lines, start = _header(path)
-    order = next((ORDERS[line[1]] for line in lines if line[0] == "format" and line[1] in ORDERS), None)
-    if order is None:
-        raise InputError(f"geometry {path}: expected a header with a format of {', '.join(ORDERS)}")
-    tables: dict[str, Table] = {}
-    with path.open("rb") as file:
-        file.seek(start)
-        for name, count, layout in _layouts(lines, order):
-            if order == "=" and count:
-                table = np.loadtxt(itertools.islice(file, count), dtype=layout, ndmin=1)
-            else:
-                table = _mapped(path, start, count, layout)
-                start += count * layout.itemsize
-            if len(table) < count:
-                raise InputError(f"geometry {path}: expected {count} rows of {name}, got {len(table)}: truncated?")
-            tables[name] = table
-    return tables
-
-
-def _layouts(lines: list[list[str]], order: str) -> Iterator[tuple[str, int, np.dtype[Any]]]:
-    """Name, number of rows and dtype of each element up to the first one with lists."""
-    starts = [index for index, line in enumerate(lines) if line[0] == "element"]
-    for start, stop in itertools.pairwise([*starts, len(lines)]):
-        properties = [line for line in lines[start:stop] if line[0] == "property"]
-        if any(line[1] == "list" for line in properties):
-            return
-        layout = np.dtype([(name, order + TYPES[kind]) for _, kind, name in properties])
-        yield lines[start][1], int(lines[start][2]), layout
+    where, order, textures, elements = f"geometry {path}", "", [], []
+    properties: list[Property] = []
+    for number, line in enumerate(lines, 1):
+        match line.split():
+            case ["format", kind, *_] if kind in ORDERS:
+                order = ORDERS[kind]
+            case ["comment", word, *rest] if word.lower() == "texturefile":
+                textures.append(line.split(None, 2)[2].strip() if rest else "")
+            case ["element", name, rows, *_] if rows.isascii() and rows.isdigit() and len(rows) < 16:
+                properties = []
+                elements.append((name, int(rows), properties))
+            case ["property", "list", count, kind, name] if (
+                elements and kind in TYPES and TYPES.get(count, "f")[0] != "f"
+            ):
+                properties.append(Property(name, TYPES[kind], TYPES[count]))
+            case ["property", kind, name] if elements and kind in TYPES:
+                properties.append(Property(name, TYPES[kind]))
+            case ["element" | "property", *_]:
+                raise InputError(f"{where}: line {number}: expected a line of a PLY header, got {line.strip()[:60]!r}")
+            case _:  # comments, some of which go on without their keyword
+                pass
+    if not order:
+        raise InputError(f"{where}: expected a header with a format of {', '.join(ORDERS)}")
+    made = tuple(Element(name, rows, tuple(entries)) for name, rows, entries in elements)
+    for element in made:
+        names = [entry.name for entry in element.properties]
+        if len(set(names)) < len(names):
+            raise InputError(f"{where}: element {element.name}: two properties of one name")
+    return Header(order, made, tuple(textures), start, len(lines))
 
 
 def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
@@ -86,21 +122,16 @@ def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
     return out
 
 
-def _mapped(path: Path, start: int, count: int, layout: np.dtype[Any]) -> Table:
-    """Up to `count` rows, as many as the file has."""
-    present = min(count, max(path.stat().st_size - start, 0) // max(layout.itemsize, 1))
-    if present <= 0:
-        return np.zeros(0, layout)
-    return np.memmap(path, dtype=layout, mode="r", offset=start, shape=(present,))
-
-
-def _header(path: Path) -> tuple[list[list[str]], int]:
-    """The words of each header line, and the offset of the data in bytes."""
+def _header(path: Path) -> tuple[list[str], int]:
+    """The lines of the header, and the offset of the data in bytes."""
     with path.open("rb") as file:
         head = file.read(MAX_HEADER)
-    text, end, rest = head.partition(b"end_header")
-    if not head.startswith(b"ply") or not end:
+    bom = len(BOM) if head.startswith(BOM) else 0
+    text, end, rest = head[bom:].partition(b"end_header")
+    if not text.startswith(b"ply") or not end:
         return [], 0
-    newline = 2 if rest.startswith(b"\r\n") else 1
-    lines = [line.split() for line in text.decode("latin-1").splitlines()]
-    return [line for line in lines if line], len(text) + len(end) + newline
+    # "\n" after a lone "\r" is data already
+    alone = b"\r" in text and b"\n" not in text
+    newline = rest.find(b"\r" if alone else b"\n", 0, 80) + 1
+    start = bom + len(text) + len(end) + newline
+    return [*text.decode("latin-1").splitlines(), "end_header"], start

@@ -7,19 +7,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from odeform.errors import InputError
+from odeform.errors import InputError, one_line
+from odeform.formats.foreign import require_content, unread
+from odeform.formats.merging import centred, merged
 from odeform.formats.registry import READERS, load_function
 from odeform.geometry.parts import subset
 from odeform.types import GaussianSplats, Geometry, Mesh
 
 __all__ = ["read_geometry"]
 
+HEAD = 512  # bytes that tell what a file is
 EXTENT = (1e-15, 1e15)
 """Of a shape in the units of its file. Squares of lengths, and their inverses, are then numbers of single precision."""
 
 
 def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
     """Read a mesh, a point cloud or Gaussian splats, in the units and axes of the file.
+
+    `up` of the result says which axis points up, where the format does: y in glTF. What was left out is in `notes`.
+    Points with the coordinates of a map, which single precision would round, are relative to `offset`; without
+    `merge` they stay as they are, in double precision.
 
     The suffix selects the format (`odeform.formats.registry.READERS`); a `.ply` may hold any of the three. Vertices of
     a mesh that coincide become one unless `merge` is false, which keeps the vertices and their order as in the file, so
@@ -47,8 +54,15 @@ def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
         raise InputError(f"geometry {path}: no such file")
     suffix = path.suffix.lower()
     if suffix not in READERS:
-        raise InputError(f"geometry {path}: expected one of {', '.join(READERS)}, got {suffix or 'no ending'}")
+        other = unread(suffix)
+        raise InputError(
+            f"geometry {path}: {other}"
+            if other
+            else f"geometry {path}: expected one of {', '.join(READERS)}, got {suffix or 'no ending'}"
+        )
     try:
+        with path.open("rb") as file:
+            require_content(file.read(HEAD), suffix, f"geometry {path}")
         # values that are not finite are counted below; warnings of parsers are about files that are refused or fine
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -57,10 +71,33 @@ def read_geometry(path: str | Path, merge: bool = True) -> Geometry:
         raise
     except MemoryError:
         raise InputError(f"geometry {path}: cannot be read as {suffix}: it takes too much memory") from None
+    except OSError as error:
+        raise InputError(f"geometry {path}: cannot be read: {error.strerror or error}") from None
     except Exception as error:
-        # parsers raise anything on a broken file
-        raise InputError(f"geometry {path}: cannot be read as {suffix}: {error}") from None
-    return _validated(geometry, path)
+        # parsers of libraries raise anything on a broken file
+        said = one_line(error) or "no reason given"
+        raise InputError(
+            f"geometry {path}: cannot be read as {suffix}, damaged? {type(error).__name__}: {said}"
+        ) from None
+    return _prepared(_validated(geometry, path), merge)
+
+
+def _prepared(geometry: Geometry, merge: bool) -> Geometry:
+    """Single precision, after large coordinates are made small and vertices merged.
+
+    Frames of a sequence share one origin: where single precision would round their coordinates, they stay double.
+    """
+    near = centred(geometry)
+    if not merge:
+        return geometry if near is not geometry else _single(geometry)
+    return _single(merged(near) if isinstance(near, Mesh) else near)
+
+
+def _single(geometry: Geometry) -> Geometry:
+    points = np.ascontiguousarray(geometry.points, dtype=np.float32)
+    if isinstance(geometry, Mesh):
+        return replace(geometry, points=points, faces=np.ascontiguousarray(geometry.faces, dtype=np.int32))
+    return replace(geometry, points=points)
 
 
 def _validated(geometry: Geometry, path: Path) -> Geometry:
@@ -76,7 +113,7 @@ def _validated(geometry: Geometry, path: Path) -> Geometry:
     points = geometry.points
     if len(points) < 2:
         raise InputError(f"geometry {path}: expected at least 2 points, got {len(points)}")
-    extent = float(np.ptp(points.astype(float), axis=0).max())
+    extent = float(max(np.ptp(column.astype(float)) for column in points.T))
     if extent <= 0.0:
         raise InputError(f"geometry {path}: all {len(points)} points coincide")
     if not EXTENT[0] <= extent <= np.abs(points).max(initial=extent) <= EXTENT[1]:

@@ -52,16 +52,31 @@ class Writer:
     """Whether `motion` also takes `truth`, a `RecordedMotion`, for errors against it."""
 
 
+POINT_TEXT = Reader("points, one per line", "odeform.formats.points:read_xyz")
+
 READERS: dict[str, Reader] = {
-    ".glb": Reader("binary glTF scene, joined into one mesh", "odeform.formats.meshes:read_mesh"),
-    ".gltf": Reader("glTF scene, joined into one mesh", "odeform.formats.meshes:read_mesh"),
-    ".obj": Reader("Wavefront mesh", "odeform.formats.meshes:read_mesh"),
-    ".off": Reader("Object File Format mesh", "odeform.formats.meshes:read_mesh"),
+    ".asc": POINT_TEXT,
+    ".csv": POINT_TEXT,
+    ".glb": Reader("binary glTF scene, joined into one mesh", "odeform.formats.gltf.reader:read_gltf"),
+    ".gltf": Reader("glTF scene, joined into one mesh", "odeform.formats.gltf.reader:read_gltf"),
+    ".ksplat": Reader("Gaussian splats (GaussianSplats3D)", "odeform.formats.splat_ksplat:read_ksplat"),
+    ".las": Reader("points of a laser scan", "odeform.formats.las:read_las"),
+    ".laz": Reader("points of a laser scan, compressed", "odeform.formats.las:read_las"),
+    ".msh": Reader("Gmsh mesh, its surface", "odeform.formats.gmsh:read_msh"),
+    ".obj": Reader("Wavefront mesh", "odeform.formats.obj:read_obj"),
+    ".off": Reader("Object File Format mesh", "odeform.formats.off:read_off"),
+    ".pcd": Reader("points of the Point Cloud Library", "odeform.formats.pcd:read_pcd"),
     ".ply": Reader("mesh, points, or Gaussian splats (INRIA or SuperSplat)", "odeform.formats.ply_files:read_ply"),
+    ".pts": POINT_TEXT,
+    ".sog": Reader("Gaussian splats (PlayCanvas)", "odeform.formats.splat_sog:read_sog"),
     ".splat": Reader("Gaussian splats (antimatter15)", "odeform.formats.splat_antimatter:read_splat"),
     ".spz": Reader("Gaussian splats (Niantic)", "odeform.formats.splat_spz:read_spz"),
-    ".stl": Reader("mesh", "odeform.formats.meshes:read_mesh"),
-    ".xyz": Reader("points, one per line", "odeform.formats.points:read_xyz"),
+    ".stl": Reader("mesh", "odeform.formats.stl:read_stl"),
+    ".txt": POINT_TEXT,
+    ".vtk": Reader("VTK data set, its surface", "odeform.formats.vtk.legacy:read_vtk"),
+    ".vtp": Reader("VTK polygons", "odeform.formats.vtk.xml:read_vtk_xml"),
+    ".vtu": Reader("VTK mesh, its surface", "odeform.formats.vtk.xml:read_vtk_xml"),
+    ".xyz": POINT_TEXT,
 }
 
 WRITERS: dict[str, Writer] = {

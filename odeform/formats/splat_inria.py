@@ -13,8 +13,9 @@ import numpy as np
 from odeform.budget import require_memory
 from odeform.errors import InputError
 from odeform.formats.ply import Table, columns
+from odeform.formats.ply_mesh import channels
 from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_axes
-from odeform.types import Floats, GaussianSplats
+from odeform.types import SH0, Floats, GaussianSplats
 
 __all__ = ["harmonic_columns", "inria_bytes", "inria_splats"]
 
@@ -30,7 +31,11 @@ MARGIN = 1e-7  # to opacities 0 and 1, whose logits are not finite
 
 
 def inria_splats(table: Table, path: Path) -> GaussianSplats:
-    """The element vertex -> splats; gray without colour. Raises `InputError` for missing columns."""
+    """The element vertex -> splats; gray without colour. Raises `InputError` for missing columns.
+
+    Splats of two scales are flat (Huang et al., "2D Gaussian Splatting for Geometrically Accurate Radiance Fields",
+    2024). Red, green and blue, from 0 to 255, stand for the constant harmonic where there is none.
+    """
     degrees = sum(name.startswith("f_rest_") for name in table.dtype.names or ()) // 3 + 1
     require_memory(f"geometry {path}", f"{len(table):,} splats", len(table) * (SPLAT_BYTES + HARMONIC_BYTES * degrees))
     notes = []
@@ -40,14 +45,25 @@ def inria_splats(table: Table, path: Path) -> GaussianSplats:
         harmonics = columns(table, list(itertools.chain(*kept)), path).reshape(len(table), len(kept), 3)
         if len(rest) >= len(kept):
             notes.append(f"colour beyond degree {MAX_DEGREE} left out")
+    elif (painted := channels({name: table[name] for name in table.dtype.names or ()})) is not None:
+        harmonics = ((painted[:, None] / np.float32(255.0) - 0.5) / SH0).astype(np.float32)
     else:
         harmonics = np.zeros((len(table), 1, 3), np.float32)
         notes.append("without colour, shown gray")
-    covariances = covariances_from_axes(
-        np.exp(columns(table, SCALE, path), dtype=float), columns(table, ROTATION, path)
-    )
+    scales = np.exp(columns(table, SCALE[: 2 if _is_flat(table) else 3], path), dtype=float)
+    if _is_flat(table):
+        scales = np.pad(scales, ((0, 0), (0, 1)))
+        notes.append("flat splats, of two scales")
+    covariances = covariances_from_axes(scales, columns(table, ROTATION, path))
     opacities = 1.0 / (1.0 + np.exp(-columns(table, ["opacity"], path)[:, 0]))
-    return GaussianSplats(columns(table, POINT, path), covariances, harmonics, opacities, tuple(notes))
+    double = any(table.dtype[name].itemsize > 4 for name in POINT if name in (table.dtype.names or ()))
+    points = np.stack([table[name] for name in POINT], axis=1) if double else columns(table, POINT, path)
+    return GaussianSplats(points, covariances, harmonics, opacities, tuple(notes))
+
+
+def _is_flat(table: Table) -> bool:
+    names = table.dtype.names or ()
+    return SCALE[1] in names and SCALE[2] not in names
 
 
 def harmonic_columns(table: Table, path: Path) -> list[tuple[str, str, str]]:

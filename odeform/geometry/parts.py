@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from odeform.errors import InputError
 from odeform.geometry.region import Mask, Region
@@ -34,7 +35,8 @@ def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None
 def subset(geometry: Unstructured, kept: Mask | slice) -> Unstructured:
     """The points where `kept` (N,) is true, with their attributes; of a slice, views."""
     if not isinstance(geometry, GaussianSplats):
-        return replace(geometry, points=geometry.points[kept])
+        colors = None if geometry.colors is None else geometry.colors[kept]
+        return replace(geometry, points=geometry.points[kept], colors=colors)
     return replace(
         geometry,
         points=geometry.points[kept],
@@ -50,8 +52,8 @@ def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
         return one
     points = np.concatenate([one.points, other.points])
     if isinstance(one, Mesh) and isinstance(other, Mesh):
-        both = None if one.colors is None or other.colors is None else np.concatenate([one.colors, other.colors])
-        return Mesh(points, np.concatenate([one.faces, other.faces + len(one.points)]), both)
+        faces = np.concatenate([one.faces, other.faces + len(one.points)])
+        return replace(one, points=points, faces=faces, colors=_both_colors(one, other))
     if isinstance(one, GaussianSplats) and isinstance(other, GaussianSplats):
         return replace(
             one,
@@ -60,7 +62,13 @@ def concatenated(one: Geometry, other: Geometry | None) -> Geometry:
             harmonics=np.concatenate([one.harmonics, other.harmonics]),
             opacities=np.concatenate([one.opacities, other.opacities]),
         )
-    return PointCloud(points)
+    if isinstance(one, PointCloud) and isinstance(other, PointCloud):
+        return replace(one, points=points, colors=_both_colors(one, other))
+    return PointCloud(points, up=one.up, offset=one.offset)
+
+
+def _both_colors(one: Mesh | PointCloud, other: Mesh | PointCloud) -> NDArray[np.uint8] | None:
+    return None if one.colors is None or other.colors is None else np.concatenate([one.colors, other.colors])
 
 
 def most_visible(splats: GaussianSplats, count: int) -> GaussianSplats:
@@ -81,4 +89,4 @@ def most_visible(splats: GaussianSplats, count: int) -> GaussianSplats:
 def _of_faces(mesh: Mesh, kept: np.ndarray) -> Mesh:
     used, local = np.unique(mesh.faces[kept], return_inverse=True)
     colors = None if mesh.colors is None else mesh.colors[kept]
-    return Mesh(mesh.points[used], local.reshape(-1, 3), colors)
+    return replace(mesh, points=mesh.points[used], faces=local.reshape(-1, 3), colors=colors)

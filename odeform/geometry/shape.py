@@ -8,6 +8,7 @@ import numpy as np
 from odeform.geometry.parts import concatenated, split
 from odeform.geometry.region import Region
 from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.geometry.upright import up_axis, up_of_rotation
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Perpoint, Points, Rotations
 
 __all__ = ["FittedShape", "fit_to", "surface_weights", "without_outliers"]
@@ -55,7 +56,9 @@ class FittedShape:
 
     def to_file(self, moved: Geometry) -> Geometry:
         """The whole shape in the units and axes of the file, its moving part as `moved` has it in the scene."""
-        return concatenated(self.transform.inverse.shape(moved), self.remainder)
+        back = self.transform.inverse.shape(moved)
+        up = up_of_rotation(self.transform.rotation)
+        return concatenated(replace(back, up=up, offset=self.source.offset), self.remainder)
 
 
 def fit_to(
@@ -68,28 +71,32 @@ def fit_to(
     """Place a shape, or the part of it within `region`, where `reference` rests; the remainder then stays still.
 
     By default the shape is scaled to the largest extent of `reference` and stands on the same footprint and floor. A
-    whole shape keeps its axes, and a part is turned so that its surroundings are below it, unless `rotation` (3, 3) is
-    given. A part stays on the floor of the scene with its surroundings; where `reference` is higher, the part alone is
-    lifted. `transform` overrides all of this. Raises `InputError` if the region is empty.
+    whole shape is turned so that the axis that points up (`odeform.geometry.upright.up_axis`) becomes z, and a part so
+    that its surroundings are below it, unless `rotation` (3, 3) is given. A part stays on the floor of the scene with
+    its surroundings; where `reference` is higher, the part alone is lifted. `transform` overrides all of this. Raises
+    `InputError` if the region is empty.
     """
     part, remainder = (geometry, None) if region is None else split(geometry, region)
     lift = 0.0 if remainder is None else float(np.asarray(reference.points)[:, 2].min())
+    reason = ""
     if transform is None:
         points = np.asarray(part.points, dtype=float)
         if remainder is not None or isinstance(geometry, GaussianSplats):
             points = without_outliers(points)
-        if remainder is not None:
-            rotation = UPRIGHT[_up(points, np.asarray(remainder.points, dtype=float))] if rotation is None else rotation
+        if rotation is None and remainder is not None:
+            rotation = UPRIGHT[_up(points, np.asarray(remainder.points, dtype=float)) or geometry.up or "+z"]
+        elif rotation is None:
+            up, reason = up_axis(geometry)
+            rotation = UPRIGHT[up]
         transform = _standing(points, rotation, np.asarray(reference.points, dtype=float), lift)
     fitted = transform.shape(part)
     if lift:
         fitted = replace(fitted, points=fitted.points + np.array([0.0, 0.0, lift], np.float32))
-    return FittedShape(geometry, region, transform, fitted, remainder, lift)
+    return FittedShape(geometry, region, transform, fitted, remainder, lift, upright=reason)
 
 
-def _standing(points: Points, rotation: Rotations | None, target: Floats, lift: float) -> Similarity:
+def _standing(points: Points, rotation: Rotations, target: Floats, lift: float) -> Similarity:
     """The similarity that gives `points` the extent and the footprint of `target`, `lift` metres lower."""
-    rotation = np.eye(3) if rotation is None else rotation
     turned = points @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     extent = float((high - low).max())
@@ -107,13 +114,14 @@ def without_outliers(points: Floats) -> Floats:
 
 
 def _up(part: Points, remainder: Floats) -> str:
-    """The signed axis along which a part rises from its surroundings: away from the points within twice its radius."""
+    """The signed axis along which a part rises from its surroundings: away from the points within twice its radius.
+    Empty where they give no direction."""
     centre = 0.5 * (part.min(axis=0) + part.max(axis=0))
     away = remainder - centre
     distance = np.linalg.norm(away, axis=1)
     near = (distance <= 2.0 * np.linalg.norm(part - centre, axis=1).max()) & (distance > 0.0)
     if not near.any():
-        return "+z"
+        return ""
     mean = (away[near] / distance[near, None]).mean(axis=0)
     axis = int(np.abs(mean).argmax())
-    return "+z" if np.abs(mean[axis]) < EVEN else ("-" if mean[axis] > 0.0 else "+") + "xyz"[axis]
+    return "" if np.abs(mean[axis]) < EVEN else ("-" if mean[axis] > 0.0 else "+") + "xyz"[axis]

@@ -76,8 +76,10 @@ class Similarity:
         return self.factor**2 * (self.rotation @ covariances @ self.rotation.T)
 
     def shape(self, shape: Shape) -> Shape:
-        """Transform a geometry with all its attributes; its points become float32."""
-        moved = replace(shape, points=self.points(shape.points).astype(np.float32))
+        """Transform a geometry with all its attributes; its points become float32. What its file says of the axes and
+        the origin does not hold any more, and is left out."""
+        points = self.points(shape.points).astype(np.float32)
+        moved = replace(shape, points=points, up="", offset=(0.0, 0.0, 0.0))
         if not isinstance(moved, GaussianSplats):
             return moved
         turned = moved.harmonics

@@ -1,14 +1,38 @@
-"""Which axis of a shape points up."""
+"""Which axis of a shape points up: what its file says, else for a mesh a guess, else z.
+
+The viewer, the command line and `fit_to` follow this one rule.
+"""
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from odeform.types import Floats, Mesh
+from odeform.geometry.similarity import UPRIGHT, Similarity
+from odeform.types import Floats, Geometry, Mesh, Rotations
 
-__all__ = ["guess_up"]
+__all__ = ["guess_up", "stand_up", "up_axis", "up_of_rotation"]
 
 NEAR = 0.03  # of the height; points this close to the lowest one stand on the floor
 CLEARLY = 1.3  # times as well as on z
+
+
+def up_axis(geometry: Geometry) -> tuple[str, str]:
+    """The axis of a shape that points up, as "+y", and why, if it is not z."""
+    if geometry.up not in ("", "+z"):
+        return geometry.up, f"{geometry.up.lstrip('+')} is up, as the file's format specifies"
+    if not geometry.up and isinstance(geometry, Mesh) and guess_up(geometry) == "+y":
+        return "+y", "**y was taken for up**, a guess: the shape stands better on it"
+    return "+z", ""
+
+
+def stand_up(geometry: Geometry) -> Geometry:
+    """A shape whose file says that another axis than z is up, turned so that z is; every other one as it is."""
+    return geometry if geometry.up in ("", "+z") else Similarity(rotation=UPRIGHT[geometry.up]).shape(geometry)
+
+
+def up_of_rotation(rotation: Rotations) -> str:
+    """The signed axis that a rotation (3, 3) turns nearest to +z, as "+y"."""
+    axis = int(np.abs(rotation[2]).argmax())
+    return ("-" if rotation[2, axis] < 0.0 else "+") + "xyz"[axis]
 
 
 def guess_up(mesh: Mesh) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint, arrays_of_object
 from odeform.errors import InputError
+from odeform.geometry.upright import stand_up
 from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
@@ -143,7 +144,7 @@ class Predictor(ABC):
 
         Args:
             geometry: a shape of N points in metres, where it lies at rest in the scene; by default the trained body
-                (`rest_of`).
+                (`rest_of`). One that was read from a file whose format says that y is up is turned: the scene's z is.
             parameters: by name, in the units of `schema`; defaults for the others.
             quality: the name of one of `qualities`, or solver settings.
             until: seconds that are integrated at once (default: the trained window). Later times may be evaluated
@@ -158,7 +159,7 @@ class Predictor(ABC):
         window = self.schema.window
         end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
         complete = self.complete(parameters)
-        shape = self.rest_of(complete) if geometry is None else geometry
+        shape = self.rest_of(complete) if geometry is None else stand_up(geometry)
         return self._solve(shape, complete, self._settings(quality, complete), end, observed)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:

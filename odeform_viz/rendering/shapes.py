@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 import viser
 
-from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Points
+from odeform.types import Floats, GaussianSplats, Geometry, Mesh, PointCloud, Points
 from odeform_viz.colors import Color
 from odeform_viz.rendering.look import Colors, Look
 from odeform_viz.rendering.meshes import MeshView
@@ -37,13 +37,14 @@ def show_shape(
         if shadow:
             cast_shadow(server, f"{root}/shadow", geometry.points)
         return _SplatView(server, root, geometry)
-    return _CloudView(server, root, geometry.points, color)
+    return _CloudView(server, root, geometry, color)
 
 
 class _CloudView:
-    def __init__(self, server: viser.ViserServer, root: str, points: Points, color: Color) -> None:
-        self._rest = np.asarray(points, dtype=np.float32)
-        self._own = np.tile(np.array(color, dtype=np.uint8), (len(points), 1))
+    def __init__(self, server: viser.ViserServer, root: str, cloud: PointCloud, color: Color) -> None:
+        self._rest = np.asarray(cloud.points, dtype=np.float32)
+        plain = np.tile(np.array(color, dtype=np.uint8), (len(cloud.points), 1))
+        self._own = plain if cloud.colors is None else cloud.colors
         self._cloud = server.scene.add_point_cloud(
             f"{root}/points", self._rest, self._own, point_size=0.003, precision="float32"
         )

@@ -7,7 +7,7 @@ import pytest
 from gltf_player import Player
 
 from odeform.errors import InputError
-from odeform.formats.mesh_colors import to_linear
+from odeform.formats.colors import to_linear
 from odeform.formats.reading import read_geometry
 from odeform.formats.writing import write_motion
 from odeform.geometry.primitives import octasphere

@@ -72,7 +72,7 @@ def damaged() -> dict[str, tuple[str, bytes]]:
         "points, not finite": ("xyz", b"0 0 0\nnan 0 0\n1 1 1\n"),
         "points, infinite": ("xyz", b"0 0 0\ninf 0 0\n1 1 1\n"),
         "points, plane": ("xyz", b"0 0\n1 1\n2 3\n"),
-        "points, words": ("xyz", b"x y z\n0 0 0\n1 1 1\n"),
+        "points, words": ("xyz", b"hello you there\n0 0 0\n1 1 1\n"),
         "points, empty": ("xyz", b""),
         "unknown ending": ("step", b"ISO-10303-21;"),
         "no ending": ("", b"v 0 0 0\n"),

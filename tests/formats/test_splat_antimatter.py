@@ -70,13 +70,13 @@ def test_refuses(tmp_path: Path) -> None:
     header = b"ply\nformat ascii 1.0\n%s\nend_header\n"
     files = {
         ("a.splat", "32 bytes a splat, got 153"): drawn().tobytes()[:-7],
-        ("b.splat", "at least 2 points, got 0"): b"",
+        ("b.splat", "an empty file"): b"",
         ("c.splat", "at least 2 points, got 1"): drawn(1).tobytes(),
         ("d.splat", "3 of 5 points are not finite"): mostly.tobytes(),
         ("e.splat", "coincide"): together.tobytes(),
         ("a.ply", "element vertex of numbers, got splat"): header % b"element splat 0\nproperty float f_dc_0",
-        ("b.ply", "element vertex of numbers, got none"): header % b"property uint packed_position",
-        ("c.ply", "cannot be read"): header % b"element vertex 2\nproperty quad rot_0",
+        ("b.ply", "line 3: expected a line of a PLY header"): header % b"property uint packed_position",
+        ("c.ply", "line 4: expected a line of a PLY header"): header % b"element vertex 2\nproperty quad rot_0",
         ("d.ply", "splats without scale_0, scale_1, scale_2"): header % b"element vertex 0\nproperty float rot_0",
         ("e.ply", "expected 4000000000 rows of vertex, got 0"): header.replace(b"ascii", b"binary_little_endian")
         % b"element vertex 4000000000\nproperty float rot_0",

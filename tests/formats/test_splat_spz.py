@@ -136,7 +136,7 @@ def faults() -> dict[str, tuple[bytes, str]]:
     sized = bytearray(four)
     struct.pack_into("<Q", sized, 40, 7)
     return {
-        "empty": (b"", "NGSP"),
+        "empty": (b"", "empty file"),
         "another file": (b"solid x" * 9, "NGSP"),
         "gzip of another file": (gzip.compress(b"solid x" * 9), "NGSP"),
         "raw, truncated": (raw[:-1], f"expected {len(raw) - 16} bytes of 60 splats, got {len(raw) - 17}"),

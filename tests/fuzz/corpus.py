@@ -3,11 +3,13 @@
 import gzip
 import io
 import struct
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import trimesh
 import zstandard
+from PIL import Image
 
 from odeform.dataset.folder import folder_reader, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry
@@ -16,6 +18,9 @@ from odeform.formats.splat_inria import inria_bytes
 from odeform.formats.splat_spz import spz_bytes
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import GaussianSplats, MotionSequence
+
+from .gltf_files import Gltf
+from .scans import CUBE, ksplat_bytes, las_bytes, msh_bytes, pcd_bytes, sog_bytes, vtk_bytes, vtu_bytes
 
 __all__ = ["dataset", "shapes"]
 
@@ -39,6 +44,82 @@ def shapes() -> dict[str, bytes]:
     files["plain.spz"] = body
     files["v4.spz"] = _version_4(body)
     files["compressed.ply"] = _compressed(20)
+    return {**files, **_scenes(mesh), **_scans(mesh.vertices)}
+
+
+def _scenes(mesh: trimesh.Trimesh) -> dict[str, bytes]:
+    """Meshes of more than triangles: what the formats know beside them."""
+    cells, kinds = [list(range(8)), [0, 1, 2, 8]], [12, 10]
+    points = np.concatenate([CUBE, [[0.5, 0.5, -1.0]]])
+    ring = "".join(f"v {x} {y} 0 1 0 0\n" for x, y in ((0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)))
+    uv = "vt 0 0\nvt 1 0\nvt 1 1\n"
+    strip = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    strip += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 1\n"
+    coff = "COFF\n4 2 0\n" + "".join(f"{x} {y} 0 255 0 0 255\n" for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    files = {
+        "polygons.obj": f"mtllib a.mtl\n{ring}{uv}usemtl a\nf -8 -7 -6 -5 -4 -3 -2 -1\nf 1/1 2/2 3/3\nf 1 2/1 3//1\n",
+        "strip.ply": f"{strip}7 0 1 2 3 -1 0 1\n",
+        "colors.off": f"{coff}3 0 1 2 0.5 0.5 0.5\n4 0 1 2 3\n",
+    }
+    out = {name: text.encode() for name, text in files.items()}
+    for binary in (False, True):
+        out[f"cells_{binary}.vtk"] = vtk_bytes(points, cells, kinds, binary)
+        for version in ("2.2", "4.1"):
+            tetrahedra = [[0, 1, 2, 4], [1, 2, 4, 6]]
+            out[f"cells_{version[0]}_{binary}.msh"] = msh_bytes(CUBE, tetrahedra, version, binary)
+    for form in ("ascii", "binary", "zlib", "appended"):
+        out[f"cells_{form}.vtu"] = vtu_bytes(points, cells, kinds, form)
+    with tempfile.TemporaryDirectory() as folder:
+        out["full.glb"] = _full().glb(Path(folder) / "a.glb").read_bytes()
+    return out
+
+
+def _full() -> Gltf:
+    """Morph targets, bones, instances, colors, a texture, and a sparse accessor in one file."""
+    file = Gltf()
+    image = io.BytesIO()
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(image, "png")
+    file.primitive["attributes"] |= {
+        "JOINTS_0": file.add(np.zeros((4, 4), np.uint8)),
+        "WEIGHTS_0": file.add(np.array([[1, 0, 0, 0]] * 4, np.float32)),
+        "COLOR_0": file.add(np.full((4, 4), 200, np.uint8), normalized=True),
+        "TEXCOORD_0": file.add(np.full((4, 2), 0.3, np.float32)),
+    }
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": file.view(b"\2\0\0\0"), "componentType": 5123},
+        "values": {"bufferView": file.view(np.ones(3, np.float32).tobytes())},
+    }
+    file.primitive |= {"material": 0, "targets": [{"POSITION": file.add(np.ones((4, 3), np.float32), sparse=sparse)}]}
+    shifts = {"TRANSLATION": file.add(np.eye(3, dtype=np.float32))}
+    file.tree |= {
+        "nodes": [
+            {"mesh": 0, "skin": 0},
+            {"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": shifts}}},
+        ],
+        "scenes": [{"nodes": [0, 1]}],
+        "skins": [{"joints": [1]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"bufferView": file.view(image.getvalue())}],
+    }
+    file.tree["meshes"][0]["weights"] = [0.5]
+    return file
+
+
+def _scans(points: np.ndarray) -> dict[str, bytes]:
+    """Points and splats of other programs."""
+    colors = np.full((len(points), 3), 200, np.uint8)
+    files = {f"points_{kind}.pcd": pcd_bytes(points, colors, kind) for kind in ("ascii", "binary", "binary_compressed")}
+    rows = [f"{x:.4f};{y:.4f};{z:.4f};10;20;30" for x, y, z in points.tolist()]
+    files["points.csv"] = "\n".join(["X;Y;Z;R;G;B", *rows, ""]).replace(".", ",").encode()
+    rows = [f"{x} {y} {z} 5 10 20 30" for x, y, z in points.tolist()]
+    files["points.pts"] = "\n".join([str(len(rows)), *rows, ""]).encode()
+    for suffix in ("las", "laz"):
+        files[f"points.{suffix}"] = las_bytes(points, colors, suffix == "laz")
+    for level in range(3):
+        files[f"level_{level}.ksplat"] = ksplat_bytes(points[:20], level, level)
+    files["splats.sog"] = sog_bytes(points[:20], bands=1)
     return files
 
 

@@ -48,7 +48,7 @@ def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) ->
     """Make a soft body of a shape. It takes 5 to 20 seconds.
 
     Splats and points without faces get a closed surface around them first. A defective mesh is repaired. `up` is the
-    axis of the shape that points up, as "+y"; by default it is guessed. Needs the extra `objects`.
+    axis of the shape that points up, as "+y"; by default what its file says, else a guess. Needs the extra `objects`.
 
     Raises:
         InputError: for a shape that encloses no volume, holds several bodies, or does not come to rest on the floor.
@@ -56,7 +56,7 @@ def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) ->
     from odeform.simulation.objects.foreign import placed_object  # looking at trained bodies needs no simulator
 
     try:
-        placed = placed_object(_surface(geometry), name, up=up)
+        placed = placed_object(_surface(geometry), name, up=up or geometry.up or None)
     except InputError as error:
         raise InputError(f"{name}: {str(error).removeprefix(f'mesh {name}: ')}") from None
     item = placed.item

@@ -63,7 +63,8 @@ def placed_object(
         name: That of the object.
         like: The object whose orientation, material and forces it gets; default: the most similar solid one.
         material: Instead of that of `like`.
-        up: Axis of the mesh that points up, as "+y"; default: y if it stands better on it, else z.
+        up: Axis of the mesh that points up, as "+y"; default: what its file says, else y if it stands better on
+            it, else z.
         unit: Metres of one unit of the mesh; default: guessed, see `plausible_scale`.
 
     Needs the extra `objects`. Raises `InputError` for a mesh that encloses no volume, holds several bodies, or does not
@@ -73,7 +74,7 @@ def placed_object(
         raise InputError(f"unit: expected a positive number of metres, got {unit}")
     fine = repaired(mesh)
     surface = even_surface(fine, COUNTS[0])
-    like, rotation = most_like(surface.points, like, guess_up(surface) if up is None else up)
+    like, rotation = most_like(surface.points, like, up or mesh.up or guess_up(surface))
     scale = plausible_scale(float(np.ptp(surface.points, axis=0).max()), like) if unit is None else unit
     place = Similarity(scale, rotation, -scale * rotation @ surface.points.mean(axis=0))
     turned = Mesh(place.points(fine.points), fine.faces)
