@@ -61,6 +61,9 @@ READERS: dict[str, Reader] = {
     ".splat": Reader("Gaussian splats (antimatter15)", "odeform.formats.splat_antimatter:read_splat"),
     ".spz": Reader("Gaussian splats (Niantic)", "odeform.formats.splat_spz:read_spz"),
     ".stl": Reader("mesh", "odeform.formats.meshes:read_mesh"),
+    ".vtk": Reader("surface of a VTK data set", "odeform.formats.vtk_files:read_vtk"),
+    ".vtp": Reader("surface of a VTK data set", "odeform.formats.vtk_files:read_vtk"),
+    ".vtu": Reader("surface of a VTK data set", "odeform.formats.vtk_files:read_vtk"),
     ".xyz": Reader("points, one per line", "odeform.formats.points:read_xyz"),
 }
 
