@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from odeform.budget import MEMORY, read_limited, require_memory
 from odeform.errors import InputError
 from odeform.formats.vtk_grid import Grid, geometry_of
 from odeform.formats.vtk_legacy import read_legacy
 from odeform.formats.vtk_xml import read_xml_grid
-from odeform.types import Geometry
+from odeform.geometry.coincidence import equal_rows
+from odeform.types import Geometry, Mesh
 
 __all__ = ["read_grid", "read_vtk"]
 
@@ -17,9 +20,13 @@ HEAD = 4096  # bytes that tell whether a file is text
 
 
 def read_vtk(path: Path, merge: bool) -> Geometry:
-    """The surface in a file of VTK, in the units of the file: of volumes the outer faces. Points are never merged."""
+    """The surface in a file of VTK, in the units of the file: of volumes the outer faces."""
     where = f"geometry {path}"
-    return geometry_of(read_grid(path, where), where)
+    shape = geometry_of(read_grid(path, where), where)
+    if not merge or not isinstance(shape, Mesh) or not np.isfinite(shape.points).all():
+        return shape
+    first, labels = equal_rows(shape.points)
+    return Mesh(shape.points[first], labels[shape.faces].astype(np.int32))
 
 
 def read_grid(path: Path, where: str) -> Grid:

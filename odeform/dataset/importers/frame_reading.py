@@ -11,7 +11,8 @@ from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
 from odeform.formats.vtk_files import read_grid
 from odeform.formats.vtk_grid import Grid, geometry_of
-from odeform.types import Faces, Floats, Frames, Geometry, Ints, Mesh
+from odeform.geometry.coincidence import equal_rows
+from odeform.types import Faces, Floats, Frames, Geometry, Mesh
 
 __all__ = ["VTK", "displacement_field", "read_displaced", "read_frames"]
 
@@ -89,12 +90,12 @@ def _require_same(mesh: Mesh, first: Mesh, file: Path, file0: Path) -> None:
 
 def _welded(frames: Floats, files: Sequence[Path]) -> tuple[Frames, Faces]:
     """One vertex for the corners of triangles that coincide in all frames."""
-    representatives, labels = _same_rows(frames[0])
+    representatives, labels = equal_rows(frames[0])
     count = len(representatives)
     for frame, file in zip(frames[1:], files[1:], strict=True):
         if np.array_equal(frame, frame[representatives][labels]):
             continue
-        representatives, labels = _same_rows(np.column_stack([labels.astype(float), frame]))
+        representatives, labels = equal_rows(np.column_stack([labels.astype(float), frame]))
         if len(representatives) > (1.0 + APART) * count:
             raise InputError(
                 f"import {file}: expected the triangles of {files[0].name} in their order, got others: corners that "
@@ -102,11 +103,3 @@ def _welded(frames: Floats, files: Sequence[Path]) -> tuple[Frames, Faces]:
             )
     return frames[:, representatives], labels.reshape(-1, 3).astype(np.int32)
 
-
-def _same_rows(rows: Floats) -> tuple[Ints, Ints]:
-    """The first of each group of equal rows, in their order, and the number of each row's group."""
-    _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty(len(order), int)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[inverse.ravel()]
