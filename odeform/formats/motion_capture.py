@@ -1,7 +1,6 @@
 """Motion capture in C3D files: the paths of markers, read by the library c3d."""
 
 import io
-import struct
 import warnings
 from dataclasses import dataclass
 
@@ -54,10 +53,11 @@ def read_c3d(data: bytes, where: str) -> Capture:
             unit, rate = _text(reader, "POINT:UNITS").lower(), float(reader.point_rate)
             count = reader.last_frame - reader.first_frame + 1
             frames = [points[:, :4] for _, points, _ in reader.read_frames(analog_transform=False)]
-        except (AssertionError, AttributeError, KeyError, IndexError, TypeError, ValueError, struct.error) as error:
-            raise InputError(f"{where}: a damaged or unusual C3D file: {error or type(error).__name__}") from None
-        except (MemoryError, OverflowError, ZeroDivisionError, RecursionError) as error:
-            raise InputError(f"{where}: a damaged C3D file: {error or type(error).__name__}") from None
+        except AssertionError as error:  # header and parameters contradict each other
+            raise InputError(f"{where}: a damaged C3D file: {error}") from None
+        except Exception:
+            # the library raises anything on a broken file
+            raise InputError(f"{where}: a damaged C3D file: its parameters cannot be read") from None
     if len(frames) < max(count, 2):
         raise InputError(f"{where}: expected {max(count, 2)} frames, got {len(frames)}: truncated?")
     if not 0.0 < rate < float("inf"):

@@ -66,7 +66,8 @@ class _Reader:
         try:
             return np.array(words, dtype=bytes).astype(float if dtype.kind == "f" else np.int64)
         except (ValueError, OverflowError):
-            raise self.error(f"expected numbers, got {next(filter(_no_number, words), b'')[:40]!r}") from None
+            word = next(filter(_no_number, words), b"")[:40].decode("latin-1")
+            raise self.error(f"expected numbers, got {word!r}") from None
 
     def error(self, text: str) -> InputError:
         return InputError(f"{self.where}: byte {self.size - len(self.rest):,}: {text}")

@@ -72,7 +72,10 @@ REFUSED = {
     "a short row behind blank lines": (b"\n\nsequence,mass,rate\n\na,0.5\n", "line 5: expected 3 cells"),
     "no table": (b"", "expected a header with a column 'sequence', got an empty table"),
     "no column": (b"name,mass\na,0.5\n", "line 1: expected a column 'sequence', .*got 'name', 'mass'"),
-    "spaces between cells": (b"sequence mass rate\na 0.5 10\n", "semicolons, tabs or bars between cells, got 'sequence m"),
+    "spaces between cells": (
+        b"sequence mass rate\na 0.5 10\n",
+        "semicolons, tabs or bars between cells, got 'sequence m",
+    ),
     "another separator than stated": (b"sep=;\nsequence,mass\na,0.5\n", "';', as `sep=` says"),
     "two columns": (b"sequence,mass,mass\na,0.5,1\n", "line 1: two columns 'mass'"),
     "a column without a name": (b"sequence,,rate\na,0.5,10\n", "line 1: column 2 has no name"),

@@ -171,7 +171,7 @@ def _sequence(folder: Path) -> tuple[SourceSequence, _Scene]:
     def read() -> tuple[Frames, Faces]:
         return _frames(files, offsets), _faces(folder, len(read_geometry(files[0]).points))
 
-    return SourceSequence(folder.name, parameters | first, len(files), read), scene
+    return SourceSequence(folder.name, parameters | first, len(files), read, metric=True), scene
 
 
 def _frames(files: list[Path], offsets: Floats) -> Frames:

@@ -40,6 +40,8 @@ def convert_source(
         splits = assign_splits(len(splits), seed)
     doubts = list(source.doubts)
     provenance = {**source.provenance, "rate_hz": source.rate, **({"split_seed": seed} if drawn else {})}
+    if unit != "m" and any(found.metric for found in source.sequences):
+        doubts.append(f"the unit {unit} is not used where files say their own")
     provenance |= {} if unit == "m" else {"unit": unit}
     entries: list[Entry] = []
     mesh: Mesh | None = None

@@ -102,4 +102,3 @@ def _welded(frames: Floats, files: Sequence[Path]) -> tuple[Frames, Faces]:
                 "meet there are apart here; export as .ply or .obj, which keep vertices"
             )
     return frames[:, representatives], labels.reshape(-1, 3).astype(np.int32)
-

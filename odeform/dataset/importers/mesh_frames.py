@@ -8,6 +8,7 @@ column per parameter, with its unit in brackets if it has one: `mass (kg)`. Colu
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 from odeform.dataset.importers.foreign import convertible
 from odeform.dataset.importers.frame_folder import frame_folder, visible
@@ -20,7 +21,7 @@ from odeform.errors import InputError
 __all__ = ["has_table", "mesh_source"]
 
 SHOWN = 5  # names in a note
-Names = Mapping[str, Sequence[Path]]
+Stored = Mapping[str, Sequence[Path]]
 
 
 def mesh_source(root: Path, rate: float | None = None) -> Source:
@@ -28,12 +29,11 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
     frames are resampled. Raises `InputError` for any mistake in it, and without a table."""
     table = find_table(root)
     parsed = read_rows(table)
-    stored: dict[str, list[Path]] = {}
-    for path in visible(root):
-        if path.is_dir() or path.suffix.lower() in SEQUENCE_FILES:
-            for name in {path.name, path.name if path.is_dir() else _stem(path)}:
-                stored.setdefault(name, []).append(path)
-    recordings = {row.name: _recording(row, stored, root, table) for row in parsed.rows}
+    stored = _stored(root)
+    found = [(row, _place(row, stored, root, table)) for row in parsed.rows]
+    recordings = {path.name if path.is_dir() else _stem(path): _recording(path) for _, path in found}
+    if len(recordings) < len(found):
+        raise InputError(f"import {table}: expected each sequence only once")
     rates = parsed.rates if rate is None else (rate,)
     if len(rates) > 1 or not all(0.0 < given < float("inf") for given in rates):
         got = ", ".join(f"{given:g}" for given in rates)
@@ -41,12 +41,26 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
     used = rates[0] if rates else common_rate(recordings, f"import {table}")
     frames, notes = frames_at(used, recordings, bool(rates))
     sequences = tuple(
-        SourceSequence(row.name, row.parameters, *frames[row.name], row.split, recordings[row.name].metric)
-        for row in parsed.rows
+        SourceSequence(name, row.parameters, *frames[name], row.split, recordings[name].metric)
+        for name, (row, _) in zip(recordings, found, strict=True)
     )
+    doubts = (*parsed.notes, *_left_out(stored, [path for _, path in found], recordings, root), *notes)
     made: dict[str, Any] = {"imported": root.name, "layout": "meshes"}
-    doubts = (*parsed.notes, *_left_out(stored, parsed.rows, recordings, root), *notes)
     return Source(f"imported-{root.name}", used, sequences, parsed.units, provenance=made, doubts=doubts)
+
+
+def _stored(root: Path) -> Stored:
+    """What a row may name: folders, and files of sequences with and without their ending."""
+    stored: dict[str, list[Path]] = {}
+    for path in visible(root):
+        if path.is_dir() or path.suffix.lower() in SEQUENCE_FILES:
+            for name in {path.name, path.name if path.is_dir() else _stem(path)}:
+                stored.setdefault(normalize("NFC", name), []).append(path)
+    return stored
+
+
+def _recording(path: Path) -> Recording:
+    return frame_folder(path) if path.is_dir() else SEQUENCE_FILES[path.suffix.lower()](path)
 
 
 def _stem(path: Path) -> str:
@@ -54,7 +68,7 @@ def _stem(path: Path) -> str:
     return path.with_suffix("").stem if path.suffix.lower() == ".series" else path.stem
 
 
-def _recording(row: Row, stored: Names, root: Path, table: Path) -> Recording:
+def _place(row: Row, stored: Stored, root: Path, table: Path) -> Path:
     """The folder or file of a row; what lists frames comes before the folder of these frames."""
     found = list(stored.get(row.name, ()))
     lists = [path for path in found if path.suffix.lower() in (".pvd", ".series")]
@@ -67,13 +81,12 @@ def _recording(row: Row, stored: Names, root: Path, table: Path) -> Recording:
         raise InputError(
             f"import {table}: {row.where}: expected one {row.name}, got {' and '.join(path.name for path in found)}"
         )
-    path = found[0]
-    return frame_folder(path) if path.is_dir() else SEQUENCE_FILES[path.suffix.lower()](path)
+    return found[0]
 
 
-def _left_out(stored: Names, rows: Sequence[Row], recordings: Mapping[str, Recording], root: Path) -> list[str]:
+def _left_out(stored: Stored, used: Sequence[Path], recordings: Mapping[str, Recording], root: Path) -> list[str]:
     """A note on folders and files that no row uses."""
-    named = {path for row in rows for path in stored.get(row.name, ())}
+    named = {path for paths in stored.values() if set(paths) & set(used) for path in paths}
     named |= {path for found in recordings.values() for file in found.listed for path in (file, *file.parents)}
     others = sorted({path.name for paths in stored.values() for path in paths if path not in named})
     if not others:
