@@ -58,7 +58,7 @@ def test_what_is_no_position_is_left_out() -> None:
 def test_gaps_are_named() -> None:
     points = moving()
     points[2:4, 1, 3] = -1.0
-    with pytest.raises(InputError, match="a.c3d: marker LKNE is not seen in 2 of 5 frames, first in frame 3: fill"):
+    with pytest.raises(InputError, match=r"a.c3d: marker LKNE is not seen in 2 of 5 frames, first in frame 3: fill"):
         read_c3d(capture(points), "a.c3d")
 
 
