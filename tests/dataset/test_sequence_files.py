@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from authors import TETRAHEDRON
+from fuzz.vtk_files import legacy, polydata, unstructured
 from own_sequences import (
     CORNERS,
     TABLE,
@@ -18,7 +19,6 @@ from own_sequences import (
     refused,
     shape,
 )
-from vtk_files import legacy, polydata, unstructured
 
 from odeform.dataset.importers.registry import import_dataset
 from odeform.errors import InputError

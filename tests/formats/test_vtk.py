@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from vtk_files import legacy, polydata, unstructured
+from fuzz.vtk_files import legacy, polydata, unstructured
 
 import odeform
 from odeform.errors import InputError

@@ -17,6 +17,8 @@ from odeform.formats.splat_spz import spz_bytes
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import GaussianSplats, MotionSequence
 
+from .vtk_files import legacy, polydata, unstructured
+
 __all__ = ["dataset", "shapes"]
 
 
@@ -28,6 +30,11 @@ def shapes() -> dict[str, bytes]:
     files["ascii.ply"] = mesh.export(file_type="ply", encoding="ascii")
     files["scene.glb"] = trimesh.Scene([mesh, mesh.copy().apply_translation([3.0, 0.0, 0.0])]).export(file_type="glb")
     files["points.ply"] = _exported(trimesh.PointCloud(mesh.vertices), "ply")
+    faces = np.asarray(mesh.faces)
+    files["text.vtk"] = legacy(mesh.vertices, faces)
+    files["binary.vtk"] = legacy(mesh.vertices, faces, {"v": mesh.vertices}, binary=True)
+    files |= {f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "raw")}
+    files["cells.vtu"] = unstructured(mesh.vertices, faces, 5, form="raw")
     text = io.StringIO()
     np.savetxt(text, mesh.vertices)
     files["points.xyz"] = text.getvalue().encode()
