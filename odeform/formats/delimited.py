@@ -24,7 +24,9 @@ COMMENT = re.compile(r"\s*(?:#|%|//)")
 SEPARATOR_LINE = re.compile(r'\s*"?sep=(.)"?\s*', re.IGNORECASE)
 NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?\d*,\d+(?:[eE][+-]?\d+)?", re.ASCII)
-THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
+INDEX = ("", "Unnamed: 0", "#")
+"""Names of a first column that numbers the rows."""
 UNIT = re.compile(r"(.*?)\s*(?:\(([^()]*)\)?|\[([^\[\]]*)\]?)")
 
 Rows = list[tuple[int, list[str]]]
@@ -57,7 +59,7 @@ def read_table(path: Path, where: str, key: str) -> Table:
         text, notes = decoded(read_limited(path, where, LARGEST), where)
     except OSError as error:
         raise InputError(f"{where}: cannot be read: {error.strerror}") from None
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    lines = text.rstrip("\x1a").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     first = next((index for index, line in enumerate(lines) if line.strip(" \t,;|")), 0)
     separator = ""
     if lines and (stated := SEPARATOR_LINE.fullmatch(lines[first])):
@@ -93,8 +95,9 @@ def _without_comments(lines: list[str], key: str) -> list[str]:
     if key not in plain.casefold():
         for index, line in enumerate(lines):
             bare = COMMENT.sub("", line, count=1)
-            if comments[index] and re.match(rf'\s*"?{key}"?\s*[,;\t|]', bare.casefold()):
-                comments[index], lines[index] = False, bare
+            if comments[index] and re.match(rf'[\s,;|]*"?{key}"?\s*[,;\t|]', bare.casefold()):
+                numbers_rows = bare[:1] in SEPARATORS  # `#` is the name of a column
+                comments[index], lines[index] = False, line if numbers_rows else bare
                 break
     return ["" if comment else line for line, comment in zip(lines, comments, strict=True)]
 
@@ -102,11 +105,18 @@ def _without_comments(lines: list[str], key: str) -> list[str]:
 def _split(lines: list[str], stated: str, where: str, key: str) -> tuple[str, Rows]:
     """The separator, and the rows that are not blank, the header first."""
     tried: Rows = []
+    broken: InputError | None = None
     for separator in (stated,) if stated else SEPARATORS:
-        rows = _cells(lines, separator, where)
+        try:
+            rows = _cells(lines, separator, where)
+        except InputError as error:
+            broken = broken or error
+            continue
         if rows and any(cell.casefold() == key for cell in rows[0][1]) and (stated or len(rows[0][1]) > 1):
             return separator, rows
         tried = max(tried, rows[:1], key=lambda rows: len(rows[0][1]) if rows else 0)
+    if broken:
+        raise broken
     if not tried:
         raise InputError(f"{where}: expected a header with a column {key!r}, got an empty table")
     got = ", ".join(repr(cell) for cell in tried[0][1][:5])
@@ -141,15 +151,21 @@ def _columns(rows: Rows, separator: str, where: str, key: str) -> tuple[list[str
                 f"as in the header, got {len(cells)}{hint if separator == ',' and len(cells) > len(header) else ''}"
             )
     notes: tuple[str, ...] = ()
-    if header[0] in ("", "Unnamed: 0") and _numbers_rows([cells[0] for _, cells in body]):
+    if header[0] in INDEX and _numbers_rows([cells[0] for _, cells in body]):
         name = f"{header[0]!r}" if header[0] else "without a name"
         header, body = header[1:], [(number, cells[1:]) for number, cells in body]
         notes = (f"{where}: the first column, {name}, numbers the rows and is left out",)
+    empty = [index for index, name in enumerate(header) if not name and not any(cells[index] for _, cells in body)]
+    header, body = _without(header, empty), [(number, _without(cells, empty)) for number, cells in body]
     if "" in header:
         raise InputError(f"{where}: line {line}: column {header.index('') + 1} has no name")
     if doubled := [name for name in header if header.count(name) > 1]:
         raise InputError(f"{where}: line {line}: two columns {doubled[0]!r}")
     return header, body, notes
+
+
+def _without(cells: list[str], columns: list[int]) -> list[str]:
+    return [cell for index, cell in enumerate(cells) if index not in columns] if columns else cells
 
 
 def _trimmed(cells: list[str], least: int) -> list[str]:
@@ -164,7 +180,7 @@ def _numbers_rows(cells: Sequence[str]) -> bool:
 
 
 def _with_points(rows: Rows, name: int, where: str) -> tuple[Rows, tuple[str, ...]]:
-    """Rows with decimal points for decimal commas, but in the column of names, and a note if they may be thousands."""
+    """Rows with decimal points for decimal commas, but in the column of names; a note if all may group thousands."""
     cells = [cell for _, cells in rows for index, cell in enumerate(cells) if index != name]
     commas = [cell for cell in cells if COMMA_NUMBER.fullmatch(cell)]
     points = [cell for cell in cells if "." in cell and NUMBER.fullmatch(cell)]
@@ -173,8 +189,9 @@ def _with_points(rows: Rows, name: int, where: str) -> tuple[Rows, tuple[str, ..
     pointed = [
         (line, [cell if index == name else _pointed(cell) for index, cell in enumerate(cells)]) for line, cells in rows
     ]
-    doubtful = bool(commas) and all(map(THOUSANDS.fullmatch, commas))
-    return pointed, (f"{where}: {commas[0]} is read as {_pointed(commas[0])}",) if doubtful else ()
+    decimals = commas or points
+    doubtful = bool(decimals) and all(map(THOUSANDS.fullmatch, decimals))
+    return pointed, (f"{where}: {decimals[0]} is read as a decimal, not as thousands",) if doubtful else ()
 
 
 def _pointed(cell: str) -> str:

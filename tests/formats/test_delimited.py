@@ -43,6 +43,10 @@ SAME = {
     "pandas with an index": b",sequence,mass (kg),rate\n0,a,0.5,10\n1,b,0.8,10\n",
     "pandas, index read and written": b"Unnamed: 0,sequence,mass (kg),rate\n0,a,0.5,10\n1,b,0.8,10\n",
     "write.csv of R": b'"","sequence","mass (kg)","rate"\n"1","a",0.5,10\n"2","b",0.8,10\n',
+    "numbered rows": b"#,sequence,mass (kg),rate\n1,a,0.5,10\n2,b,0.8,10\n",
+    "all quoted by LibreOffice": GERMAN.replace(";", '";"').replace("\r\n", '"\r\n"').join('""').encode()[:-2],
+    "an empty column": b"sequence,,mass (kg),rate\na,,0.5,10\nb,,0.8,10\n",
+    "the end of a file in CP/M": PLAIN.encode() + b"\x1a",
     "capital letters": PLAIN.replace("sequence", "Sequence").encode(),
     "exponents": b"sequence,mass (kg),rate\na,5e-1,1.0E+1\nb,+.8,10.\n",
     "German exponents": b"sequence;mass (kg);rate\na;5,0E-1;1,0E+1\nb;,8;10\n",
@@ -117,7 +121,10 @@ def test_guesses_are_said(tmp_path: Path) -> None:
         return read_table(path, "import t", "sequence").notes
 
     assert notes(PLAIN.encode()) == notes(GERMAN.encode()) == ()
-    assert "1,250 is read as 1.250" in notes(b"sequence;mass\na;1,250\nb;2,500\n")[0]
+    for mark in (b",", b"."):
+        ambiguous = b"sequence;mass\na;1%s250\nb;2%s500\n" % (mark, mark)
+        assert "250 is read as a decimal, not as thousands" in notes(ambiguous)[0]
+    assert notes(b"sequence;mass\na;1,250\nb;0,500\n") == ()
     assert "Windows-1252" in notes("sequence,Stärke\na,0.5\n".encode("cp1252"))[0]
     assert "first column" in notes(SAME["pandas with an index"])[0]
 

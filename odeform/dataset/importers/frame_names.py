@@ -8,20 +8,24 @@ from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from odeform.errors import InputError
+from odeform.types import Floats
 
 __all__ = ["Numbered", "even_step", "numbered_frames"]
 
 SEPARATED = r"(?:^|(?<=[\s_.,=+(\[-]))-"  # a minus behind a letter or a digit separates
+MANTISSA = r"(?:\d+(?:[.,]\d+)?|(?<![\w.])\.\d+|(?<=_)\.\d+)"
 NUMBER = (
-    r"(?:{minus})?"
-    r"(?:\d+(?:[.,]\d+)?|(?<![\w.])\.\d+|(?<=_)\.\d+)"
-    r"(?:[eE][+-]\d+|(?<=[\s_.=+-]\d)[eE]\d+(?![A-Za-z0-9]))?"
+    r"(?<![A-Za-z0-9.,])(?:{minus})?" + MANTISSA + r"[eE][+-]\d+(?![A-Za-z0-9])"  # behind a letter, e- may be a name
+    r"|(?:{minus})?" + MANTISSA
 )
 NUMBERS = re.compile(NUMBER.format(minus=SEPARATED), re.ASCII)
 SIGNED = re.compile(NUMBER.format(minus="-"), re.ASCII)
 INTEGERS = re.compile(r"\d+", re.ASCII)
 FARTHEST = 300  # powers of ten
+COARSE = 0.2  # of a step: numbers that are rounded by more say nothing of it
 UNEVEN = 1e-3  # of a step: numbers that differ by less are evenly spaced
 SHOWN = 4  # names in a message
 TIMES = "if that is meant, give the times of the frames in a table times.csv"
@@ -74,36 +78,61 @@ def numbered_frames(files: Sequence[Path], where: str) -> Numbered:
             raise InputError(f"{where}: {first.path.name} and {second.path.name} are both frame {_short(one)}")
     numbers = tuple(float(value) for value, _ in values)
     decimal = any(re.search(r"[.,eE]", name.numbers[column]) for name in names)
-    steps = [float(two - one) for (one, _), (two, _) in pairwise(values)]
-    step = even_step(numbers, steps, where, [name.path.name for _, name in values], decimal)
+    first = values[0][0]
+    from_first = [float(value - first) for value, _ in values]  # integers of many digits stay exact
+    rounding = min(10.0 ** int(value.as_tuple().exponent) for value, _ in values) if decimal else 0.0
+    shown = [name.path.name for _, name in values]
+    step = even_step(from_first, where, shown, decimal, rounding, float(first))
     return Numbered(tuple(name.path for _, name in values), numbers, decimal, step)
 
 
 def even_step(
-    numbers: Sequence[float], steps: Sequence[float], where: str, names: Sequence[str], decimal: bool
+    numbers: Sequence[float], where: str, names: Sequence[str], decimal: bool, rounding: float = 0.0, first: float = 0.0
 ) -> float | None:
     """The step between numbers that increase; None for uneven decimals, which have no gap that is evident.
 
-    Raises `InputError`, which `where` leads, if numbers are missing, or are integers without a common step.
+    Numbers may be rounded to multiples of `rounding`; `first` is added to those in messages. Raises `InputError`, which
+    `where` leads, if numbers are missing, or are integers without a common step.
     """
-    step, often = Counter(float(f"{step:.9g}") for step in steps).most_common(1)[0]
-    step = step if often > 1 else min(steps)
-    odd = [index for index, width in enumerate(steps) if abs(width - step) > UNEVEN * step]
-    if not odd:
-        return step
-    index = odd[0]
-    before, after = names[index], names[index + 1]
-    multiples = all(abs(width / step - round(width / step)) < UNEVEN for width in steps)
-    if multiples and (not decimal or 2 * often >= len(steps)):
-        first, last = _short(numbers[index] + step), _short(numbers[index + 1] - step)
-        missing = f"frame {first} is" if first == last else f"frames {first} to {last} are"
-        raise InputError(f"{where}: {missing} missing between {before} and {after}; {TIMES}")
-    if not decimal:
-        raise InputError(
-            f"{where}: expected frames numbered in equal steps, got {before} and {after}, {_short(steps[index])} "
-            f"apart, among steps of {_short(step)}; {TIMES}"
-        )
-    return None
+    values = np.array(numbers)
+    steps = np.diff(values)
+    often = Counter(float(f"{step:.9g}") for step in steps).most_common(1)[0]
+    likely = often[0] if often[1] > 1 else float(steps.min())
+    for step, error in ((likely, 0.0), (float(np.median(steps)), 0.5 * rounding)):
+        fitted = _on_a_grid(values, step, error)
+        if fitted is None:
+            continue
+        step, skipped = fitted
+        if not skipped.any():
+            return step
+        if not decimal or 2 * np.count_nonzero(skipped) <= len(steps):
+            index = int(np.argmax(skipped > 0))
+            lowest, highest = first + numbers[index] + step, first + numbers[index + 1] - step
+            frames = f"frames {_short(lowest)} to {_short(highest)} are"
+            missing = f"frame {_short(lowest)} is" if skipped[index] == 1 else frames
+            between = f"between {names[index]} and {names[index + 1]}"
+            raise InputError(f"{where}: {missing} missing {between}; {TIMES}")
+    if decimal:
+        return None
+    index = int(np.argmax(steps != likely))
+    raise InputError(
+        f"{where}: expected frames numbered in equal steps, got {names[index]} and {names[index + 1]}, "
+        f"{_short(steps[index])} apart, among steps of {_short(likely)}; {TIMES}"
+    )
+
+
+def _on_a_grid(values: Floats, step: float, error: float) -> tuple[float, Floats] | None:
+    """The step of (T,) values that are multiples of it from the first, and how many multiples each step leaves out.
+
+    None for values that are off by more than a small part of the step and `error`, or if that is no small part.
+    """
+    if error > COARSE * step:
+        return None
+    widths = np.maximum(np.round(np.diff(values) / step), 1.0)
+    places = np.concatenate([[0.0], np.cumsum(widths)])
+    fitted = float((values[-1] - values[0]) / places[-1])
+    off = np.abs(values - values[0] - fitted * places).max()
+    return None if off > 2.0 * error + UNEVEN * fitted else (fitted, widths - 1.0)
 
 
 def _parsed(path: Path, pattern: re.Pattern[str]) -> _Name:
@@ -172,4 +201,4 @@ def _value(number: str, where: str) -> Decimal:
 
 
 def _short(number: float | Decimal) -> str:
-    return f"{float(number):.9g}"
+    return f"{float(number):.6g}" if abs(number) < 1e5 else f"{float(number):.17g}"

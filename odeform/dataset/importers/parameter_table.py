@@ -20,6 +20,8 @@ TABLES = ("parameters.csv", "parameters.json", "parameters.tsv")
 WORKBOOKS = ("parameters.xlsx", "parameters.xls", "parameters.ods", "parameters.numbers")
 SEQUENCE, SPLIT, RATE = "sequence", "split", "rate"
 SPLITS = ("train", "val", "test")
+COUNTERS = ("index", "id", "no", "no.", "nr", "nr.", "row", "run")
+"""Names of columns that more often number the rows than vary the motion."""
 HERTZ = ("", "hz", "1/s", "fps")
 
 
@@ -78,6 +80,9 @@ def read_rows(table: Path) -> ParameterTable:
             f"import {table}: expected a split for every sequence or for none, got none for {without[0]}"
             + (f" and {len(without) - 1} more" if len(without) > 1 else "")
         )
+    counters = [name for name in rows[0].parameters if name.casefold() in COUNTERS]
+    if counters:
+        notes += (f"import {table}: the column {counters[0]!r} is taken as a parameter: leave it out if it is none",)
     return ParameterTable(tuple(rows), units, tuple(sorted(rates)), notes)
 
 

@@ -13,7 +13,7 @@ from odeform.types import Faces, Frames, Times
 
 __all__ = ["Read", "Recording", "common_rate", "frames_at"]
 
-SAME = 1e-3  # relative: rates that differ by less are one
+SAME = 1e-2  # relative: steps of rounded numbers that differ by less are one
 MOST = 1_000_000  # frames
 
 Read = Callable[[], tuple[Frames, Faces]]
@@ -58,7 +58,7 @@ def common_rate(recordings: Mapping[str, Recording], where: str) -> float:
         name, found = without[0]
         hint = ""
         if found.decimal and found.step:
-            hint = f"; {name} counts in steps of {found.step:g}: if these are seconds, --rate {1 / found.step:g}"
+            hint = f"; {name} counts in steps of {found.step:g}: if these are seconds, --rate {_hertz(found.step)}"
         raise InputError(f"{where}: expected one rate in Hz, in a column 'rate' or by --rate, got none{hint}")
     times = next(iter(recordings.values()))
     even = even_times(np.asarray(times.times), times.where)
@@ -113,10 +113,16 @@ def _doubt(recording: Recording, rate: float) -> str:
             "times, list them in times.csv"
         )
     if recording.decimal and step and abs(1.0 / step - rate) > SAME * rate:
-        return f"the names count in steps of {step:g}; if these are seconds, the rate is {1 / step:g} Hz, not {rate:g}"
+        return (
+            f"the names count in steps of {step:g}; if these are seconds, the rate is {_hertz(step)} Hz, not {rate:g}"
+        )
     if step and not recording.decimal and step != 1.0:
         return f"frames are numbered in steps of {step:g}; they are taken {1 / rate:g} s apart"
     return ""
+
+
+def _hertz(step: float) -> str:
+    return f"{float(f'{1.0 / step:.3g}'):g}"
 
 
 def _timed(recording: Recording, times: Times, rate: float, given: bool) -> tuple[int, Read, str]:
@@ -125,7 +131,7 @@ def _timed(recording: Recording, times: Times, rate: float, given: bool) -> tupl
     even = even_times(times, where)
     if recording.counted and given:
         names = [f"time {time:g}" for time in times]
-        step = even_step(times.tolist(), np.diff(times).tolist(), where, names, decimal=False)
+        step = even_step(times.tolist(), where, names, decimal=False)
         if rate * (step or 1.0) != 1.0:
             note = f"the times are integers; they are taken to count frames, {1 / rate:g} s apart"
             return recording.count, recording.read, note
