@@ -81,6 +81,7 @@ REFUSED = {
     "no numbers": ("first last", "expected one sequence"),
     "steps and frames": ("Step-1-Frame-0 Step-1-Frame-1 Step-2-Frame-0", "one number that counts .*got 2 that vary"),
     "decimals with a letter": ("t0p25 t0p5 t1p0", "got 2 that vary"),
+    "far beyond all times": ("f_1e-99999999999999999999 f_2e-3", "plausible size"),
     "beyond all times": ("f_1e+999 f_2e+999", r"plausible size, got 1e\+999"),
 }
 

@@ -123,7 +123,7 @@ def test_fields_of_displacements_in_one_file(tmp_path: Path) -> None:
     _, sequence = imported(root)
     assert heights(sequence) == [0.8, 0.9, 1.0]
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {"displacement0": CORNERS, "displacement2": CORNERS}))
-    with pytest.raises(InputError, match=r"a.vtk: field 1 is missing between displacement0 and displacement2"):
+    with pytest.raises(InputError, match=r"a.vtk: frame 1 is missing between displacement0 and displacement2"):
         imported(root)
 
 

@@ -4,16 +4,16 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
+from decimal import Decimal, InvalidOperation
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
+from odeform.dataset.importers.even_steps import even_step, short
 from odeform.errors import InputError
-from odeform.types import Floats
 
-__all__ = ["Numbered", "even_step", "numbered_frames"]
+__all__ = ["Numbered", "numbered_frames"]
 
 SEPARATED = r"(?:^|(?<=[\s_.,=+(\[-]))-"  # a minus behind a letter or a digit separates
 MANTISSA = r"(?:\d+(?:[.,]\d+)?|(?<![\w.])\.\d+|(?<=_)\.\d+)"
@@ -25,10 +25,8 @@ NUMBERS = re.compile(NUMBER.format(minus=SEPARATED), re.ASCII)
 SIGNED = re.compile(NUMBER.format(minus="-"), re.ASCII)
 INTEGERS = re.compile(r"\d+", re.ASCII)
 FARTHEST = 300  # powers of ten
-COARSE = 0.2  # of a step: numbers that are rounded by more say nothing of it
-UNEVEN = 1e-3  # of a step: numbers that differ by less are evenly spaced
 SHOWN = 4  # names in a message
-TIMES = "if that is meant, give the times of the frames in a table times.csv"
+TIMES = "; if that is meant, give the times of the frames in a table times.csv"
 
 
 @dataclass(frozen=True)
@@ -75,64 +73,15 @@ def numbered_frames(files: Sequence[Path], where: str) -> Numbered:
     values = sorted(((_value(name.numbers[column], where), name) for name in names), key=lambda pair: pair[0])
     for (one, first), (two, second) in pairwise(values):
         if one == two:
-            raise InputError(f"{where}: {first.path.name} and {second.path.name} are both frame {_short(one)}")
+            raise InputError(f"{where}: {first.path.name} and {second.path.name} are both frame {short(one)}")
     numbers = tuple(float(value) for value, _ in values)
     decimal = any(re.search(r"[.,eE]", name.numbers[column]) for name in names)
     first = values[0][0]
-    from_first = [float(value - first) for value, _ in values]  # integers of many digits stay exact
+    from_first = np.array([float(value - first) for value, _ in values])  # integers of many digits stay exact
     rounding = min(10.0 ** int(value.as_tuple().exponent) for value, _ in values) if decimal else 0.0
     shown = [name.path.name for _, name in values]
-    step = even_step(from_first, where, shown, decimal, rounding, float(first))
+    step = even_step(from_first, where, shown, decimal, rounding, float(first), TIMES)
     return Numbered(tuple(name.path for _, name in values), numbers, decimal, step)
-
-
-def even_step(
-    numbers: Sequence[float], where: str, names: Sequence[str], decimal: bool, rounding: float = 0.0, first: float = 0.0
-) -> float | None:
-    """The step between numbers that increase; None for uneven decimals, which have no gap that is evident.
-
-    Numbers may be rounded to multiples of `rounding`; `first` is added to those in messages. Raises `InputError`, which
-    `where` leads, if numbers are missing, or are integers without a common step.
-    """
-    values = np.array(numbers)
-    steps = np.diff(values)
-    often = Counter(float(f"{step:.9g}") for step in steps).most_common(1)[0]
-    likely = often[0] if often[1] > 1 else float(steps.min())
-    for step, error in ((likely, 0.0), (float(np.median(steps)), 0.5 * rounding)):
-        fitted = _on_a_grid(values, step, error)
-        if fitted is None:
-            continue
-        step, skipped = fitted
-        if not skipped.any():
-            return step
-        if not decimal or 2 * np.count_nonzero(skipped) <= len(steps):
-            index = int(np.argmax(skipped > 0))
-            lowest, highest = first + numbers[index] + step, first + numbers[index + 1] - step
-            frames = f"frames {_short(lowest)} to {_short(highest)} are"
-            missing = f"frame {_short(lowest)} is" if skipped[index] == 1 else frames
-            between = f"between {names[index]} and {names[index + 1]}"
-            raise InputError(f"{where}: {missing} missing {between}; {TIMES}")
-    if decimal:
-        return None
-    index = int(np.argmax(steps != likely))
-    raise InputError(
-        f"{where}: expected frames numbered in equal steps, got {names[index]} and {names[index + 1]}, "
-        f"{_short(steps[index])} apart, among steps of {_short(likely)}; {TIMES}"
-    )
-
-
-def _on_a_grid(values: Floats, step: float, error: float) -> tuple[float, Floats] | None:
-    """The step of (T,) values that are multiples of it from the first, and how many multiples each step leaves out.
-
-    None for values that are off by more than a small part of the step and `error`, or if that is no small part.
-    """
-    if error > COARSE * step:
-        return None
-    widths = np.maximum(np.round(np.diff(values) / step), 1.0)
-    places = np.concatenate([[0.0], np.cumsum(widths)])
-    fitted = float((values[-1] - values[0]) / places[-1])
-    off = np.abs(values - values[0] - fitted * places).max()
-    return None if off > 2.0 * error + UNEVEN * fitted else (fitted, widths - 1.0)
 
 
 def _parsed(path: Path, pattern: re.Pattern[str]) -> _Name:
@@ -194,11 +143,10 @@ def _mixed_widths(numbers: list[str]) -> bool:
 
 
 def _value(number: str, where: str) -> Decimal:
-    value = Decimal(number.replace(",", "."))
-    if abs(value.adjusted()) > FARTHEST:
+    try:
+        value = Decimal(number.replace(",", "."))
+    except InvalidOperation:  # an exponent of many digits
+        value = Decimal("inf")
+    if not value.is_finite() or abs(value.adjusted()) > FARTHEST:
         raise InputError(f"{where}: expected numbers of frames of a plausible size, got {number}")
     return value
-
-
-def _short(number: float | Decimal) -> str:
-    return f"{float(number):.6g}" if abs(number) < 1e5 else f"{float(number):.17g}"

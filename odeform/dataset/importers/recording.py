@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from odeform.dataset.importers.frame_names import even_step
+from odeform.dataset.importers.even_steps import even_step
 from odeform.dataset.resampling import even_times, is_even, resampled
 from odeform.errors import InputError
 from odeform.types import Faces, Frames, Times
@@ -131,7 +131,7 @@ def _timed(recording: Recording, times: Times, rate: float, given: bool) -> tupl
     even = even_times(times, where)
     if recording.counted and given:
         names = [f"time {time:g}" for time in times]
-        step = even_step(times.tolist(), where, names, decimal=False)
+        step = even_step(times - times[0], where, names, decimal=False, first=float(times[0]))
         if rate * (step or 1.0) != 1.0:
             note = f"the times are integers; they are taken to count frames, {1 / rate:g} s apart"
             return recording.count, recording.read, note

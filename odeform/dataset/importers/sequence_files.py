@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from odeform.budget import MEMORY, read_limited
+from odeform.dataset.importers.even_steps import even_step
 from odeform.dataset.importers.frame_folder import frame_folder, recorded_files
 from odeform.dataset.importers.frame_reading import DISPLACEMENT, VTK
 from odeform.dataset.importers.recording import Recording
@@ -73,7 +74,7 @@ def vtk_recording(path: Path) -> Recording:
     grid = read_grid(path, where)
     numbered = {}
     for name in grid.vectors:
-        stem, digits = re.fullmatch(r"(.*?)[_.@ ]*(\d*)", name, re.DOTALL).groups()  # pyright: ignore[reportOptionalMemberAccess]
+        stem, digits = re.fullmatch(r"(.*?)[_.@ ]*(\d{0,15})", name, re.DOTALL).groups()  # pyright: ignore[reportOptionalMemberAccess]
         if digits and DISPLACEMENT.search(stem):
             numbered.setdefault(stem, {})[int(digits)] = name
     if len(numbered) != 1:
@@ -83,9 +84,8 @@ def vtk_recording(path: Path) -> Recording:
         )
     ((_, found),) = numbered.items()
     order = sorted(found)
-    if missing := sorted(set(range(order[0], order[-1])) - set(order))[:1]:
-        raise InputError(f"{where}: field {missing[0]} is missing between {found[order[0]]} and {found[order[-1]]}")
     fields = [found[number] for number in order]
+    even_step(np.array(order, float) - order[0], where, fields, decimal=False, first=float(order[0]))
 
     def read() -> tuple[Frames, Faces]:
         meshes = [
