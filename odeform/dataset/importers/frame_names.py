@@ -73,7 +73,7 @@ def numbered_frames(files: Sequence[Path], where: str) -> Numbered:
     values = sorted(((_value(name.numbers[column], where), name) for name in names), key=lambda pair: pair[0])
     for (one, first), (two, second) in pairwise(values):
         if one == two:
-            raise InputError(f"{where}: {first.path.name} and {second.path.name} are both frame {short(one)}")
+            raise InputError(f"{where}: {first.path.name} and {second.path.name} are both frame {short(float(one))}")
     numbers = tuple(float(value) for value, _ in values)
     decimal = any(re.search(r"[.,eE]", name.numbers[column]) for name in names)
     first = values[0][0]
