@@ -27,6 +27,7 @@ class MotionArrays:
         faces: (F, 3), or None.
         others: The arrays `weights` and `parameters`, as far as they are there.
         counted: Whether the times are integers, which may count frames instead of seconds.
+        unused: The names of further arrays.
     """
 
     vertices: Frames
@@ -34,6 +35,7 @@ class MotionArrays:
     faces: Faces | None
     others: dict[str, np.ndarray]
     counted: bool
+    unused: tuple[str, ...]
 
 
 def read_motion_arrays(data: bytes, where: str) -> MotionArrays:
@@ -63,6 +65,7 @@ def read_motion_arrays(data: bytes, where: str) -> MotionArrays:
         arrays.get(chosen["faces"]),
         {name: arrays[name] for name in others},
         times is not None and times.dtype.kind in "iu",
+        tuple(sorted(names - set(arrays))),
     )
 
 

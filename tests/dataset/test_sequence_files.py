@@ -103,6 +103,24 @@ def test_other_lists_are_refused(entries: str, message: str, tmp_path: Path) -> 
     refused(pvd(tmp_path / "src", entries), f"a.pvd: .*{message}")
 
 
+def test_a_list_among_the_frames_says_their_times(tmp_path: Path) -> None:
+    root = tmp_path / "src"
+    for name in ("a", "b"):
+        (root / name).mkdir(parents=True)
+        entries = ""
+        for k in range(3):
+            (root / name / f"f_{k}.vtp").write_bytes(polydata(shape(0.1 * k), TETRAHEDRON))
+            entries += f'<DataSet timestep="{0.5 * k}" file="f_{k}.vtp"/>'
+        (root / name / "all.pvd").write_text(f'<VTKFile type="Collection"><Collection>{entries}</Collection></VTKFile>')
+    (root / "parameters.csv").write_text(WITHOUT_RATE)
+    dataset, sequence = imported(root)
+    assert dataset.schema.window.rate == 2.0
+    assert heights(sequence) == [0.0, 0.1, 0.2]
+    (root / "a/more.pvd").touch()
+    with pytest.raises(InputError, match=r"expected one sequence, got the lists all.pvd and more.pvd"):
+        imported(root)
+
+
 def test_integer_times_count_frames_where_a_rate_is_given(tmp_path: Path) -> None:
     entries = "".join(f'<DataSet timestep="{k}" file="f{k}.vtp"/>' for k in range(3))
     root = pvd(tmp_path / "src", entries)
@@ -122,8 +140,8 @@ def test_fields_of_displacements_in_one_file(tmp_path: Path) -> None:
     (root / "parameters.csv").write_text(TABLE)
     _, sequence = imported(root)
     assert heights(sequence) == [0.8, 0.9, 1.0]
-    (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {"displacement0": CORNERS, "displacement2": CORNERS}))
-    with pytest.raises(InputError, match=r"a.vtk: frame 1 is missing between displacement0 and displacement2"):
+    (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {f"displacement{k}": CORNERS for k in (0, 1, 3)}))
+    with pytest.raises(InputError, match=r"a.vtk: frame 2 is missing between displacement1 and displacement3"):
         imported(root)
 
 
@@ -144,13 +162,25 @@ def test_arrays_of_vertices(names: tuple[str, str], tmp_path: Path) -> None:
     assert heights(sequence) == [0.0, 0.2, 0.4]
 
 
+def test_times_that_are_hardly_seconds_are_doubted(tmp_path: Path) -> None:
+    root = tmp_path / "src"
+    root.mkdir()
+    for name in ("a", "b"):
+        np.savez(root / f"{name}.npz", t=20.0 * np.arange(3), vertices=np.stack([shape(0.1 * k) for k in range(3)]))
+    (root / "parameters.csv").write_text(WITHOUT_RATE)
+    dataset, _ = imported(root)
+    assert dataset.provenance["notes"] == ["the times make 0.05 frames per second: are they in seconds?"]
+
+
 def test_points_without_faces_are_a_body_too(tmp_path: Path) -> None:
     root = tmp_path / "src"
     root.mkdir()
     for name in ("a", "b"):
-        np.savez(root / f"{name}.npz", times=0.1 * np.arange(3), positions=np.stack([shape(0.1 * k) for k in range(3)]))
+        positions = np.stack([shape(0.1 * k) for k in range(3)])
+        np.savez(root / f"{name}.npz", times=0.1 * np.arange(3), positions=positions, labels=np.array(["Tip"]))
     (root / "parameters.csv").write_text(WITHOUT_RATE)
-    _, sequence = imported(root)
+    dataset, sequence = imported(root)
+    assert dataset.provenance["notes"] == ["a and 1 more: arrays left out: labels"]
     assert sequence.faces.shape == (0, 3)
     assert np.allclose(sequence.weights, 0.25)
 

@@ -77,7 +77,8 @@ def _read(found: SourceSequence, rate: float, metres: float) -> MotionSequence:
     vertices, faces = found.read()
     vertices = vertices if metres == 1.0 else metres * vertices
     if not np.isfinite(vertices).all():
-        raise InputError(f"{found.name}: expected finite vertices")
+        frame, vertex, _ = np.argwhere(~np.isfinite(vertices))[0]
+        raise InputError(f"{found.name}: expected finite vertices, frame {frame} has another number at vertex {vertex}")
     weights = surface_weights(Mesh(vertices[0], faces))
     return MotionSequence(np.arange(len(vertices)) / rate, vertices.astype(np.float32), faces, weights, name=found.name)
 

@@ -11,16 +11,17 @@ from typing import Any
 from unicodedata import normalize
 
 from odeform.dataset.importers.foreign import convertible
-from odeform.dataset.importers.frame_folder import frame_folder, visible
+from odeform.dataset.importers.frame_folder import visible
 from odeform.dataset.importers.parameter_table import Row, find_table, has_table, read_rows
 from odeform.dataset.importers.recording import Recording, common_rate, frames_at
-from odeform.dataset.importers.sequence_files import SEQUENCE_FILES
+from odeform.dataset.importers.sequence_files import LISTS, SEQUENCE_FILES, folder_recording
 from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
 
 __all__ = ["has_table", "mesh_source"]
 
 SHOWN = 5  # names in a note
+PLAUSIBLE = (1.0, 1e5)  # Hz
 Stored = Mapping[str, Sequence[Path]]
 
 
@@ -44,6 +45,8 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
         SourceSequence(name, row.parameters, *frames[name], row.split, recordings[name].metric)
         for name, (row, _) in zip(recordings, found, strict=True)
     )
+    if not rates and not PLAUSIBLE[0] <= used <= PLAUSIBLE[1]:
+        notes = (*notes, f"the times make {used:g} frames per second: are they in seconds?")
     doubts = (*parsed.notes, *_left_out(stored, [path for _, path in found], recordings, root), *notes)
     made: dict[str, Any] = {"imported": root.name, "layout": "meshes"}
     return Source(f"imported-{root.name}", used, sequences, parsed.units, provenance=made, doubts=doubts)
@@ -60,7 +63,7 @@ def _stored(root: Path) -> Stored:
 
 
 def _recording(path: Path) -> Recording:
-    return frame_folder(path) if path.is_dir() else SEQUENCE_FILES[path.suffix.lower()](path)
+    return folder_recording(path) if path.is_dir() else SEQUENCE_FILES[path.suffix.lower()](path)
 
 
 def _stem(path: Path) -> str:
@@ -71,7 +74,7 @@ def _stem(path: Path) -> str:
 def _place(row: Row, stored: Stored, root: Path, table: Path) -> Path:
     """The folder or file of a row; what lists frames comes before the folder of these frames."""
     found = list(stored.get(row.name, ()))
-    lists = [path for path in found if path.suffix.lower() in (".pvd", ".series")]
+    lists = [path for path in found if path.suffix.lower() in LISTS]
     found = lists[:1] if lists else found
     if not found:
         near = [path for path in visible(root) if path.stem == row.name]

@@ -10,7 +10,7 @@ import numpy as np
 
 from odeform.budget import MEMORY, read_limited
 from odeform.dataset.importers.even_steps import even_step
-from odeform.dataset.importers.frame_folder import frame_folder, recorded_files
+from odeform.dataset.importers.frame_folder import frame_folder, recorded_files, visible
 from odeform.dataset.importers.frame_reading import DISPLACEMENT, VTK
 from odeform.dataset.importers.recording import Recording
 from odeform.dataset.importers.unpacking import Unpacked
@@ -23,10 +23,21 @@ from odeform.formats.vtk_xml import parsed_xml
 from odeform.io import parse_json
 from odeform.types import Faces, Frames, Mesh
 
-__all__ = ["SEQUENCE_FILES", "listed_frames"]
+__all__ = ["LISTS", "SEQUENCE_FILES", "folder_recording"]
 
 LARGEST_LIST = 1 << 24  # bytes
+LISTS = (".pvd", ".series")
+"""Endings of files that list frames and their times."""
 NO_FACES = np.zeros((0, 3), np.int32)
+
+
+def folder_recording(folder: Path) -> Recording:
+    """The frames in a folder; a list of ParaView among them says their times. Raises `InputError` for several."""
+    lists = [path for path in visible(folder) if path.suffix.lower() in LISTS]
+    if len(lists) > 1:
+        names = " and ".join(path.name for path in lists[:3])
+        raise InputError(f"import {folder}: expected one sequence, got the lists {names}")
+    return listed_frames(lists[0]) if lists else frame_folder(folder)
 
 
 def npz_recording(path: Path) -> Recording:
@@ -40,7 +51,8 @@ def npz_recording(path: Path) -> Recording:
             again.faces, again.vertices.shape[1], where
         )
 
-    return Recording(where, len(motion.vertices), read, motion.times, motion.counted)
+    notes = (f"arrays left out: {', '.join(motion.unused[:8])}",) if motion.unused else ()
+    return Recording(where, len(motion.vertices), read, motion.times, motion.counted, notes=notes)
 
 
 def c3d_recording(path: Path) -> Recording:
@@ -58,7 +70,7 @@ def zip_recording(path: Path) -> Recording:
     """The frames in a zipped folder."""
     archive = Unpacked(path)
     with archive.named():
-        found = frame_folder(archive.root)
+        found = folder_recording(archive.root)
 
     def read() -> tuple[Frames, Faces]:
         with archive.named():
@@ -85,7 +97,7 @@ def vtk_recording(path: Path) -> Recording:
     ((_, found),) = numbered.items()
     order = sorted(found)
     fields = [found[number] for number in order]
-    even_step(np.array(order, float) - order[0], where, fields, decimal=False, first=float(order[0]))
+    step = even_step(np.array(order, float) - order[0], where, fields, decimal=False, first=float(order[0]))
 
     def read() -> tuple[Frames, Faces]:
         meshes = [
@@ -97,14 +109,14 @@ def vtk_recording(path: Path) -> Recording:
         return np.stack([mesh.points for mesh in meshes]), meshes[0].faces
 
     note = f"the frames are the points displaced by {fields[0]} to {fields[-1]}"
-    return Recording(where, len(fields), read, notes=(note,))
+    return Recording(where, len(fields), read, step=step, notes=(note,))
 
 
 def listed_frames(path: Path) -> Recording:
     """The frames that a `.pvd` or `.series` file of ParaView lists, with their times."""
     where = f"import {path}"
     data = _content(path, LARGEST_LIST)
-    listed = _collection(data, where) if path.suffix.lower() == ".pvd" else _series(data, where)
+    listed = _collection(data, where) if path.suffix.lower() == LISTS[0] else _series(data, where)
     if len(listed) < 2:
         raise InputError(f"{where}: expected at least 2 frames, got {len(listed)}")
     listed.sort()
@@ -173,8 +185,7 @@ def _content(path: Path, most: int) -> bytes:
 
 
 SEQUENCE_FILES: dict[str, Callable[[Path], Recording]] = {
-    ".pvd": listed_frames,
-    ".series": listed_frames,
+    **dict.fromkeys(LISTS, listed_frames),
     ".npz": npz_recording,
     ".c3d": c3d_recording,
     ".zip": zip_recording,
