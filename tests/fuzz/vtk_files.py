@@ -83,7 +83,8 @@ def _xml(
         lists.append(array("types", types))
     fields = "".join(array(name, np.asarray(values, "<f4")) for name, values in vectors.items())
     compressor = ' compressor="vtkZLibDataCompressor"' if form == "zlib" else ""
-    count = f'NumberOfPoints="{len(points)}" NumberOfCells="{len(cells)}" NumberOfPolys="{len(cells)}"'
+    counted = "NumberOfCells" if types is not None else "NumberOfPolys"
+    count = f'NumberOfPoints="{len(points)}" {counted}="{len(cells)}"'
     text = (
         f'<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt32"{compressor}><{kind}>'
         f"<Piece {count}><PointData>{fields}</PointData><Points>{array('Points', points)}</Points>"
