@@ -106,6 +106,8 @@ class _Parts:
             raise reader.error("expected POINTS, got none")
         if self.dimensions:
             return _structured(self.points, self.dimensions, reader)
+        if self.types is None and any(not kind for _, _, kind in self.cells):
+            raise reader.error("expected CELL_TYPES behind CELLS, got none: truncated?")
         offsets: list[Ints] = [np.zeros(1, np.int64)]
         start = 0
         for own, connectivity, _ in self.cells:

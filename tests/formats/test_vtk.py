@@ -49,6 +49,12 @@ def test_xml_in_all_encodings(form: str, tmp_path: Path) -> None:
     )  # only the outside
 
 
+def test_one_cell_in_base64(tmp_path: Path) -> None:
+    """Its type is a single byte behind the four of the header, which are encoded together."""
+    shell = solid(read(unstructured(CUBE, [list(range(8))], 12, form="binary"), tmp_path / "a.vtu"))
+    assert shell.volume == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(
     ("kind", "corners", "volume"),
     [
@@ -93,6 +99,7 @@ def test_points_without_cells_are_a_cloud(tmp_path: Path) -> None:
 
 
 HEAD = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET "
+CELLS = "UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\nCELLS 1 4\n3 0 1 2\n"
 REFUSED = {
     "another file": ("a.vtk", b"solid\n", "'# vtk DataFile' in the first line, got 'solid'"),
     "an image": ("a.vtk", (HEAD + "STRUCTURED_POINTS\n").encode(), "STRUCTURED_POINTS has no mesh"),
@@ -102,6 +109,7 @@ REFUSED = {
         legacy(BOX.vertices, BOX.faces, binary=True)[:200],
         "bytes of .*truncated",
     ),
+    "truncated before the types": ("a.vtk", (HEAD + CELLS).encode(), "expected CELL_TYPES behind CELLS"),
     "a word": ("a.vtk", (HEAD + "POLYDATA\nPOINTS 1 float\n1 2 x").encode(), "expected numbers, got 'x'"),
     "a keyword": ("a.vtk", (HEAD + "POLYDATA\nPOINTZ 1 float\n").encode(), "a keyword of VTK .* got 'POINTZ'"),
     "an immense number": ("a.vtk", (HEAD + "POLYDATA\nPOINTS 99999999999 float\n").encode(), "at most .*got '999"),
