@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> None:
     from odeform.formats.writing import motion_files, write_motion
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import UPRIGHT, Similarity
-    from odeform.models.modal.user_body import UserBodyPredictor, own_body, takes_user_bodies
+    from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
     from odeform.models.registry import load, observations
     from odeform.motion.caveats import caveats
 

@@ -12,11 +12,22 @@ from odeform.budget import require_memory
 from odeform.errors import InputError
 from odeform.types import MotionSequence
 
-__all__ = ["check_arrays", "checked_sequence", "read_arrays"]
+__all__ = ["array_names", "check_arrays", "checked_sequence", "read_arrays"]
 
 ARRAYS = ("times", "vertices", "faces", "weights")
 FARTHEST = 1e9  # m
 COPIES = 4  # of its arrays that the use of a sequence takes
+
+
+def array_names(data: bytes, where: str) -> set[str]:
+    """The names of the arrays in an `.npz` archive. `InputError`, which `where` leads, for other files."""
+    if data[:2] != b"PK":
+        raise InputError(f"{where}: damaged: expected an .npz archive, got {len(data):,} other bytes")
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            return {name.removesuffix(".npy") for name in archive.namelist()}
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError) as error:
+        raise InputError(f"{where}: damaged: {error}") from None
 
 
 def read_arrays(
@@ -27,8 +38,8 @@ def read_arrays(
     Sizes are checked before an array is read. Nothing is unpickled. `InputError`, which `where` leads, for other files.
     """
     try:
+        found = array_names(data, where)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            found = {name.removesuffix(".npy") for name in archive.namelist()}
             names = [*names, *(name for name in optional if name in found)]
             size = sum(archive.getinfo(f"{name}.npy").file_size for name in names)
         require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
@@ -40,6 +51,8 @@ def read_arrays(
     except InputError:
         raise
     except (KeyError, ValueError, TypeError, EOFError, OSError, MemoryError, OverflowError) as error:
+        if "allow_pickle" in str(error):
+            raise InputError(f"{where}: expected arrays of numbers, got Python objects, which are not read") from None
         raise InputError(f"{where}: damaged: {error}") from None
     except (zipfile.BadZipFile, zlib.error, TokenError, NotImplementedError, RuntimeError, SyntaxError) as error:
         raise InputError(f"{where}: damaged: {error}") from None

@@ -3,19 +3,17 @@
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from odeform.dataset.arrays import check_arrays, read_arrays
+from odeform.dataset.arrays import check_arrays
+from odeform.dataset.motion_arrays import read_motion_arrays
+from odeform.dataset.resampling import even_times, is_even, resampled
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
 from odeform.io import parse_json
 from odeform.schema import Schema
-from odeform.types import Floats, Mesh, MotionSequence
+from odeform.types import Mesh, MotionSequence
 
 __all__ = ["read_captured"]
-
-SHORTEST = 1e-9  # step between frames, relative to the whole
-UNEVEN = 1e-3  # of a step: more, and frames are resampled
 
 
 def read_captured(data: bytes, where: str, schema: Schema, body: Mesh) -> MotionSequence:
@@ -28,25 +26,26 @@ def read_captured(data: bytes, where: str, schema: Schema, body: Mesh) -> Motion
     Raises:
         InputError: Arrays that are missing, do not fit together or are not finite; the message begins with `where`.
     """
-    arrays = read_arrays(data, where, ("times", "vertices"), ("faces", "weights", "parameters"))
-    vertices = arrays["vertices"]
-    faces = arrays.get("faces")
+    motion = read_motion_arrays(data, where)
+    vertices, faces = motion.vertices, motion.faces
+    if motion.times is None:
+        raise InputError(f"{where}: expected an array times ({len(vertices)},) in seconds, one for each frame")
     if faces is None:
-        if vertices.ndim != 3 or vertices.shape[1] != len(body.points):
+        if vertices.shape[1] != len(body.points):
             raise InputError(
-                f"{where}: expected faces (F, 3), or as many vertices as the trained body has, {len(body.points)}"
+                f"{where}: expected faces (F, 3), or as many vertices as the trained body has, {len(body.points)}; "
+                f"got {vertices.shape[1]} vertices without faces"
             )
         faces = body.faces
-    weighed = "weights" in arrays
-    arrays = {"weights": np.full(vertices.shape[1:2], 1.0), **arrays, "faces": faces}
-    check_arrays(arrays, where)
-    weights = arrays["weights"] if weighed else surface_weights(Mesh(vertices[0], faces))
-    known = _parameters(arrays, where, schema)
-    times = arrays["times"].astype(float)
-    times = times - times[0]
-    if np.diff(times).min() < SHORTEST * times[-1]:
-        raise InputError(f"{where}: expected times that increase by at least {SHORTEST:g} of the whole in each frame")
-    times, vertices = _even(times, vertices)
+    arrays = {"times": motion.times, "vertices": vertices, "weights": np.full(vertices.shape[1:2], 1.0), "faces": faces}
+    check_arrays({**arrays, **{name: motion.others[name] for name in motion.others if name == "weights"}}, where)
+    weights = motion.others.get("weights")
+    if weights is None:
+        weights = surface_weights(Mesh(vertices[0], faces))
+    known = _parameters(motion.others, where, schema)
+    times = even_times(motion.times, where)
+    if not is_even(motion.times, times[1]):
+        vertices = resampled(motion.times, vertices, times, where)
     return MotionSequence(times, vertices.astype(np.float32), faces, weights, known, where)
 
 
@@ -59,10 +58,3 @@ def _parameters(arrays: dict[str, np.ndarray], where: str, schema: Schema) -> di
     known = schema.known(known)
     complete = schema.complete(known)
     return {name: complete[name] for name in known}
-
-
-def _even(times: Floats, vertices: Floats) -> tuple[Floats, Floats]:
-    even = np.linspace(0.0, times[-1], len(times))
-    if np.abs(times - even).max() <= UNEVEN * even[1]:
-        return even, vertices
-    return even, CubicSpline(times, vertices)(even)

@@ -73,9 +73,9 @@ READERS: dict[str, Reader] = {
     ".spz": Reader("Gaussian splats (Niantic)", "odeform.formats.splat_spz:read_spz"),
     ".stl": Reader("mesh", "odeform.formats.stl:read_stl"),
     ".txt": POINT_TEXT,
-    ".vtk": Reader("VTK data set, its surface", "odeform.formats.vtk.legacy:read_vtk"),
-    ".vtp": Reader("VTK polygons", "odeform.formats.vtk.xml:read_vtk_xml"),
-    ".vtu": Reader("VTK mesh, its surface", "odeform.formats.vtk.xml:read_vtk_xml"),
+    ".vtk": Reader("VTK data set, its surface", "odeform.formats.vtk_files:read_vtk"),
+    ".vtp": Reader("VTK polygons", "odeform.formats.vtk_files:read_vtk"),
+    ".vtu": Reader("VTK mesh, its surface", "odeform.formats.vtk_files:read_vtk"),
     ".xyz": POINT_TEXT,
 }
 

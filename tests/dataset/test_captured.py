@@ -76,8 +76,8 @@ def test_a_predicted_motion_can_be_opened(tmp_path: Any, schema: Schema) -> None
     ("change", "message"),
     [
         ({"vertices": np.zeros((3, 5, 3), np.float32), "times": np.arange(3.0)}, "expected faces"),
-        ({"times": np.zeros(151)}, "expected at least 2 frames"),
-        ({"vertices": None}, "damaged"),
+        ({"times": np.zeros(151)}, "one for each frame"),
+        ({"vertices": None}, r"expected an array vertices \(T, N, 3\), got times"),
         ({"parameters": np.array("[1]")}, "by name"),
         ({"parameters": np.array('{"mass": "heavy"}')}, "mass"),
         ({"faces": np.array([[0, 1, 9999]])}, "faces refer"),

@@ -8,6 +8,7 @@ from odeform.dataset import store
 from odeform.dataset.folder import folder_reader, save_sequence, write_index
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.packed import pack
+from odeform.dataset.recorded import read_recorded
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
 from odeform.simulation.scenes.registry import get_scene
@@ -56,3 +57,9 @@ def test_opens_folders_and_files(dataset: Dataset, shipped: Path) -> None:
     assert open_dataset(str(shipped / "kick.odp")).root == shipped / "kick.odp"
     with pytest.raises(InputError, match=r"dataset\.json"):
         open_dataset(shipped)
+
+
+def test_files_of_ones_own_are_imported_first(tmp_path: Path) -> None:
+    (tmp_path / "own.npz").touch()
+    with pytest.raises(InputError, match=r"expected DATASET/NAME, .*odeform import"):
+        read_recorded(f"{tmp_path}/own.npz")

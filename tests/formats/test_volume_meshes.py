@@ -94,7 +94,7 @@ def test_polygons_of_xml(tmp_path: Path) -> None:
     assert len(_read(tmp_path / "a.vtp", text.encode()).faces) == 2
     for changed, said in (
         (text.replace("0 1 2 3<", "0 1 2 9<"), "a cell refers to vertex 9, of 4"),
-        (text.replace("0 1 2 3<", "0 1 2<"), "expected 4 numbers of connectivity, got 3: truncated"),
+        (text.replace("0 1 2 3<", "0 1 2<"), "expected offsets that increase up to 3"),
         (text[:-30], "expected XML of VTK"),
         (text.replace("PolyData", "ImageData"), "expected a VTKFile of UnstructuredGrid or PolyData"),
         (text.replace('byte_order="LittleEndian"', 'compressor="vtkLZ4DataCompressor"'), "vtkLZ4DataCompressor, which"),
@@ -131,5 +131,3 @@ def test_legacy_files_that_are_cut_short(tmp_path: Path, binary: bool) -> None:
     for stop in (data.index(b"POINTS") + 60, data.index(b"CELLS") + 20, data.index(b"CELL_TYPES")):
         with pytest.raises(InputError, match="truncated"):
             _read(tmp_path / "a.vtk", data[:stop])
-    with pytest.raises(InputError, match="expected DATASET POLYDATA or UNSTRUCTURED_GRID, got 'DATASET STRUCTURED"):
-        _read(tmp_path / "a.vtk", data.replace(b"UNSTRUCTURED_GRID", b"STRUCTURED_GRID"))

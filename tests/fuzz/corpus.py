@@ -21,6 +21,7 @@ from odeform.types import GaussianSplats, MotionSequence
 
 from .gltf_files import Gltf
 from .scans import CUBE, ksplat_bytes, las_bytes, msh_bytes, pcd_bytes, sog_bytes, vtk_bytes, vtu_bytes
+from .vtk_files import legacy, polydata, unstructured
 
 __all__ = ["dataset", "shapes"]
 
@@ -33,6 +34,11 @@ def shapes() -> dict[str, bytes]:
     files["ascii.ply"] = mesh.export(file_type="ply", encoding="ascii")
     files["scene.glb"] = trimesh.Scene([mesh, mesh.copy().apply_translation([3.0, 0.0, 0.0])]).export(file_type="glb")
     files["points.ply"] = _exported(trimesh.PointCloud(mesh.vertices), "ply")
+    faces = np.asarray(mesh.faces)
+    files["text.vtk"] = legacy(mesh.vertices, faces)
+    files["binary.vtk"] = legacy(mesh.vertices, faces, {"v": mesh.vertices}, binary=True)
+    files |= {f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "raw")}
+    files["cells.vtu"] = unstructured(mesh.vertices, faces, 5, form="raw")
     text = io.StringIO()
     np.savetxt(text, mesh.vertices)
     files["points.xyz"] = text.getvalue().encode()

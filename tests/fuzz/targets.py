@@ -28,6 +28,7 @@ from odeform_viz.view import DisplayOptions, ViewRequest
 
 from .corpus import dataset, shapes
 from .mutations import Random, mutated, mutated_json
+from .sequences import SEQUENCES
 
 __all__ = ["TARGETS", "Target"]
 
@@ -244,6 +245,7 @@ TARGETS = (
     Target("folder", _folder, _read_all),
     Target("packed", _packed, _read_all),
     Target("table", _table, _import),
+    *(Target(name, make, _import) for name, make in SEQUENCES.items()),
     Target("captured motion", _captured, _open),
     Target("state", _state, _restore),
 )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from odeform.budget import read_limited
+from odeform.dataset.importers.frame_names import numbered_frames
 from odeform.dataset.importers.natural_order import naturally_sorted, subfolders
 from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
@@ -152,6 +153,8 @@ def _sequence(folder: Path) -> tuple[SourceSequence, _Scene]:
         keys = " or ".join(scene.key for scene in SCENES)
         raise InputError(f"import {folder / PARAMETERS}: expected {keys}, got {', '.join(raw) or 'nothing'}")
     files = naturally_sorted((folder / SHAPES).glob("*.xyz"))
+    if len(files) > 1:
+        files = list(numbered_frames(files, f"import {folder / SHAPES}").files)
     where = folder / PARAMETERS
     try:
         parameters = scene.parameters(raw)
@@ -168,7 +171,7 @@ def _sequence(folder: Path) -> tuple[SourceSequence, _Scene]:
     def read() -> tuple[Frames, Faces]:
         return _frames(files, offsets), _faces(folder, len(read_geometry(files[0]).points))
 
-    return SourceSequence(folder.name, parameters | first, len(files), read), scene
+    return SourceSequence(folder.name, parameters | first, len(files), read, metric=True), scene
 
 
 def _frames(files: list[Path], offsets: Floats) -> Frames:

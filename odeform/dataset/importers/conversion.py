@@ -1,5 +1,6 @@
 """Conversion of an importer's source to a data set."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from odeform.dataset.folder import folder_reader, save_sequence, write_index
 from odeform.dataset.importers.source import Source, SourceSequence
+from odeform.dataset.importers.units import METRES, body_size, size_doubts
 from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
@@ -19,12 +21,15 @@ __all__ = ["convert_source"]
 SAME = 1e-6  # relative to the value or to one: parameters that differ by less do not vary
 
 
-def convert_source(source: Source, out: Path, seed: int = 0) -> Dataset:
+def convert_source(
+    source: Source, out: Path, seed: int = 0, unit: str = "m", renamed: Callable[[str], str] = str
+) -> Dataset:
     """Write a source as a data set into the folder `out`.
 
     Parameters that do not vary become `fixed`. Splits are those of the source, or drawn 70/10/20 by `seed` if any
-    sequence lacks one. A sequence that cannot be read is listed with the reason. Raises `InputError` if none can be
-    read, if no parameter varies, or if the meshes differ.
+    sequence lacks one. Lengths are in `unit`, but of sequences that say their own. A sequence that cannot be read is
+    listed with the reason, `renamed` as all that a user reads. Raises `InputError` if none can be read, if no parameter
+    varies, or if the meshes differ.
     """
     if not source.sequences:
         raise InputError("import: expected at least one sequence")
@@ -33,7 +38,11 @@ def convert_source(source: Source, out: Path, seed: int = 0) -> Dataset:
     drawn = not all(splits)
     if drawn:
         splits = assign_splits(len(splits), seed)
+    doubts = list(source.doubts)
     provenance = {**source.provenance, "rate_hz": source.rate, **({"split_seed": seed} if drawn else {})}
+    if unit != "m" and any(found.metric for found in source.sequences):
+        doubts.append(f"the unit {unit} is not used where files say their own")
+    provenance |= {} if unit == "m" else {"unit": unit}
     entries: list[Entry] = []
     mesh: Mesh | None = None
     progress = Progress("import", len(splits))
@@ -41,27 +50,35 @@ def convert_source(source: Source, out: Path, seed: int = 0) -> Dataset:
         parameters = schema.complete({p.name: found.parameters[p.name] for p in schema.parameters})
         entry = Entry(found.name, split, parameters)
         try:
-            sequence = _read(found, source.rate)
+            sequence = _read(found, source.rate, 1.0 if found.metric else METRES[unit])
         except InputError as error:
-            entries.append(replace(entry, status=str(error)))
-            progress.advance(note=str(error))
+            entries.append(replace(entry, status=renamed(str(error))))
+            progress.advance(note=entries[-1].status)
             continue
+        if mesh is None:
+            provenance["size_m"] = body_size(sequence.vertices[0])
+            doubts += size_doubts(provenance["size_m"], found.name, "m" if found.metric else unit)
         mesh = mesh or sequence.rest
+        if np.array_equal(sequence.vertices, np.broadcast_to(sequence.vertices[0], sequence.vertices.shape)):
+            doubts.append(f"{found.name}: nothing moves: all {len(sequence.vertices)} frames are the same")
         _require_same_mesh(mesh, sequence.rest, found.name)
         entries.append(replace(entry, sha256=save_sequence(out, found.name, sequence)))
         progress.advance()
     progress.close()
     if mesh is None:
         raise InputError(f"import: none of {len(entries)} sequences can be read; {entries[0].status}")
+    provenance |= {"notes": list(map(renamed, doubts))} if doubts else {}
     dataset = Dataset(out, schema, tuple(entries), folder_reader(out), fixed, provenance)
     write_index(dataset)
     return dataset
 
 
-def _read(found: SourceSequence, rate: float) -> MotionSequence:
+def _read(found: SourceSequence, rate: float, metres: float) -> MotionSequence:
     vertices, faces = found.read()
+    vertices = vertices if metres == 1.0 else metres * vertices
     if not np.isfinite(vertices).all():
-        raise InputError(f"{found.name}: expected finite vertices")
+        frame, vertex, _ = np.argwhere(~np.isfinite(vertices))[0]
+        raise InputError(f"{found.name}: expected finite vertices, frame {frame} has another number at vertex {vertex}")
     weights = surface_weights(Mesh(vertices[0], faces))
     return MotionSequence(np.arange(len(vertices)) / rate, vertices.astype(np.float32), faces, weights, name=found.name)
 

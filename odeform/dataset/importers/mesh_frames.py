@@ -1,133 +1,98 @@
-"""A folder of mesh frames: one subfolder per sequence with its frames as .obj or .ply, and a table of parameters.
+"""A folder of motions: a table of parameters, and for each row a folder of frames or a file with all of them.
 
-The table, `parameters.csv`, has one row per sequence: a column `sequence` that names the subfolder, and one column per
-parameter, with its unit in brackets if it has one: `mass (kg)`. Columns `split` (train, val, test) and `rate` (Hz, the
-same in all rows) are optional. `parameters.json` is a list of such rows as objects.
+The table, `parameters.csv`, has one row per sequence: a column `sequence` that names the subfolder or the file, and one
+column per parameter, with its unit in brackets if it has one: `mass (kg)`. Columns `split` (train, val, test) and
+`rate` (Hz, the same in all rows) are optional. `parameters.json` is a list of such rows as objects.
 """
 
-import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
-import numpy as np
-
-from odeform.budget import read_limited
-from odeform.dataset.importers.natural_order import naturally_sorted, subfolders
+from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.frame_folder import visible
+from odeform.dataset.importers.parameter_table import Row, find_table, has_table, read_rows
+from odeform.dataset.importers.recording import Recording, common_rate, frames_at
+from odeform.dataset.importers.sequence_files import LISTS, SEQUENCE_FILES, folder_recording
 from odeform.dataset.importers.source import Source, SourceSequence
 from odeform.errors import InputError
-from odeform.formats.reading import read_geometry
-from odeform.io import parse_json
-from odeform.types import Faces, Frames, Mesh
 
 __all__ = ["has_table", "mesh_source"]
 
-LARGEST = 1 << 26  # bytes of a table
-ENDINGS = (".obj", ".ply")
-TABLES = ("parameters.csv", "parameters.json")
-SEQUENCE, SPLIT, RATE = "sequence", "split", "rate"
-SPLITS = ("train", "val", "test")
-
-Row = Mapping[Any, Any]
-
-
-def has_table(root: Path) -> bool:
-    """Whether a folder has a table of parameters."""
-    return _table(root) is not None
+SHOWN = 5  # names in a note
+PLAUSIBLE = (1.0, 1e5)  # Hz
+Stored = Mapping[str, Sequence[Path]]
 
 
 def mesh_source(root: Path, rate: float | None = None) -> Source:
-    """All sequences of the table. `rate` in Hz overrides that of the table. Raises `InputError` for any mistake in it,
-    and without a table."""
-    table = _table(root)
-    if table is None:
-        raise InputError(f"import {root}: expected {' or '.join(TABLES)}")
-    rows = _rows(table)
-    folders = {folder.name: folder for folder in subfolders(root)}
-    sequences, units = [], {}
-    for row in rows:
-        name = str(row.get(SEQUENCE, ""))
-        if name not in folders:
-            raise InputError(f"import {table}: sequence {name!r}: no such folder in {root}")
-        split = str(row.get(SPLIT) or "")
-        if split not in ("", *SPLITS):
-            raise InputError(f"import {table}: {name}: split: expected {', '.join(SPLITS)}, got {split!r}")
-        parameters = {}
-        for column, value in row.items():
-            if column not in (SEQUENCE, SPLIT, RATE):
-                parameter, _, unit = column.partition("(")
-                parameter = parameter.strip()
-                if parameter in parameters:
-                    raise InputError(f"import {table}: two columns of the parameter {parameter!r}")
-                units[parameter] = unit.rstrip(") ")
-                parameters[parameter] = _number(value, f"import {table}: {name}: {column}")
-        files = naturally_sorted(path for path in folders[name].iterdir() if path.suffix.lower() in ENDINGS)
-        sequences.append(SourceSequence(name, parameters, len(files), lambda files=files: _read(files), split))
-    if len({found.name for found in sequences}) != len(sequences):
+    """All sequences of the table. `rate` in Hz overrides that of the table, and both the times of the files, at which
+    frames are resampled. Raises `InputError` for any mistake in it, and without a table."""
+    table = find_table(root)
+    parsed = read_rows(table)
+    stored = _stored(root)
+    found = [(row, _place(row, stored, root, table)) for row in parsed.rows]
+    recordings = {path.name if path.is_dir() else _stem(path): _recording(path) for _, path in found}
+    if len(recordings) < len(found):
         raise InputError(f"import {table}: expected each sequence only once")
-    without = [found.name for found in sequences if not found.split]
-    if 0 < len(without) < len(sequences):
+    rates = parsed.rates if rate is None else (rate,)
+    if len(rates) > 1 or not all(0.0 < given < float("inf") for given in rates):
+        got = ", ".join(f"{given:g}" for given in rates)
+        raise InputError(f"import {table}: expected one rate in Hz, in a column 'rate' or by --rate, got {got}")
+    used = rates[0] if rates else common_rate(recordings, f"import {table}")
+    frames, notes = frames_at(used, recordings, bool(rates))
+    sequences = tuple(
+        SourceSequence(name, row.parameters, *frames[name], row.split, recordings[name].metric)
+        for name, (row, _) in zip(recordings, found, strict=True)
+    )
+    if not rates and not PLAUSIBLE[0] <= used <= PLAUSIBLE[1]:
+        notes = (*notes, f"the times make {used:g} frames per second: are they in seconds?")
+    doubts = (*parsed.notes, *_left_out(stored, [path for _, path in found], recordings, root), *notes)
+    made: dict[str, Any] = {"imported": root.name, "layout": "meshes"}
+    return Source(f"imported-{root.name}", used, sequences, parsed.units, provenance=made, doubts=doubts)
+
+
+def _stored(root: Path) -> Stored:
+    """What a row may name: folders, and files of sequences with and without their ending."""
+    stored: dict[str, list[Path]] = {}
+    for path in visible(root):
+        if path.is_dir() or path.suffix.lower() in SEQUENCE_FILES:
+            for name in {path.name, path.name if path.is_dir() else _stem(path)}:
+                stored.setdefault(normalize("NFC", name), []).append(path)
+    return stored
+
+
+def _recording(path: Path) -> Recording:
+    return folder_recording(path) if path.is_dir() else SEQUENCE_FILES[path.suffix.lower()](path)
+
+
+def _stem(path: Path) -> str:
+    """Without the ending, which may be one of two, as in a.vtu.series."""
+    return path.with_suffix("").stem if path.suffix.lower() == ".series" else path.stem
+
+
+def _place(row: Row, stored: Stored, root: Path, table: Path) -> Path:
+    """The folder or file of a row; what lists frames comes before the folder of these frames."""
+    found = list(stored.get(row.name, ()))
+    lists = [path for path in found if path.suffix.lower() in LISTS]
+    found = lists[:1] if lists else found
+    if not found:
+        near = [path for path in visible(root) if path.stem == row.name]
+        hint = convertible([path.suffix.lower() for path in near])
+        raise InputError(f"import {table}: {row.where}: sequence {row.name!r}: no such folder or file in {root}{hint}")
+    if len(found) > 1:
         raise InputError(
-            f"import {table}: expected a split for every sequence or for none, got none for {without[0]}"
-            + (f" and {len(without) - 1} more" if len(without) > 1 else "")
+            f"import {table}: {row.where}: expected one {row.name}, got {' and '.join(path.name for path in found)}"
         )
-    made = {"imported": root.name, "layout": "meshes"}
-    return Source(f"imported-{root.name}", _rate(rows, table, rate), tuple(sequences), units, provenance=made)
+    return found[0]
 
 
-def _table(root: Path) -> Path | None:
-    return next((root / name for name in TABLES if (root / name).is_file()), None)
-
-
-def _rows(table: Path) -> list[Row]:
-    try:
-        text = read_limited(table, f"import {table}", LARGEST).decode("utf-8-sig")
-        if table.suffix == ".json":
-            rows = parse_json(text, f"import {table}")
-            if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-                raise ValueError("expected a list of objects, one per sequence")
-        else:
-            reader = csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)
-            names = list(reader.fieldnames or ())
-            if doubled := [name for name in names if names.count(name) > 1]:
-                raise ValueError(f"two columns {doubled[0]!r}")
-            rows: list[Row] = [*reader]
-            if any(None in row or None in row.values() for row in rows):
-                raise ValueError("expected the same number of cells in every row")
-    except InputError:
-        raise
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(f"import {table}: cannot be read: {error}") from None
-    if not rows or not all(SEQUENCE in row for row in rows):
-        raise InputError(f"import {table}: expected rows with a column {SEQUENCE!r}")
-    return rows
-
-
-def _rate(rows: list[Row], table: Path, given: float | None) -> float:
-    rates = {_number(row[RATE], f"import {table}: {RATE}") for row in rows if row.get(RATE) not in (None, "")}
-    if given is not None:
-        rates = {given}
-    if len(rates) != 1 or not 0.0 < min(rates) < float("inf"):
-        raise InputError(
-            f"import {table}: expected one rate in Hz, in a column {RATE!r} or by --rate, got {sorted(rates) or 'none'}"
-        )
-    return rates.pop()
-
-
-def _number(value: Any, where: str) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where}: expected a number, got {value!r}") from None
-
-
-def _read(files: list[Path]) -> tuple[Frames, Faces]:
-    meshes = []
-    for file in files:
-        mesh = read_geometry(file, merge=False)
-        if not isinstance(mesh, Mesh):
-            raise InputError(f"import {file}: expected a mesh, got points")
-        if meshes and (mesh.points.shape != meshes[0].points.shape or not np.array_equal(mesh.faces, meshes[0].faces)):
-            raise InputError(f"import {file}: expected the same mesh as in {files[0].name}")
-        meshes.append(mesh)
-    return np.stack([mesh.points for mesh in meshes]), meshes[0].faces
+def _left_out(stored: Stored, used: Sequence[Path], recordings: Mapping[str, Recording], root: Path) -> list[str]:
+    """A note on folders and files that no row uses."""
+    named = {path for paths in stored.values() if set(paths) & set(used) for path in paths}
+    named |= {path for found in recordings.values() for file in found.listed for path in (file, *file.parents)}
+    others = sorted({path.name for paths in stored.values() for path in paths if path not in named})
+    if not others:
+        return []
+    more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+    return [f"import {root}: without a row in the table, and left out: {', '.join(others[:SHOWN])}{more}"]

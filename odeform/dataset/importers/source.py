@@ -20,6 +20,8 @@ class SourceSequence:
     """Returns vertices (T, N, 3) in metres and faces (F, 3). Raises `InputError` for damaged files."""
     split: str = ""
     """"train", "val" or "test"; empty if the source has no splits."""
+    metric: bool = False
+    """Whether its files say their unit, so that no other is assumed."""
 
 
 @dataclass(frozen=True)
@@ -36,3 +38,5 @@ class Source:
     """Parameters of which ratios matter rather than differences."""
     notes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+    """What was assumed or left out, for the user to check."""
