@@ -54,7 +54,8 @@ def test_derivatives_by_the_law_are_those_of_differences(support: Support) -> No
     law, rng, count = any_law(), np.random.default_rng(1), 30
     material, states = rng.uniform(-1.0, 1.0, (count, 2)), rng.normal(size=(STATE, count))
     states[1], states[2] = rng.uniform(-0.02, 0.005, count), rng.uniform(-1.0, 1.0, count)
-    flat, chosen = law.flat(), rng.permutation(len(law.flat()))[:40]
+    flat, size = law.flat(), law.terms.size
+    chosen = np.concatenate([np.arange(0, size, 3), size + rng.permutation(len(flat) - size)[:30]])
     roll, dynamics = (4, 10, 1e-3), RollingDynamics(law, support, RADIUS, material)
     rolled, changes = roll_out_with_sensitivities(dynamics, chosen, states, *roll)
     assert np.array_equal(rolled, dynamics.roll_out(states, *roll))
@@ -109,6 +110,14 @@ def test_slopes_of_the_support_are_those_of_its_heights(support: Support) -> Non
     angles = np.random.default_rng(0).uniform(-20.0, 20.0, 200)
     ahead, behind = (support.at(angles + sign * 1e-3)[0] for sign in (1.0, -1.0))
     assert np.allclose((ahead - behind) / 2e-3, support.at(angles)[1], atol=2e-4)
+
+
+def test_the_support_is_found_at_the_ends_of_its_table(support: Support) -> None:
+    """A remainder of a tiny negative angle is rounded to a whole turn."""
+    for angle in (0.0, -1e-20, 2.0 * np.pi, -2.0 * np.pi, 200.0 * np.pi):
+        heights, slopes = support.at(np.array([angle]))
+        assert np.allclose([heights[0], slopes[0]], [support.heights[0], support.slopes[0]], atol=1e-12)
+        assert np.isfinite(support.bends(np.array([angle]))).all()
 
 
 def test_numbers_of_a_law_go_forth_and_back() -> None:
