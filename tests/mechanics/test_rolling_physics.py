@@ -69,7 +69,7 @@ def test_a_larger_lever_of_friction_makes_a_ball_spin_less() -> None:
 def test_rolling_is_braked_by_the_offset_of_the_push() -> None:
     """Deceleration g b / (r (1 + inertia)) while it spins fast: the push stands b ahead of the centre."""
     offset, inertia, speed = 1e-3, 0.4, 4.0
-    law = law_of(friction=np.log(0.5), rolling=np.log(offset), inertia=np.log(inertia), grip=np.log(1e-3))
+    law = law_of(friction=np.log(0.5), rolling=np.log(offset), inertia=np.log(inertia))
     y = moved(law, [0.1, 0.6], height=-DEPTH, speed=speed, spin=speed / RADIUS)
     lost = (y[0, 3] - y[1, 3]) / 0.5
     assert lost == pytest.approx(GRAVITY * offset / (RADIUS * (1.0 + inertia)), rel=1e-3)
@@ -81,7 +81,7 @@ def test_rolling_is_braked_by_the_offset_of_the_push() -> None:
 def test_slow_rolling_is_braked_by_its_spin() -> None:
     """At a tenth of a radian a second, by tanh(0.1) of the whole brake."""
     offset, inertia, spin = 1e-3, 0.4, 0.1
-    law = law_of(friction=np.log(0.5), rolling=np.log(offset), inertia=np.log(inertia), grip=np.log(1e-3))
+    law = law_of(friction=np.log(0.5), rolling=np.log(offset), inertia=np.log(inertia))
     y = moved(law, [0.0, 1e-2], height=-DEPTH, speed=spin * RADIUS, spin=spin)
     assert (y[0, 3] - y[1, 3]) / 1e-2 == pytest.approx(
         np.tanh(spin) * GRAVITY * offset / (RADIUS * (1.0 + inertia)), rel=0.05
