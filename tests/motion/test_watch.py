@@ -137,3 +137,14 @@ def test_a_scene_without_a_floor_has_none_to_sink_into() -> None:
 def test_a_motion_that_never_was_sound_stays_at_rest() -> None:
     broken, _ = watch(lowest=lambda t: np.where(t > 0.0, -1.0, 0.0))
     assert broken.held(np.array([0.0, 0.2, 1.0, 1.5])) == pytest.approx(np.zeros(4), abs=1e-4)
+
+
+@pytest.mark.parametrize("step", [1, 2, 40, *range(42, 49), 57])
+def test_after_the_window_no_moment_of_the_grid_is_left_out(step: int) -> None:
+    """It sinks for the length of one interval, wherever that is among those that are checked at once."""
+    moment = 1.0 + step / 120.0
+    brief, _ = watch(lowest=lambda t: np.where(np.abs(t - moment) < 0.4 / 120.0, -0.01, 0.0))
+    stop = brief.stop_at(1.55)
+    assert stop is not None
+    assert stop.time == pytest.approx(moment - 0.4 / 120.0, abs=2e-5)
+    assert brief.stop_at(moment - 0.5 / 120.0) is None
