@@ -146,3 +146,9 @@ def test_strays_are_beyond_one_and_a_half_times_the_distance_of_nineteen_in_twen
     for far, kept in ((1.40, True), (1.46, False)):
         points = np.concatenate([line, [[0.0, far, 0.0]]])
         assert (len(without_outliers(points)) == 402) == kept
+
+
+def test_a_shape_without_extent_keeps_its_size() -> None:
+    fit = fit_to(PointCloud(np.full((3, 3), 7.0)), ball(2))
+    assert fit.transform.factor == 1.0
+    assert np.allclose(fit.geometry.points, [0.0, 0.0, 0.0], atol=1e-6)
