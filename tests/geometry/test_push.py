@@ -47,3 +47,8 @@ def test_a_default_contact_is_in_the_open_and_faces_the_way_asked_for(ball: Mesh
     contact = default_contact(ball, np.array([0.0, -1.0, 1.0]))
     assert contact.normal @ np.array([0.0, -1.0, 1.0]) / math.sqrt(2.0) > 0.95
     assert touching_centre(ball, contact) is not None
+
+
+def test_unless_asked_otherwise_a_contact_faces_up_and_towards_the_viewer(ball: Mesh) -> None:
+    contact = default_contact(ball)
+    assert contact.normal @ np.array([-0.6, -0.35, 0.72]) > 0.95

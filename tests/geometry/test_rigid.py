@@ -104,3 +104,13 @@ def test_each_frame_may_have_its_own_shape() -> None:
     assert np.allclose(rotation, turns)
     centres = np.einsum("n,tni->ti", weights, shapes)
     assert np.allclose(shift, np.einsum("tij,tj->ti", turns, centres) + shifts - centres)
+
+
+def test_the_spin_of_a_small_rotation_vector_is_its_series() -> None:
+    """Below 1e-4 rad, where differences of cosines would be lost, as above."""
+    change = np.array([0.3, -0.2, 0.9])
+    for angle in (1e-9, 9.99e-5, 1.01e-4):
+        vector = angle * AXIS
+        across = np.cross(vector, change)
+        expected = change - across / 2.0 + np.cross(vector, across) / 6.0
+        np.testing.assert_allclose(body_spin(vector, change), expected, rtol=0.0, atol=1e-11)

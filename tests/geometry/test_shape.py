@@ -6,7 +6,7 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.region import Sphere
-from odeform.geometry.shape import fit_to, surface_weights
+from odeform.geometry.shape import fit_to, surface_weights, without_outliers
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
@@ -126,3 +126,29 @@ def test_an_empty_region_is_refused() -> None:
     shape, _ = scene("+z")
     with pytest.raises(InputError, match="region contains 0 of"):
         fit_to(shape, ball(2), Sphere(np.array([1e3, 0.0, 0.0]), 1.0))
+
+
+def test_surroundings_count_up_to_twice_the_radius_of_a_part() -> None:
+    """A floor right below a ball, and a ceiling with more points three radii above its centre."""
+    rng = np.random.default_rng(1)
+
+    def layer(height: float, count: int) -> np.ndarray:
+        return np.concatenate([rng.uniform(-0.02, 0.02, (count, 2)), np.full((count, 1), height)], axis=1)
+
+    region = Sphere(np.array([0.0, 0.0, 0.1]), 0.1025)
+    for height, up in ((0.1 + 0.25, "+z"), (0.1 + 0.15, "-z")):
+        shape = PointCloud(np.concatenate([ball(3).points, layer(-4e-3, 50), layer(height, 5000)]))
+        assert np.array_equal(fit_to(shape, ball(2), region).transform.rotation, UPRIGHT[up])
+
+
+def test_strays_are_beyond_one_and_a_half_times_the_distance_of_nineteen_in_twenty() -> None:
+    line = np.linspace(-1.0, 1.0, 401)[:, None] * [1.0, 0.0, 0.0]
+    for far, kept in ((1.40, True), (1.46, False)):
+        points = np.concatenate([line, [[0.0, far, 0.0]]])
+        assert (len(without_outliers(points)) == 402) == kept
+
+
+def test_a_shape_without_extent_keeps_its_size() -> None:
+    fit = fit_to(PointCloud(np.full((3, 3), 7.0)), ball(2))
+    assert fit.transform.factor == 1.0
+    assert np.allclose(fit.geometry.points, [0.0, 0.0, 0.0], atol=1e-6)

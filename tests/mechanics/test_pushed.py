@@ -94,6 +94,13 @@ def test_the_sphere_stays_on_its_guide(block: Block) -> None:
     np.testing.assert_allclose(np.cross(way, force), 0.0, atol=1e-12)
 
 
+def test_without_a_force_the_guide_points_at_the_contact(block: Block) -> None:
+    still, pressed = (pushed(block, force).push for force in (0.0 * NORMAL, np.array([-1.5, 0.8, -0.6])))
+    np.testing.assert_allclose(still.guides, -NORMAL[None], atol=1e-12)
+    assert still.forces.tolist() == [[0.0]]
+    np.testing.assert_allclose(pressed.guides * pressed.forces, [[-1.5, 0.8, -0.6]], atol=1e-12)
+
+
 def test_directions_of_deformation_vibrate_independently(block: Block) -> None:
     push = pushed(block, -2.0 * NORMAL).push
     (modes,), (squares,) = push.modes, push.squares

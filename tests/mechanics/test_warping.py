@@ -32,3 +32,22 @@ def test_the_turns_of_a_surface_that_turns_as_a_whole_are_that_turn() -> None:
     found = surface_turns(points, faces, shapes)
     np.testing.assert_allclose(found[..., 0], np.broadcast_to(turn, points.shape), rtol=1e-4)
     assert not found[..., 1].any()
+
+
+def test_turns_fit_the_edges_around_a_point_with_equal_weight_for_each_direction() -> None:
+    """Least squares over the edges, each by its own length."""
+    rng = np.random.default_rng(0)
+    ball = trimesh.creation.icosphere(1)
+    points, faces = np.asarray(ball.vertices) * [1.0, 2.0, 0.5], np.asarray(ball.faces, dtype=np.int32)
+    points = points + 0.1 * rng.normal(size=points.shape)
+    shapes = rng.normal(size=(*points.shape, 1))
+    found = surface_turns(points, faces, shapes)[..., 0]
+    for vertex in (0, 17, 41):
+        others = np.unique(faces[(faces == vertex).any(axis=1)])
+        others = others[others != vertex]
+        edges, moved = points[others] - points[vertex], (shapes[others] - shapes[vertex])[..., 0]
+        length = np.linalg.norm(edges, axis=1)
+        # turn x edge, as a matrix times the turn
+        matrix = np.concatenate([np.cross(np.eye(3), edge).T / size for edge, size in zip(edges, length, strict=True)])
+        expected = np.linalg.lstsq(matrix, (moved / length[:, None]).ravel(), rcond=None)[0]
+        np.testing.assert_allclose(found[vertex], expected, rtol=1e-4, atol=1e-4)

@@ -74,3 +74,15 @@ def test_many_points_are_evaluated_as_few() -> None:
     values, slopes, few = basis.values(points), gradients(basis, points), slice(CHUNK - 5, CHUNK + 5)
     assert np.allclose(values[few], basis.values(points[few]), atol=1e-6)
     assert np.allclose(slopes[few], gradients(basis, points[few]), rtol=1e-5)
+
+
+def test_gradients_far_away_are_those_of_the_values() -> None:
+    """Where points are pulled in along their ray."""
+    basis, step, rng = fitted(), 2e-3, np.random.default_rng(5)
+    away = rng.normal(size=(60, 3))
+    points = away / np.linalg.norm(away, axis=1, keepdims=True) * rng.uniform(6.5, 9.0, (60, 1)) * RADIUS
+    slopes = gradients(basis, points)
+    for axis in range(3):
+        shift = step * np.eye(3)[axis]
+        slope = (basis.values(points + shift).astype(float) - basis.values(points - shift)) / (2.0 * step)
+        assert np.abs(slopes[:, :, axis] - slope).max() < 0.02 * np.abs(slopes).max()

@@ -1,6 +1,6 @@
 """What has to be known of a motion is said in one sentence each, and nothing where there is nothing to say."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.motion.caveats import caveats
+from odeform.motion.reduced_motion import ReducedMotion, as_reduced
 
 SINKING = {"mass": 1.3, "bending": 0.335, "force": 39.7, "azimuth": 0.0, "elevation": 0.947}
 
@@ -28,6 +29,20 @@ def test_parameters_and_times_outside(kick: Predictor) -> None:
     assert times == "1 of 3 frames are outside the trained window, 0 to 1 s: there the motion is extrapolated"
     (far,) = caveats(kick.solve(), np.array([0.0, 9.0]))
     assert far.endswith("soon after 4 s it stands still")
+
+
+class Moment(ReducedMotion):
+    """A motion of which one moment is predicted."""
+
+    only_at = 0.5
+
+
+def test_a_single_moment(kick: Predictor) -> None:
+    motion = as_reduced(kick.solve())
+    moment = Moment(**{field.name: getattr(motion, field.name) for field in fields(motion)})
+    assert caveats(moment, np.array([0.5])) == ()
+    (said,) = caveats(moment, np.array([0.0, 0.5, 0.7, 1.0]))
+    assert said == "only the state at 0.5 s is predicted: 3 of 4 frames are not predictions"
 
 
 def test_a_motion_that_stops(sinking: Predictor) -> None:

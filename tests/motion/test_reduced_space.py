@@ -8,7 +8,17 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.models.base import Predictor
-from odeform.motion.reduced_space import POSE, ReducedSpace, decompose, make_space, rotation_of, to_canonical
+from odeform.motion.reduced_space import (
+    POSE,
+    ReducedSpace,
+    decompose,
+    make_space,
+    motion_rmse,
+    rotation_of,
+    small_motion,
+    to_canonical,
+)
+from odeform.motion.rolling import Rolling
 from odeform.types import Mesh, MotionSequence
 
 HEADING = 0.9
@@ -132,3 +142,31 @@ def test_nothing_grows_by_more_than_three_tenths_of_what_was_trained() -> None:
     assert np.linalg.norm(later[3, :3]) == pytest.approx(3.0 * 1.3 * 0.4)
     assert np.array_equal(later[:, 6:], bounded[:, 6:])
     assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == (0.4, 2e-3)
+
+
+def test_small_motions_are_measured_by_what_they_move() -> None:
+    """A shift as it is, a turn by sqrt(2/3) of the radius of gyration, and coefficients, which are displacements."""
+    y = np.array([[3.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.6, 0.0, 0.8, 0.0, 0.0]])
+    bent = np.array([[0.0] * 6 + [0.3, -0.4]])
+    assert small_motion(y, 0.3) == pytest.approx([5.0, 0.3 * np.sqrt(2.0 / 3.0)])
+    assert small_motion(bent, 0.3) == pytest.approx([0.5])
+    # over three axes and all times
+    assert motion_rmse(y, np.zeros_like(y), 0.3) == pytest.approx(np.sqrt((25.0 + 0.06) / 6.0))
+    assert motion_rmse(y, y, 0.3) == 0.0
+
+
+def test_bodies_that_roll_have_patterns_in_place_of_modes() -> None:
+    rng, axis = np.random.default_rng(0), np.array([0.0, 1.0, 0.0])
+    rest = np.asarray(trimesh.creation.icosphere(1, 0.1).vertices)
+    modes, weights = rng.normal(size=(len(rest), 3, 4)), np.full(len(rest), 1.0 / len(rest))
+    plain = make_space(Mesh(rest, np.zeros((0, 3), np.int32)), modes, weights, np.zeros(3))
+    space = replace(plain, rolling=Rolling(axis, rng.normal(size=(5, 4, 2))))
+    assert (plain.coordinates, space.coordinates) == (POSE + 4, POSE + 2)
+    y = np.concatenate([rng.normal(size=(6, 3)), rng.normal(size=(6, 1)) * axis, rng.normal(size=(6, 2))], axis=1)
+    whole = space.with_modes(y)
+    assert whole.shape == (6, POSE + 4)
+    np.testing.assert_array_equal(whole[:, :POSE], y[:, :POSE])
+    np.testing.assert_allclose(whole[:, POSE:], space.rolling.coefficients(y[:, 3:POSE], y[:, POSE:]))
+    np.testing.assert_allclose(space.with_patterns(whole), y, rtol=1e-5, atol=1e-6)
+    assert plain.with_modes(whole) is whole
+    assert plain.with_patterns(whole) is whole

@@ -116,6 +116,19 @@ def test_energy_from_nowhere_stops_it() -> None:
     assert stop.reason == "it gains energy"
 
 
+def test_energy_is_compared_with_a_tenth_more_than_the_largest_in_the_window() -> None:
+    """A ball that swings by half a metre and is lifted slowly afterwards: where it is lifted by a tenth of that."""
+
+    def lifted(times: Times) -> Floats:
+        return np.where(times > 1.0, 0.5 + 0.2 * (times - 1.0), 0.5 * np.cos(np.pi * times) ** 2)
+
+    stop = watch(height=lifted)[0].first_stop(1.5)
+    assert stop is not None
+    assert stop.reason == "it gains energy"
+    # the largest energy is looked up a sixteenth of the window before its end: 4.89 of 4.905 J/kg
+    assert stop.time == pytest.approx(1.0 + (1.1 * 4.89 - 4.905 - 0.02) / (0.2 * 9.81), abs=0.01)
+
+
 def test_a_scene_without_a_floor_has_none_to_sink_into() -> None:
     free = Watch(Limits(None), WINDOW, lambda t: Sample(np.full(len(t), -9.0), np.zeros(len(t)), np.zeros((len(t), 3))))
     assert free.first_stop(1.5) is None
@@ -124,3 +137,14 @@ def test_a_scene_without_a_floor_has_none_to_sink_into() -> None:
 def test_a_motion_that_never_was_sound_stays_at_rest() -> None:
     broken, _ = watch(lowest=lambda t: np.where(t > 0.0, -1.0, 0.0))
     assert broken.held(np.array([0.0, 0.2, 1.0, 1.5])) == pytest.approx(np.zeros(4), abs=1e-4)
+
+
+@pytest.mark.parametrize("step", [1, 2, 40, *range(42, 49), 57])
+def test_after_the_window_no_moment_of_the_grid_is_left_out(step: int) -> None:
+    """It sinks for the length of one interval, wherever that is among those that are checked at once."""
+    moment = 1.0 + step / 120.0
+    brief, _ = watch(lowest=lambda t: np.where(np.abs(t - moment) < 0.4 / 120.0, -0.01, 0.0))
+    stop = brief.stop_at(1.55)
+    assert stop is not None
+    assert stop.time == pytest.approx(moment - 0.4 / 120.0, abs=2e-5)
+    assert brief.stop_at(moment - 0.5 / 120.0) is None
