@@ -114,7 +114,7 @@ def dataset(made_once: MadeOnce) -> Dataset:
     """Coarse kicks: really simulated, with fewer vertices and a larger step than the scene's own."""
 
     def simulate(folder: Path) -> None:
-        with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
+        with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"), _unchecked():
             _coarsen(patch)
             runner.simulate("kick", folder, count=21, seed=3, workers=2, ranges=RANGES)
 
@@ -129,7 +129,7 @@ def trained(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
     def fit(folder: Path) -> None:
         few = functools.partial(config.TrainConfig, random_features=200, sharpnesses=(1.0,))
         folder.mkdir()
-        with pytest.MonkeyPatch.context() as patch:
+        with pytest.MonkeyPatch.context() as patch, _unchecked():
             patch.setattr(config, "TrainConfig", few)
             for model in models:
                 path = folder / f"{model}.safetensors"

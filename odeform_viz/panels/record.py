@@ -43,7 +43,6 @@ class RecordPanel(Panel):
     def show(self, status: RecordingStatus) -> None:
         """Show the progress of a recording, or how it ended."""
         active = status.state == "active"
-        self._start.visible, self._stop.visible, self._path.disabled = not active, active, active
         if active:
             self._text.content = f"**recording** to `{status.path}`, {status.frames} frames"
         elif status.state == "failed":
@@ -53,3 +52,5 @@ class RecordPanel(Panel):
             self._text.content = f"`{status.path}`, {status.frames} frames: {check}"
             free = (Path(status.path).with_stem(f"{self._stem}-{n}") for n in itertools.count(2))
             self._path.value = str(next(path for path in free if not path.exists()))
+        # last: who sees the button may type the next name at once
+        self._start.visible, self._stop.visible, self._path.disabled = not active, active, active

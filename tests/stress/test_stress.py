@@ -229,6 +229,7 @@ def test_spin_is_energy() -> None:
     assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     plot = stability_map(model, ("force", "mass"), reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")

@@ -146,7 +146,7 @@ class LoopbackClient:
         self.until(lambda: command in self._commands)
         self._send("CommandTriggerMessage", uuid=self._commands[command])
 
-    def upload(self, label: str, name: str, content: bytes) -> None:
+    def upload(self, label: str, name: str, content: bytes | bytearray) -> None:
         """Upload a file with the upload button of that label."""
         parts = [content[at : at + PART] for at in range(0, len(content), PART)]
         ids = {"source_component_uuid": self.controls[label].uuid, "transfer_uuid": uuid.uuid4().hex}
@@ -178,9 +178,9 @@ class LoopbackClient:
     def until(self, holds: Callable[[], bool], seconds: float = DEADLINE) -> bool:
         """Receive until a condition holds, or for at most `seconds`; returns whether it holds."""
         end = time.monotonic() + seconds
-        while not holds() and time.monotonic() < end:
+        while not (held := bool(holds())) and time.monotonic() < end:
             self.receive(0.1)
-        return holds()
+        return held
 
     def _handle(self, message: dict[str, Any]) -> None:
         kind, props = message["type"], message.get("props", {})

@@ -42,6 +42,7 @@ def test_a_short_training_of_the_default_model_gives_the_recorded_scores(
     assert "kick/odeform: " in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_continuation_alone_is_fitted_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     name, out = "mass-elastic/pod-rbf", tmp_path / "mass-elastic_pod-rbf.safetensors"
     assert main(["retrain", name, "--only", "continuation", "--keep", str(tmp_path)]) == 0
