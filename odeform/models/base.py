@@ -23,7 +23,10 @@ from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
-__all__ = ["Predictor", "check_finite"]
+__all__ = ["QUALITIES", "Predictor", "check_finite"]
+
+QUALITIES = ("draft", "balanced", "reference")
+"""The names of solver settings, from cheap to fine; models that do not integrate accept them as well."""
 
 DEEPER = 1.25  # times the depth below the floor of trained motions, where that is more than other bodies may have
 
@@ -107,10 +110,19 @@ class Predictor(ABC):
             bodies = {"": checkpoint.arrays, **objects}
             bands = {name: error_band(arrays) for name, arrays in bodies.items()}
             self._bands = {name: band for name, band in bands.items() if band is not None}
-            self._read(checkpoint)
+            with np.errstate(under="ignore"):  # rounding to zero is no error, whatever a program asks numpy for
+                self._read(checkpoint)
         except Exception as error:
-            # what a damaged file has in the place of a number or a shape may raise anything
-            raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
+            # what a damaged file has in the place of a number or a shape may raise anything; in a class of another
+            # package, only what `_read` is documented to raise says that the file is at fault
+            if not (self._is_of_odeform or isinstance(error, KeyError | ValueError)):
+                raise
+            raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from error
+
+    @property
+    def _is_of_odeform(self) -> bool:
+        """Whether the class that reads the arrays is one of this package, and not one that a program registered."""
+        return type(self).__module__.partition(".")[0] == "odeform"
 
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
@@ -152,8 +164,7 @@ class Predictor(ABC):
             InputError: for a shape, parameter, quality or observation that this model cannot use.
         """
         self._check_observed(observed)
-        window = self.schema.window
-        end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
+        end = self._end(until)
         complete = self.complete(parameters)
         shape = self.rest_of(complete) if geometry is None else geometry
         return self._solve(shape, complete, self._settings(quality, complete), end, observed)
@@ -220,6 +231,17 @@ class Predictor(ABC):
         if observed is None and self.schema.needs_observations:
             raise InputError(f"{self.model}: interpolates between observed frames, and none were given")
 
+    def _end(self, until: float | None) -> float:
+        """The seconds up to which to solve, soft-clamped; the trained window for None."""
+        window = self.schema.window
+        try:
+            end = window.stop if until is None else float(until)
+        except (TypeError, ValueError):
+            end = np.nan
+        if np.isnan(end):
+            raise InputError(f"until: expected a number of seconds, got {until!r}")
+        return float(window.soft_clamped(np.array(end)))
+
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         """`frontier`, for the body in `parameters`, which are complete."""
         return self.frontier
@@ -230,9 +252,9 @@ class Predictor(ABC):
 
     def _settings(self, quality: str | SolverSettings, parameters: Parameters) -> SolverSettings | None:
         """None for a model without qualities that is given one by name."""
+        if isinstance(quality, SolverSettings):
+            return quality
         known = self._qualities_of(parameters)
-        if not known or isinstance(quality, SolverSettings):
-            return quality if isinstance(quality, SolverSettings) else None
-        if quality not in known:
-            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known)}")
-        return known[quality]
+        if not isinstance(quality, str) or quality not in (known or QUALITIES):
+            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known or QUALITIES)}")
+        return known.get(quality)

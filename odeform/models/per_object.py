@@ -65,6 +65,10 @@ class PerObject(Predictor):
         self._kind = kind
         super().__init__(checkpoint)
 
+    @property
+    def _is_of_odeform(self) -> bool:
+        return self._kind.__module__.partition(".")[0] == "odeform"
+
     def _read(self, checkpoint: Checkpoint) -> None:
         self.parts = {name: self._kind(_part(checkpoint, name)) for name in checkpoint.schema.objects}
         first = next(iter(self.parts.values()))
