@@ -121,7 +121,8 @@ class Parameter:
         """The value as a float, in `unit`. Values outside the trained range are accepted.
 
         Raises:
-            InputError: Not a finite number, not positive where the scale is "log", or a tensor that asks for its gradient.
+            InputError: Not a finite number, not positive where the scale is "log", or a tensor that asks for its
+                gradient.
         """
         if getattr(value, "requires_grad", False):
             raise InputError(

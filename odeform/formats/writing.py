@@ -66,8 +66,8 @@ def write_motion(
         truth: A record of the same parameters whose mesh `motion` moves; `.csv` then has errors against it.
 
     Raises:
-        InputError: No times, a name with an unknown suffix, or without `{frame}` where the format holds one frame, or a format
-            that holds no errors, with a `truth`.
+        InputError: No times, a name with an unknown suffix, or without `{frame}` where the format holds one frame, or
+            a format that holds no errors, with a `truth`.
 
     Examples:
         >>> import numpy as np

@@ -21,6 +21,8 @@ from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 
 if TYPE_CHECKING:
+    import torch
+
     from odeform.models.training.run import Run
 
 __all__ = ["QUALITIES", "Predictor", "check_finite"]
@@ -74,6 +76,8 @@ class Predictor(ABC):
     """Solver settings by name (draft, balanced, reference); empty for models that do not integrate."""
     frontier: tuple[FrontierPoint, ...] = ()
     """The measured solver settings, cheap to fine; empty for models without, and in older checkpoints."""
+    accurate: SolverSettings = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
+    """Settings whose errors are far below those of single precision: what derivatives are taken of."""
     rescales_input: bool = True
     """Whether a foreign shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
     knows_foreign_errors: bool = False
@@ -169,6 +173,38 @@ class Predictor(ABC):
         shape = self.rest_of(complete) if geometry is None else geometry
         return self._solve(shape, complete, self._settings(quality, complete), end, observed)
 
+    def torch(
+        self, parameters: Mapping[str, Any], times: Any, geometry: "Geometry | torch.Tensor | None" = None
+    ) -> "torch.Tensor":
+        """Predict points as a tensor of PyTorch that can be differentiated, once.
+
+        Args:
+            parameters: by name, as `solve` takes them; numbers, or tensors of one number (three for a vector), by which
+                the result can be differentiated. Defaults for the others.
+            times: (T,) seconds, or one number.
+            geometry: points at rest (N, 3) in metres as a tensor, by which the result can be differentiated, or a
+                shape as `solve` takes it; by default the trained body.
+
+        Returns:
+            (T, N, 3) metres, or (N, 3) for one time, with the precision and the device of the given tensors. The ODE is
+            solved by `accurate` settings in double precision. Derivatives of latent models are exact within the window;
+            others come from central differences of such solutions, with two of them for each parameter.
+
+        Raises:
+            InputError: as `solve`; times that ask for a gradient; and models that interpolate between frames.
+
+        Examples:
+            >>> import odeform, torch
+            >>> force = torch.tensor(120.0, dtype=torch.float64, requires_grad=True)
+            >>> points = odeform.load("kick/gp").torch({"force": force}, [0.1, 0.2])
+            >>> points[-1, :, 0].mean().backward()
+            >>> bool(force.grad > 0.0)
+            True
+        """
+        from odeform.models.differentiable import differentiable_points
+
+        return differentiable_points(self, parameters, times, geometry)
+
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """All parameters, checked, with defaults for those not given (`Schema.complete`).
 
@@ -241,6 +277,10 @@ class Predictor(ABC):
         if np.isnan(end):
             raise InputError(f"until: expected a number of seconds, got {until!r}")
         return float(window.soft_clamped(np.array(end)))
+
+    def model_of(self, parameters: Parameters) -> "Predictor":
+        """The model of the body that complete `parameters` select: itself, where there is one for all."""
+        return self
 
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         """`frontier`, for the body in `parameters`, which are complete."""

@@ -87,6 +87,9 @@ class PerObject(Predictor):
     ) -> Motion:
         return self.parts[parameters[OBJECT]]._solve(geometry, parameters, settings, until, observed)
 
+    def model_of(self, parameters: Parameters) -> Predictor:
+        return self.parts[parameters[OBJECT]]
+
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         return self.parts[parameters[OBJECT]].frontier
 

@@ -11,8 +11,8 @@ import torch
 
 import odeform
 from odeform.errors import InputError
-from odeform.models.baselines.nearest import Nearest
 from odeform.models.base import Predictor
+from odeform.models.baselines.nearest import Nearest
 from odeform.models.registry import open_checkpoint
 from odeform.motion.base import Motion
 

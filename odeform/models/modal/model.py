@@ -50,6 +50,7 @@ class ModalModel(ReducedModel):
     """The motion of one elastic body on the floor that a projectile pushes."""
 
     model = "modal"
+    accurate = QUALITIES["reference"]
     rescales_input = False
     knows_objects = True
     resumable = True
