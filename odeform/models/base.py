@@ -4,11 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from odeform.checkpoint import Checkpoint, arrays_of_object
+from odeform.checkpoint import Checkpoint, arrays_of_object, write_checkpoint
 from odeform.errors import InputError
 from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
@@ -93,6 +94,8 @@ class Predictor(ABC):
     """Whether it is solved for, so that a training has no budget."""
     resumable: bool = False
     """Whether an interrupted training can be continued."""
+    descends: bool = False
+    """Whether it is trained by gradient descent, with a loss and on a device that can be chosen."""
     ablations: ClassVar[Mapping[str, str]] = {}
     """Parts that a training may leave out, and what that means."""
 
@@ -238,6 +241,10 @@ class Predictor(ABC):
         within. None where the checkpoint holds errors of too few validation sequences for that."""
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
         return None if band is None else band.at(self.schema.vector(parameters), times)
+
+    def save(self, path: str | Path) -> None:
+        """Write the checkpoint, which `odeform.load` reads."""
+        write_checkpoint(path, self.checkpoint)
 
     @property
     def bodies(self) -> tuple[Mesh, ...]:

@@ -6,8 +6,8 @@ A model of reduced coordinates (`odeform.motion.reduced_space`) moves points by
 
 PyTorch differentiates this formula. It is told two derivatives: that of y by the normalised parameters u, which is
 exact for a family with sensitivities and else comes from central differences of accurate solutions, and that of the
-modes phi by the points (`DisplacementBasis.slopes`). Models that move each point by itself are differentiated as a whole, by
-central differences in single precision.
+modes phi by the points (`DisplacementBasis.slopes`). Models that move each point by itself are differentiated as a
+whole, by central differences in single precision.
 """
 
 from collections.abc import Callable, Mapping

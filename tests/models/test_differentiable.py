@@ -10,7 +10,8 @@ import odeform
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 
-PUSH = {"object": "donut", "contact": [0.0, 0.0, 0.02], "force": [1.0, 0.0, -2.0]}
+pytestmark = pytest.mark.usefixtures("unchecked")  # many solutions in double precision
+SLOW = ("kick", "mass-elastic/odeform-rolling", "mass-elastic/direct")
 CASES = {
     "mass-elastic": ({"mass": 0.25, "bending": 1.3}, 1e-5),
     "mass-elastic/gp": ({"mass": 0.25, "bending": 1.3}, 1e-5),
@@ -31,7 +32,7 @@ def tensors(values: dict[str, float]) -> dict[str, torch.Tensor]:
     return {name: torch.tensor(value, dtype=torch.float64, requires_grad=True) for name, value in values.items()}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in CASES])
 def test_derivatives_are_those_of_differences(name: str) -> None:
     predictor, (values, allowed) = odeform.load(name), CASES[name]
     stop = predictor.schema.window.stop
@@ -63,14 +64,8 @@ def test_a_push_is_differentiated_by_its_contact_and_force() -> None:
     points[..., 0].mean().backward()
     for name, step in (("contact", 1e-6), ("force", 1e-4)):
         way = np.array([0.6, -0.3, 0.2])
-        ends = [
-            float(
-                predictor.torch({"object": "donut", **values, name: values[name] + side * step * way}, times)[
-                    ..., 0
-                ].mean()
-            )
-            for side in (-1.0, 1.0)
-        ]
+        moved = [{**values, name: values[name] + side * step * way} for side in (-1.0, 1.0)]
+        ends = [float(predictor.torch({"object": "donut", **end}, times)[..., 0].mean()) for end in moved]
         slope = given[name].grad
         assert slope is not None
         assert float(slope @ torch.tensor(way)) == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=0.02)
@@ -87,7 +82,7 @@ def test_torch_finds_no_fault_with_exact_derivatives() -> None:
     assert torch.autograd.gradcheck(points, (*given, rest), eps=1e-5, atol=1e-4, rtol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["mass-elastic", "kick", "contact-force", "mass-elastic/gp", "mass-elastic/direct"])
+@pytest.mark.parametrize("name", ["mass-elastic", "kick", "mass-elastic/gp", "mass-elastic/direct"])
 def test_points_are_those_of_a_motion(name: str) -> None:
     predictor, times = odeform.load(name), np.array([0.0, 0.05, 0.2])
     points = predictor.torch({}, times)

@@ -114,6 +114,6 @@ def test_a_fault_of_a_program_is_its_own() -> None:
 @pytest.mark.parametrize("fault", [KeyError("weights"), ValueError("weights: expected (3, 4)")])
 def test_a_file_is_at_fault_where_a_program_says_so(fault: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Programmed, "fault", fault)
-    with pytest.raises(InputError, match="checkpoint of nearest: missing or wrong .*weights") as caught:
+    with pytest.raises(InputError, match=r"checkpoint of nearest: missing or wrong .*weights") as caught:
         Programmed(open_checkpoint("mass-elastic/nearest"))
     assert caught.value.__cause__ is fault

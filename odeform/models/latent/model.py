@@ -34,6 +34,7 @@ class LatentModel(IntegratedModel):
 
     model = "latent"
     resumable = True
+    descends = True
     ablations: ClassVar[Mapping[str, str]] = {
         "ode": "states stay as they start",
         "clock": "decoders are not conditioned on time",
