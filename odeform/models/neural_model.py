@@ -78,9 +78,7 @@ class NeuralModel(IntegratedModel):
     def _read(self, checkpoint: Checkpoint) -> None:
         super()._read(checkpoint)
         module = self.network(len(self.schema.learned), self.space.coordinates, **checkpoint.config["network"])
-        weights = {
-            k.removeprefix(PREFIX): torch.tensor(v) for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)
-        }
+        arrays = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
         try:
             module.load_state_dict({name: torch.tensor(value) for name, value in arrays.items()})
         except RuntimeError as error:

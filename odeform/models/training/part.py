@@ -19,7 +19,7 @@ DAMAGED = (pickle.UnpicklingError, zipfile.BadZipFile, RuntimeError, KeyError, T
 
 
 def write_part(path: Path, training: Mapping[str, Any], state: Mapping[str, Any]) -> None:
-    """Write the state, tensors and plain values in dictionaries and lists, of the training that plain values describe."""
+    """Write the state of a training, tensors and plain values in dictionaries and lists; `training` describes it."""
     buffer = io.BytesIO()
     torch.save({"training": json.dumps(training), "state": dict(state)}, buffer)
     atomic_write(path, buffer.getvalue())
@@ -35,15 +35,7 @@ def read_part(path: Path, training: Mapping[str, Any]) -> dict[str, Any]:
         found, state = json.loads(known["training"]), dict(known["state"])
     except OSError as error:
         raise InputError(f"--resume: {path}: {error.strerror}; expected an interrupted training") from None
-    except (
-        pickle.UnpicklingError,
-        zipfile.BadZipFile,
-        RuntimeError,
-        KeyError,
-        TypeError,
-        ValueError,
-        EOFError,
-    ) as error:
+    except DAMAGED as error:
         raise InputError(f"--resume: {path}: not a state of a training: {error}") from None
     expected = json.loads(json.dumps(training))
     if found != expected:
