@@ -11,6 +11,7 @@ whole, by central differences in single precision.
 """
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
@@ -51,7 +52,7 @@ class _Linear(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, inputs: torch.Tensor, values: Array, jacobian: Callable[[], Array]) -> torch.Tensor:
-        ctx.jacobian, ctx.like = jacobian, inputs
+        ctx.jacobian, ctx.like = cache(jacobian), inputs  # rows of a Jacobian are asked for one after the other
         return torch.tensor(values)
 
     @staticmethod
@@ -66,7 +67,7 @@ class _PerPoint(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, points: torch.Tensor, values: Array, slopes: Callable[[], Array]) -> torch.Tensor:
-        ctx.slopes = slopes
+        ctx.slopes = cache(slopes)
         return torch.tensor(values)
 
     @staticmethod
@@ -99,7 +100,8 @@ def differentiable_points(
         moved = _reduced_points(motion, rest, azimuth, _coordinates(model, motion, solve, u, clock))
     else:
         moved = _moved_points(motion, solve, u, rest, clock)
-    tensors = [t for t in (*given.values(), geometry, getattr(geometry, "points", None)) if isinstance(t, torch.Tensor)]
+    asked = (*parameters.values(), geometry, getattr(geometry, "points", None))
+    tensors = [tensor for tensor in asked if isinstance(tensor, torch.Tensor)]
     like = tensors[0] if tensors else torch.empty(0)
     out = moved.to(like.device, max((t.dtype for t in tensors), key=lambda d: d.itemsize, default=like.dtype))
     return out[0] if np.ndim(times) == 0 else out

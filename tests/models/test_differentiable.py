@@ -47,7 +47,7 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
     for p, slope in zip((p for p in predictor.schema.parameters if p.name in values), by_values, strict=True):
         step = 1e-3 * (p.high - p.low)
         ends = [total({**values, p.name: values[p.name] + side * step}, rest) for side in (-1.0, 1.0)]
-        size = float(weights.abs().mean() * points.abs().mean() * weights.numel()) / (p.high - p.low)
+        size = float(weights.abs().mean() * points.detach().abs().mean() * weights.numel()) / (p.high - p.low)
         assert float(slope) == pytest.approx((ends[1] - ends[0]) / (2.0 * step), rel=allowed, abs=1e-3 * size)
     way = torch.randn(rest.shape, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
     ends = [total(values, rest + side * 1e-3 * way) for side in (-1.0, 1.0)]
@@ -73,10 +73,10 @@ def test_a_push_is_differentiated_by_its_contact_and_force() -> None:
 
 def test_torch_finds_no_fault_with_exact_derivatives() -> None:
     predictor = odeform.load("mass-elastic")
-    rest = few_points(predictor)[:3].requires_grad_()
+    rest = few_points(predictor)[:1].requires_grad_()
 
     def points(mass: torch.Tensor, bending: torch.Tensor, rest: torch.Tensor) -> torch.Tensor:
-        return predictor.torch({"mass": mass, "bending": bending}, [0.2, 0.5], rest)
+        return predictor.torch({"mass": mass, "bending": bending}, [0.4], rest)
 
     given = [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in (0.25, 1.3)]
     assert torch.autograd.gradcheck(points, (*given, rest), eps=1e-5, atol=1e-4, rtol=1e-3)
