@@ -32,7 +32,10 @@ def is_there(mark: str) -> bool:
     if not mark.startswith("needs "):
         return True
     module, kind, attribute = mark.removeprefix("needs ").rsplit(".", 2)
-    return hasattr(getattr(importlib.import_module(module), kind), attribute)
+    try:
+        return hasattr(getattr(importlib.import_module(module), kind), attribute)
+    except ModuleNotFoundError:
+        return False
 
 
 def run_python(page: Path, slow: bool) -> None:

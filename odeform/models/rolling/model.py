@@ -54,12 +54,12 @@ class RollingModel(IntegratedModel):
 
     model = "rolling"
     continues_itself = True
-    resumable = True
     ablations: ClassVar[Mapping[str, str]] = {
         "network": "coefficients of the contact law depend on the material alone",
         "corners": "the body rolls over a smooth floor on a smooth rim",
         "correction": "what is left unexplained is not regressed",
     }
+    resumable = True
 
     @classmethod
     def train(cls, run: "Run") -> Checkpoint:

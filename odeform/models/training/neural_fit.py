@@ -37,7 +37,7 @@ EXACT = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
 
 def train_neural(model: type[NeuralModel], run: Run) -> Checkpoint:
     """Train on the data of `run`; an interrupted training is continued from `run.part`."""
-    data = run.reduced_data()
+    data = run.reduced_data(patterns=True)
     learner = _Learner(model, data, run)
     val = learner.train()
     arrays = {**learner.best[1], "scale": learner.scale}
