@@ -29,7 +29,8 @@ class NeuralModel(IntegratedModel):
 
     A subclass sets `model`, its name, and `network`, a module that is constructed as `network(P, C, **settings)` for P
     parameters and C coordinates: shift, rotation vector, and coefficients of the deformation's modes (of a body that
-    rolls: of patterns that do not turn with it). It has three methods; (B,) motions are computed together, and theta (B, P) is in [-1, 1]:
+    rolls: of patterns that do not turn with it). It has three methods; (B,) motions are computed together, and theta
+    (B, P) is in [-1, 1]:
 
     - `initial_state(theta)` -> (B, S), the state at time 0;
     - `vector_field(t, z, theta)` -> (B, S), the slope per second of z (B, S) at t seconds, a number;
