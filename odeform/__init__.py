@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from odeform.dataset.in_memory import dataset_from_arrays
     from odeform.dataset.index import Dataset
     from odeform.dataset.store import open_dataset
     from odeform.errors import InputError
@@ -26,12 +27,14 @@ if TYPE_CHECKING:
     from odeform.identification.identify import identify
     from odeform.identification.observation import Observation
     from odeform.models.base import Predictor
+    from odeform.models.neural_model import NeuralModel
+    from odeform.models.plugins import register_model
     from odeform.models.registry import load
     from odeform.motion.base import Motion
     from odeform.schema import Parameter, Schema
     from odeform.simulation.runner import simulate
     from odeform.solver.integrate import SolverSettings
-    from odeform.training.train import train
+    from odeform.training.train import fit, train
     from odeform.types import GaussianSplats, Mesh, MotionSequence, PointCloud
 
     __version__: str
@@ -43,6 +46,7 @@ __all__ = [
     "Mesh",
     "Motion",
     "MotionSequence",
+    "NeuralModel",
     "Observation",
     "Parameter",
     "PointCloud",
@@ -51,11 +55,14 @@ __all__ = [
     "SolverSettings",
     "__version__",
     "calibrate",
+    "dataset_from_arrays",
     "evaluate",
+    "fit",
     "identify",
     "load",
     "open_dataset",
     "read_geometry",
+    "register_model",
     "simulate",
     "train",
     "write_motion",
@@ -69,6 +76,7 @@ _MODULES = {
     "Mesh": "types",
     "Motion": "motion.base",
     "MotionSequence": "types",
+    "NeuralModel": "models.neural_model",
     "Observation": "identification.observation",
     "Parameter": "schema",
     "PointCloud": "types",
@@ -76,11 +84,14 @@ _MODULES = {
     "Schema": "schema",
     "SolverSettings": "solver.integrate",
     "calibrate": "identification.discrepancy",
+    "dataset_from_arrays": "dataset.in_memory",
     "evaluate": "evaluation.metrics",
+    "fit": "training.train",
     "identify": "identification.identify",
     "load": "models.registry",
     "open_dataset": "dataset.store",
     "read_geometry": "formats.reading",
+    "register_model": "models.plugins",
     "simulate": "simulation.runner",
     "train": "training.train",
     "write_motion": "formats.writing",

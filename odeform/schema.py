@@ -122,8 +122,15 @@ class Parameter:
         """The value as a float, in `unit`. Values outside the trained range are accepted.
 
         Raises:
-            InputError: Not a finite number, or not positive where the scale is "log".
+            InputError: Not a finite number, not positive where the scale is "log", or a tensor that asks for its
+                gradient.
         """
+        if getattr(value, "requires_grad", False):
+            raise InputError(
+                f"{self.name}: expected a number, got a tensor that asks for its gradient; `Predictor.torch` takes one"
+            )
+        if isinstance(value, bool | np.bool_):
+            raise InputError(f"{self.name}: expected a number in {self.unit}, got {value}")
         try:
             number = float(value)
         except (TypeError, ValueError):

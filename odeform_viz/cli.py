@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import odeform
 from odeform.cli import run_guarded
-from odeform.cli.options import Parser
+from odeform.cli.options import Parser, add_plugin, load_plugins
 from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
@@ -111,6 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument(
         "--sequence", metavar="PATH", help="show a sequence of a data set, DATASET/NAME, as the truth beside the models"
     )
+    add_plugin(show)
     page = parser.add_argument_group("where to serve")
     page.add_argument("--host", default="127.0.0.1", metavar="H", help="address to listen on (default: 127.0.0.1)")
     page.add_argument(
@@ -160,6 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def work() -> None:
         nonlocal agrees
+        load_plugins(args.plugin)
         if args.replay:
             agrees = replay(args.replay, args.tolerance)
             return

@@ -13,7 +13,7 @@ import pytest
 import odeform
 
 ACCESSORS = (property, cached_property, classmethod, staticmethod)
-SLOW = {"calibrate", "identify", "simulate", "train"}
+SLOW = {"calibrate", "fit", "identify", "simulate", "train"}
 ROOT = Path(odeform.__file__).parent
 PACKAGES = (ROOT, ROOT.parent / "odeform_viz", ROOT.parent / "docs" / "odeform_figures")
 COMMANDS = ("odeform.cli.", "odeform_figures.commands.")

@@ -19,7 +19,7 @@ from odeform.cli import (
     train,
 )
 from odeform.cli.interrupts import interruptible
-from odeform.cli.options import Parser
+from odeform.cli.options import Parser, add_plugin, load_plugins
 from odeform.errors import FailedCheck, InputError, one_line
 
 __all__ = ["COMMANDS", "Command", "commands", "main", "run_guarded"]
@@ -73,6 +73,7 @@ class _Parser(Parser):
         if self.command is not None:
             self.set_defaults(run=self.command.run)
             self.command.add_options(self)
+            add_plugin(self)
             self.command = None
         return super().parse_known_args(*args, **kwargs)
 
@@ -121,7 +122,12 @@ def _main(argv: Sequence[str] | None) -> int:
         return code
     args = _parser_of(known).parse_args(argv)
     missing = _missing_folders(args)
-    code = run_guarded(lambda: args.run(args))
+
+    def work() -> None:
+        load_plugins(args.plugin)
+        args.run(args)
+
+    code = run_guarded(work)
     for folder in (folder for folder in missing if folder.exists()):
         print(f"note: created the folder {folder}", file=sys.stderr)
     return code

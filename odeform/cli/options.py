@@ -14,10 +14,12 @@ __all__ = [
     "add_cluster",
     "add_data",
     "add_json",
+    "add_plugin",
     "add_quality",
     "add_seed",
     "add_split",
     "add_window",
+    "load_plugins",
     "parse_settings",
     "parse_window",
     "positive",
@@ -81,6 +83,21 @@ def add_cluster(parser: argparse.ArgumentParser, needs: str = "") -> None:
 def add_json(parser: argparse.ArgumentParser, text: str = "also write the result to this file, as JSON") -> None:
     """--json FILE."""
     parser.add_argument("--json", metavar="FILE", help=text)
+
+
+def add_plugin(parser: argparse._ActionsContainer) -> None:
+    """--plugin FILE, for `load_plugins`."""
+    text = "run this Python file first, which registers models of your own (may be repeated)"
+    parser.add_argument("--plugin", action="append", default=[], metavar="FILE.py", help=text)
+
+
+def load_plugins(files: Sequence[str]) -> None:
+    """Run the files of --plugin; `InputError` for one that is not there, and what their code raises as it is."""
+    if files:
+        from odeform.models.plugins import load_plugin
+
+        for file in files:
+            load_plugin(file)
 
 
 def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, str]:

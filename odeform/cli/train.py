@@ -41,7 +41,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--object", nargs="+", default=[], metavar="NAME", help="train on these objects only, of a scene with several"
     )
-    parser.add_argument("--resume", action="store_true", help="continue an interrupted training from FILE.part")
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="continue an interrupted training from FILE.part, which models with a state leave",
+    )
 
 
 def run(args: argparse.Namespace) -> None:

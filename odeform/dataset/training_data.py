@@ -15,7 +15,7 @@ from odeform.motion.reduced_space import ReducedSpace, decompose, fit_modes, mak
 from odeform.schema import Schema, Window
 from odeform.types import Basis, Bools, Floats, Mesh, MotionSequence, Perpoint, Times, Vector
 
-__all__ = ["FILLED_WEIGHT", "TrainingData", "prepare"]
+__all__ = ["FILLED_WEIGHT", "TrainingData", "inputs_identity", "prepare"]
 
 SPLITS = ("train", "val")
 TRUNCATION = 5e-3  # share of the RMS deformation that may be left out
@@ -131,7 +131,7 @@ def prepare(
         reduced=reduced,
         observed={split: subsampling.observed(count, len(reduced[split])) for split in SPLITS},
         truncation_mm={split: float(1e3 * np.sqrt(left_out[split])) for split in SPLITS},
-        identity=_identity(dataset, subsampling, count, kept),
+        identity=inputs_identity(dataset, subsampling, count, kept),
         first_free=int(np.searchsorted(body.times, float(dataset.fixed.get(PULSE, 0.0)) - 1e-9)),
     )
 
@@ -187,7 +187,8 @@ def _trained_schema(schema: Schema, times: Times, subsampling: FrameSubsampling)
     return replace(schema, window=Window(float(times[0]), float(times[-1]), rate))
 
 
-def _identity(dataset: Dataset, subsampling: FrameSubsampling, count: int, modes: int) -> str:
+def inputs_identity(dataset: Dataset, subsampling: FrameSubsampling, count: int, modes: int) -> str:
+    """SHA-256 of all inputs of a training: the sequences, the frames, and the number of modes, or of given frames."""
     used = [[entry.name, entry.sha256] for split in SPLITS for entry in dataset.select(split)]
     inputs = [used, count, subsampling.every, subsampling.stagger, modes]
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()

@@ -12,7 +12,7 @@ from odeform.formats.registry import FRAME, Writer, load_function, motion_ending
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.geometry.shape import FittedShape
 from odeform.io import atomic_open, atomic_write
-from odeform.motion.base import Motion
+from odeform.motion.base import Motion, checked_times
 from odeform.motion.caveats import caveats
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import Floats, GaussianSplats, Geometry
@@ -46,7 +46,7 @@ def write_shape(geometry: Geometry, out: str | Path, notes: Sequence[str] = ()) 
 
 def write_motion(
     motion: Motion,
-    times: Floats,
+    times: Floats | Sequence[float],
     out: str | Path,
     fit: FittedShape | None = None,
     truth: RecordedMotion | None = None,
@@ -59,15 +59,15 @@ def write_motion(
 
     Args:
         motion: What `Predictor.solve` returned.
-        times: (T,) seconds, in any order.
+        times: (T,) seconds, in any order, as an array or a list.
         out: A file name.
         fit: How the shape was brought into the scene. Lengths, position and axes are then those of its file, and files
             of single frames include the part that stands still.
         truth: A record of the same parameters whose mesh `motion` moves; `.csv` then has errors against it.
 
     Raises:
-        InputError: A name with an unknown suffix, or without `{frame}` where the format holds one frame, or a format
-            that holds no errors, with a `truth`.
+        InputError: No times, a name with an unknown suffix, or without `{frame}` where the format holds one frame, or
+            a format that holds no errors, with a `truth`.
 
     Examples:
         >>> import numpy as np
@@ -79,7 +79,7 @@ def write_motion(
         >>> odeform.write_motion(motion, np.array([0.0, 0.5]), "ball_{frame}.ply")
         >>> odeform.write_motion(motion, np.arange(0.0, 1.0, 0.02), "ball.glb")
     """
-    path = Path(out)
+    path, times = Path(out), checked_times(times)
     files = motion_files(path, len(times), truth is not None)
     _require_finite(motion, times)
     writer = writers()[path.suffix.lower()]

@@ -4,11 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from odeform.checkpoint import Checkpoint, arrays_of_object
+from odeform.checkpoint import Checkpoint, arrays_of_object, write_checkpoint
 from odeform.errors import InputError
 from odeform.geometry.upright import stand_up
 from odeform.models.error_band import error_band
@@ -23,9 +24,14 @@ from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 
 if TYPE_CHECKING:
+    import torch
+
     from odeform.models.training.run import Run
 
-__all__ = ["Predictor", "check_finite"]
+__all__ = ["QUALITIES", "Predictor", "check_finite"]
+
+QUALITIES = ("draft", "balanced", "reference")
+"""The names of solver settings, from cheap to fine; models that do not integrate accept them as well."""
 
 DEEPER = 1.25  # times the depth below the floor of trained motions, where that is more than other bodies may have
 
@@ -74,6 +80,8 @@ class Predictor(ABC):
     """Solver settings by name (draft, balanced, reference); empty for models that do not integrate."""
     frontier: tuple[FrontierPoint, ...] = ()
     """The measured solver settings, cheap to fine; empty for models without, and in older checkpoints."""
+    accurate: SolverSettings = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
+    """Settings whose errors are far below those of single precision: what derivatives are taken of."""
     rescales_input: bool = True
     """Whether a foreign shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
     knows_foreign_errors: bool = False
@@ -89,6 +97,8 @@ class Predictor(ABC):
     """Whether it is solved for, so that a training has no budget."""
     resumable: bool = False
     """Whether an interrupted training can be continued."""
+    descends: bool = False
+    """Whether it is trained by gradient descent, with a loss and on a device that can be chosen."""
     ablations: ClassVar[Mapping[str, str]] = {}
     """Parts that a training may leave out, and what that means."""
 
@@ -111,10 +121,19 @@ class Predictor(ABC):
             bodies = {"": checkpoint.arrays, **objects}
             bands = {name: error_band(arrays) for name, arrays in bodies.items()}
             self._bands = {name: band for name, band in bands.items() if band is not None}
-            self._read(checkpoint)
+            with np.errstate(under="ignore"):  # rounding to zero is no error, whatever a program asks numpy for
+                self._read(checkpoint)
         except Exception as error:
-            # what a damaged file has in the place of a number or a shape may raise anything
-            raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
+            # what a damaged file has in the place of a number or a shape may raise anything; in a class of another
+            # package, only what `_read` is documented to raise says that the file is at fault
+            if not (self._is_of_odeform or isinstance(error, KeyError | ValueError)):
+                raise
+            raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from error
+
+    @property
+    def _is_of_odeform(self) -> bool:
+        """Whether the class that reads the arrays is one of this package, and not one that a program registered."""
+        return type(self).__module__.partition(".")[0] == "odeform"
 
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
@@ -156,11 +175,42 @@ class Predictor(ABC):
             InputError: for a shape, parameter, quality or observation that this model cannot use.
         """
         self._check_observed(observed)
-        window = self.schema.window
-        end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
+        end = self._end(until)
         complete = self.complete(parameters)
         shape = self.rest_of(complete) if geometry is None else stand_up(geometry)
         return self._solve(shape, complete, self._settings(quality, complete), end, observed)
+
+    def torch(
+        self, parameters: Mapping[str, Any], times: Any, geometry: "Geometry | torch.Tensor | None" = None
+    ) -> "torch.Tensor":
+        """Predict points as a tensor of PyTorch that can be differentiated, once.
+
+        Args:
+            parameters: by name, as `solve` takes them; numbers, or tensors of one number (three for a vector), by which
+                the result can be differentiated. Defaults for the others.
+            times: (T,) seconds, or one number.
+            geometry: points at rest (N, 3) in metres as a tensor, by which the result can be differentiated, or a
+                shape as `solve` takes it; by default the trained body.
+
+        Returns:
+            (T, N, 3) metres, or (N, 3) for one time, with the precision and the device of the given tensors. The ODE is
+            solved by `accurate` settings in double precision. Derivatives of latent models are exact within the window;
+            others come from central differences of such solutions, with two of them for each parameter.
+
+        Raises:
+            InputError: as `solve`; times that ask for a gradient; and models that interpolate between frames.
+
+        Examples:
+            >>> import odeform, torch
+            >>> force = torch.tensor(120.0, dtype=torch.float64, requires_grad=True)
+            >>> points = odeform.load("kick/gp").torch({"force": force}, [0.1, 0.2])
+            >>> points[-1, :, 0].mean().backward()
+            >>> bool(force.grad > 0.0)
+            True
+        """
+        from odeform.models.differentiable import differentiable_points
+
+        return differentiable_points(self, parameters, times, geometry)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """All parameters, checked, with defaults for those not given (`Schema.complete`).
@@ -196,6 +246,10 @@ class Predictor(ABC):
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
         return None if band is None else band.at(self.schema.vector(parameters), times)
 
+    def save(self, path: str | Path) -> None:
+        """Write the checkpoint, which `odeform.load` reads."""
+        write_checkpoint(path, self.checkpoint)
+
     @property
     def bodies(self) -> tuple[Mesh, ...]:
         """The trained bodies where they rest in the scene; empty where the checkpoint does not hold them."""
@@ -224,6 +278,21 @@ class Predictor(ABC):
         if observed is None and self.schema.needs_observations:
             raise InputError(f"{self.model}: interpolates between observed frames, and none were given")
 
+    def _end(self, until: float | None) -> float:
+        """The seconds up to which to solve, soft-clamped; the trained window for None."""
+        window = self.schema.window
+        try:
+            end = window.stop if until is None else float(until)
+        except (TypeError, ValueError):
+            end = np.nan
+        if np.isnan(end):
+            raise InputError(f"until: expected a number of seconds, got {until!r}")
+        return float(window.soft_clamped(np.array(end)))
+
+    def model_of(self, parameters: Parameters) -> "Predictor":
+        """The model of the body that complete `parameters` select: itself, where there is one for all."""
+        return self
+
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         """`frontier`, for the body in `parameters`, which are complete."""
         return self.frontier
@@ -234,9 +303,9 @@ class Predictor(ABC):
 
     def _settings(self, quality: str | SolverSettings, parameters: Parameters) -> SolverSettings | None:
         """None for a model without qualities that is given one by name."""
+        if isinstance(quality, SolverSettings):
+            return quality
         known = self._qualities_of(parameters)
-        if not known or isinstance(quality, SolverSettings):
-            return quality if isinstance(quality, SolverSettings) else None
-        if quality not in known:
-            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known)}")
-        return known[quality]
+        if not isinstance(quality, str) or quality not in (known or QUALITIES):
+            raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known or QUALITIES)}")
+        return known.get(quality)

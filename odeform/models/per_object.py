@@ -65,6 +65,10 @@ class PerObject(Predictor):
         self._kind = kind
         super().__init__(checkpoint)
 
+    @property
+    def _is_of_odeform(self) -> bool:
+        return self._kind.__module__.partition(".")[0] == "odeform"
+
     def _read(self, checkpoint: Checkpoint) -> None:
         self.parts = {name: self._kind(_part(checkpoint, name)) for name in checkpoint.schema.objects}
         first = next(iter(self.parts.values()))
@@ -82,6 +86,9 @@ class PerObject(Predictor):
         observed: MotionSequence | None,
     ) -> Motion:
         return self.parts[parameters[OBJECT]]._solve(geometry, parameters, settings, until, observed)
+
+    def model_of(self, parameters: Parameters) -> Predictor:
+        return self.parts[parameters[OBJECT]]
 
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         return self.parts[parameters[OBJECT]].frontier

@@ -10,6 +10,7 @@ from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
 from odeform.models.names import ALIASES, MODELS, TRAINABLE
 from odeform.models.per_object import PerObject, is_per_object
+from odeform.models.plugins import plugged_in, registered
 from odeform.models.reduced_model import ReducedModel
 from odeform.schema import Schema
 from odeform.types import MotionSequence
@@ -31,12 +32,19 @@ Kind = TypeVar("Kind", bound=Predictor)
 
 
 def model_class(name: str) -> type[Predictor]:
-    """The class of a registered model, or of an alias of one; `InputError` for any other name."""
+    """The class of a model, or of an alias of one; `InputError` for any other name.
+
+    Besides those of this package there are models that a program registered (`odeform.models.plugins`), and those that
+    installed packages declare. No code is imported because a checkpoint names it.
+    """
     known = ALIASES.get(name, name)
-    if known not in MODELS:
-        raise InputError(f"unknown model {name!r}: expected one of {', '.join(MODELS)}")
-    module, _, attribute = MODELS[known].partition(":")
-    return getattr(importlib.import_module(module), attribute)
+    if known in MODELS:
+        module, _, attribute = MODELS[known].partition(":")
+        return getattr(importlib.import_module(module), attribute)
+    found = plugged_in(known)
+    if found is None:
+        raise InputError(f"unknown model {name!r}: expected one of {', '.join((*MODELS, *registered()))}")
+    return found
 
 
 def models_of(kind: type[Kind]) -> dict[str, type[Kind]]:

@@ -7,16 +7,25 @@ from functools import cached_property
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.geometry.likeness import Likeness
 from odeform.motion.trust import UNKNOWN, Trust
 from odeform.motion.watch import Stop, Watch
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, Geometry, Matrices, Points, Pose, Times
 
-__all__ = ["LATEST", "Motion", "SolveStats"]
+__all__ = ["LATEST", "Motion", "SolveStats", "checked_times"]
 
 LATEST = 10.0
 """Trained windows after which the clock of every model has stopped."""
+
+
+def checked_times(t: float | Times) -> Times:
+    """Return `t`, a number or (T,) seconds, as (T,) seconds; `InputError` for no time at all, and for NaN."""
+    times = np.atleast_1d(np.asarray(t, dtype=float))
+    if times.ndim != 1 or not len(times) or np.isnan(times).any():
+        raise InputError(f"time: expected seconds, a number or (T,) of them, got {np.array2string(times, threshold=5)}")
+    return times
 
 
 @dataclass(frozen=True)
@@ -172,8 +181,10 @@ class Motion(ABC):
         return f"{'' if solver == 'ok' else f'{solver}; '}stopped at t = {stop.time:.3f} s: {stop.reason}"
 
     def _clock(self, t: float | Times) -> Times:
-        """(T,) seconds of the model's clock at which `t`, a number or (T,) seconds, is evaluated."""
-        clock = self.schema.window.soft_clamped(np.atleast_1d(np.asarray(t, dtype=float)))
+        """(T,) seconds of the model's clock at which `t`, a number or (T,) seconds, is evaluated; before it starts, a
+        body rests."""
+        window = self.schema.window
+        clock = window.soft_clamped(np.maximum(checked_times(t), min(window.start, 0.0)))
         return clock if self.watch is None else self.watch.held(clock)
 
     @property

@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
 from odeform.geometry.shape import surface_weights
-from odeform.motion.base import SolveStats
+from odeform.motion.base import SolveStats, checked_times
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.types import Floats, Frames, Mesh, MotionSequence, Points, Pose, Times
 
@@ -71,11 +71,12 @@ class RecordedMotion:
 
     def vertices(self, t: float | Times) -> Points | Frames:
         """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
-        return self._splines[0](np.clip(t, 0.0, self.end)).astype(np.float32)
+        out = self._splines[0](np.clip(checked_times(t), 0.0, self.end)).astype(np.float32)
+        return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
         """The best rigid motion from the rest: (4, 4) in scene axes, metres; (T, 4, 4) for (T,) times."""
-        turn, shift = np.split(self._splines[1](np.clip(np.atleast_1d(t), 0.0, self.end)), 2, axis=1)
+        turn, shift = np.split(self._splines[1](np.clip(checked_times(t), 0.0, self.end)), 2, axis=1)
         out = np.zeros((len(turn), 4, 4))
         out[:, :3, :3] = rotation_from_vector(turn)
         out[:, :3, 3] = shift + self._centre - out[:, :3, :3] @ self._centre

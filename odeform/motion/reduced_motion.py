@@ -64,6 +64,10 @@ class ReducedMotion(Motion):
         times = self._clock(t)
         return self.space.bounded(self.trajectory.reduced(times), self.schema.window.passed(times))
 
+    def coordinates(self, t: float | Times) -> Float[np.ndarray, "times body_y"]:
+        """(T, 6 + K) in metres and radians, double precision: pose and deformation at (T,) seconds, or at one."""
+        return self._reduced(t)
+
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)
         rotation, shift = self._rotation_shift(y)

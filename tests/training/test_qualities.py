@@ -77,3 +77,18 @@ def test_the_model_is_not_blamed_for_what_a_spline_filled_in(
     known = Validation.of(prepare(dataset, model.space.basis.modes, FrameSubsampling(every=6, stagger=True)))
     wrong = replace(known, reduced=known.reduced + 9.0 * ~known.observed[..., None])
     assert measure_frontier(model, wrong) == measure_frontier(model, known)
+
+
+def test_the_reference_is_the_finest_even_where_nothing_moves_yet() -> None:
+    """After a few steps of training the cheapest settings may be exact, and are then all of the frontier."""
+    coarse, fine = SolverSettings("rk4", step=0.1), SolverSettings("rk4", step=0.01)
+    still = (FrontierPoint(coarse, 4.0, 0.0, 0.0),)
+    chosen = choose_qualities(still, (10.0, 1.0), finest=fine)
+    assert SolverSettings(**chosen["draft"]) == coarse
+    assert SolverSettings(**chosen["reference"]) == fine
+
+
+def test_the_reference_is_never_coarser_than_what_was_measured_as_finer() -> None:
+    fine, finer = SolverSettings("rk4", step=0.01), SolverSettings("dopri5", tolerance=1e-6)
+    frontier = (FrontierPoint(fine, 40.0, 1e-2, 1e-3), FrontierPoint(finer, 60.0, 1e-4, 1e-5))
+    assert SolverSettings(**choose_qualities(frontier, (1e-2, 1e-3), finest=fine)["reference"]) == finer

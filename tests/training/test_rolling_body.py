@@ -121,6 +121,26 @@ def test_later_motions_are_those_of_the_ode_alone(predictor: Predictor) -> None:
     assert np.abs(corrected.reduced(pushed) - alone.reduced(pushed)).max() > 1e-4
 
 
+@pytest.mark.slow
+def test_an_interrupted_fit_goes_on_after_its_last_stage(data: TrainingData, tmp_path: Path) -> None:
+    request, part, seen = TrainRequest("rolling", steps=5), tmp_path / "state.part", []
+    whole, _ = fit_rolling_body(data, request, silent)
+
+    def interrupt(line: str) -> None:
+        seen.append(line)
+        if len(seen) == 3:  # in the second stage
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fit_rolling_body(data, request, interrupt, part)
+    lines: list[str] = []
+    resumed, _ = fit_rolling_body(data, replace(request, resume=True), lines.append, part)
+    assert lines[0].endswith("with stage 2")
+    assert all(np.array_equal(resumed[name], whole[name]) for name in whole)
+    with pytest.raises(InputError, match="state of another training"):
+        fit_rolling_body(data, replace(request, resume=True, seed=1), silent, part)
+
+
 def test_pushes_are_known_by_how_they_accelerate(data: TrainingData) -> None:
     schema, theta = data.schema, np.array([[0.3, 0.5, -0.2]])
     mass, force, elevation = (p.denormalise(float(u)) for p, u in zip(schema.learned, theta[0], strict=True))

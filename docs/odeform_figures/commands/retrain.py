@@ -104,7 +104,7 @@ def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command
     from odeform.models.modal.training.fit import with_measured_qualities
     from odeform.models.registry import load_model
     from odeform.models.training.continuation import refitted
-    from odeform.training.train import write_scored
+    from odeform.training.train import scored
 
     known = {**recorded.provenance, what: {"command": command, "versions": {"odeform": version("odeform")}}}
     checkpoint, dataset = replace(recorded, provenance=known), open_dataset(name.split("/")[0])
@@ -112,7 +112,7 @@ def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command
         write_checkpoint(out, refitted(checkpoint, dataset))
     else:
         # other steps make other errors
-        write_scored(with_measured_qualities(load_model(checkpoint), dataset), out, dataset)
+        write_checkpoint(out, scored(with_measured_qualities(load_model(checkpoint), dataset), dataset))
 
 
 def _scores(scores: dict[str, Any] | None) -> dict[str, float]:

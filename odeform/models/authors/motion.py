@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
-from odeform.motion.base import Motion, SolveStats
+from odeform.motion.base import Motion, SolveStats, checked_times
 from odeform.schema import Parameters, Schema
 from odeform.types import Frames, Geometry, Matrices, Points, Pose, Times
 
@@ -79,7 +79,7 @@ class FrameMotion(Motion):
         return np.sqrt(np.maximum(np.einsum("tk,kl,tl->t", weights, self._gram, weights), 0.0))
 
     def _clamped(self, t: float | Times) -> Times:
-        times = self.schema.window.soft_clamped(np.atleast_1d(np.asarray(t, dtype=float)))
+        times = self.schema.window.soft_clamped(checked_times(t))
         return np.clip(times, self._times[0], self._times[-1])
 
     def _local(self, times: Times) -> Frames:

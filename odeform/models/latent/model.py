@@ -35,6 +35,7 @@ class LatentModel(Model):
 
     model = "latent"
     resumable = True
+    descends = True
     ablations: ClassVar[Mapping[str, str]] = {
         "ode": "states stay as they start",
         "clock": "decoders are not conditioned on time",

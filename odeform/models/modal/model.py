@@ -49,6 +49,7 @@ class ModalModel(Model):
     """The motion of one elastic body on the floor that a projectile pushes."""
 
     model = "modal"
+    accurate = QUALITIES["reference"]
     rescales_input = False
     fallback = SolverSettings("limex", step=2.5e-3, dtype="float64")
     finer = MappingProxyType({EXACT: 0.0})

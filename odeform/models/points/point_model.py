@@ -33,6 +33,8 @@ class PointModel(Predictor):
     A subclass sets `model`, its `network`, which `odeform train` trains, and the `trajectory` that evaluates it.
     """
 
+    resumable = True
+    descends = True
     network: PointNet
     trajectory: type[MomentaryPoints | FramedPoints]
 

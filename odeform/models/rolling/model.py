@@ -59,6 +59,7 @@ class RollingModel(Model):
         "corners": "the body rolls over a smooth floor on a smooth rim",
         "correction": "what is left unexplained is not regressed",
     }
+    resumable = True
 
     @classmethod
     def train(cls, run: "Run") -> Checkpoint:

@@ -101,12 +101,19 @@ def choose_qualities(
     frontier: Sequence[FrontierPoint],
     model_errors_mm: tuple[float, float],
     shares: Mapping[str, tuple[float, float]] = SHARES,
+    finest: SolverSettings | None = None,
 ) -> dict[str, Any]:
-    """Settings of each quality: the cheapest within its shares of the model's errors; `reference` is the finest."""
+    """Settings of each quality: the cheapest within its shares of the model's errors; `reference` is the finest point.
+
+    Where no settings have an error, the cheapest is the only point: `reference` is then `finest`, if it is given. So it
+    is where nothing moves yet after a few steps of training, and where a regression alone makes the motion.
+    """
     chosen = {
         name: cheapest_within_error(frontier, *np.multiply(share, model_errors_mm)) for name, share in shares.items()
     }
-    return {name: point.quality.to_json() for name, point in {**chosen, "reference": frontier[-1]}.items()}
+    last = frontier[-1]
+    reference = finest if finest is not None and last.solver_error_mm == 0.0 else last.quality
+    return {**{name: point.quality.to_json() for name, point in chosen.items()}, "reference": reference.to_json()}
 
 
 def with_qualities(
@@ -117,9 +124,11 @@ def with_qualities(
     shares: Mapping[str, tuple[float, float]] = SHARES,
 ) -> Checkpoint:
     """The checkpoint of a trained model with its frontier, as `measure_frontier` finds it, and the qualities that are
-    chosen on it by `choose_qualities`."""
+    chosen on it by `choose_qualities`; the last of the candidates is the finest."""
     model = load_model(checkpoint)
     assert isinstance(model, ReducedModel)
-    frontier, errors_mm = measure_frontier(model, known, reference, candidates)
-    settings = {"qualities": choose_qualities(frontier, errors_mm, shares), "frontier": [p.to_json() for p in frontier]}
+    tried = _candidates(float(known.times[1] - known.times[0])) if candidates is None else candidates
+    frontier, errors_mm = measure_frontier(model, known, reference, tried)
+    qualities = choose_qualities(frontier, errors_mm, shares, tried[-1])
+    settings = {"qualities": qualities, "frontier": [point.to_json() for point in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})

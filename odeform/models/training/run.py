@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from odeform.models.training.body import body_arrays
 from odeform.models.training.request import TrainRequest
 from odeform.types import Arrays
 
+if TYPE_CHECKING:
+    from odeform.models.training.loss import Loss
+
 __all__ = ["Run", "train_model"]
 
 NARROW = 1e-3  # of a scene's range, by which that of an object is wider than its data
@@ -30,9 +33,22 @@ class Run:
     dataset: Dataset
     request: TrainRequest
     body: Arrays
-    part: Path
-    """The file of an interrupted training."""
+    part: Path | None
+    """The file that keeps the state of the training; None: it cannot be continued."""
     report: Callable[[str], None]
+    loss: "Loss | None" = None
+    """What a descent minimises, in place of the model's own."""
+    device: str | None = None
+    """Where a descent runs, as PyTorch names it; None: on a GPU if there is one."""
+
+    def __post_init__(self) -> None:
+        model = model_class(self.request.model)
+        for name, value in (("loss", self.loss), ("device", self.device)):
+            if value is not None and not model.descends:
+                raise InputError(
+                    f"{name}: {self.request.model} is fitted by least squares on the processor, not by descent; "
+                    f"expected no {name}"
+                )
 
     def reduced_data(self, patterns: bool = False) -> TrainingData:
         """The data set in reduced coordinates, with the frames that the request asks for; reports its size."""

@@ -19,10 +19,12 @@ from odeform.models.points.arithmetic import Net, Numpy
 from odeform.models.points.point_model import PointModel
 from odeform.models.points.point_network import Trial, sum_of
 from odeform.models.points.point_trajectories import point_batch
-from odeform.models.points.training.fit import Budget, fit_points, initial_weights
+from odeform.models.points.training.fit import fit_points, initial_weights
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.torch_arithmetic import Torch
 from odeform.models.registry import load, models_of
+from odeform.models.training.request import TrainRequest
+from odeform.models.training.run import Run
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 SETTING = {"mass": 0.6, "force": 110.0, "azimuth": 0.7}
@@ -192,11 +194,14 @@ def test_steps_of_the_ode_tell_their_error(models: dict[str, PointModel]) -> Non
     assert models["rnn"].solve(None, SETTING).stats.solver_error_mm is None
 
 
-def test_the_same_seed_gives_the_same_weights(data: PointData, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_seed_gives_the_same_weights(
+    data: PointData, dataset: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
     network = POINT_MODELS["direct"].network
     monkeypatch.setattr(network, "trials", (Trial(3e-3, 8),), raising=False)
     monkeypatch.setattr(network, "work", 64, raising=False)
-    one, two = (fit_points("direct", network, data, Budget(0.0, 6), 3, lambda _: None) for _ in range(2))
+    run = Run(dataset, TrainRequest("direct", seed=3, steps=6), {}, None, lambda _: None)
+    one, two = (fit_points(network, data, run) for _ in range(2))
     assert all(np.array_equal(one.arrays[name], two.arrays[name]) for name in one.arrays)
 
 

@@ -38,7 +38,7 @@ def _trained_network(run: Run, data: TrainingData) -> Checkpoint:
     used = config.TrainConfig(request.minutes, request.steps, seed=request.seed, without=request.without)
     if "random-features" in request.without:
         used = replace(used, random_features=0)
-    val = train_network(net, data, used, run.report, run.part, request.resume)
+    val = train_network(net, data, used, run.report, run.part, request.resume, run.loss, run.device)
     remove_ablated(net)
     settings = {"network": asdict(net.config), "qualities": {}, "training": asdict(used), "val": val}
     return run.reduced_checkpoint(data, {PREFIX + k: v for k, v in network_weights(net).items()}, settings)

@@ -10,14 +10,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import torch
-
 from odeform.dataset.training_data import TrainingData
 from odeform.models.latent.network import ODeformNet
 from odeform.models.latent.training.config import TrainConfig
 from odeform.models.latent.training.random_features import affordable, widen
 from odeform.models.latent.training.trainer import Trainer
 from odeform.models.training.descent import small_batches
+from odeform.models.training.loss import Loss, torch_device
 from odeform.types import Arrays
 
 __all__ = ["network_weights", "train_network"]
@@ -59,20 +58,22 @@ def train_network(
     report: Callable[[str], None] = print,
     part: Path | None = None,
     resume: bool = False,
+    loss: Loss | None = None,
+    device: str | None = None,
 ) -> dict[str, float]:
-    """Train in place, on a GPU if there is one; return validation errors in mm, steps, batch size and seconds.
+    """Train in place; return validation errors in mm, steps, batch size and seconds.
 
-    The state is written to `part` at every report and on interruption; `resume` continues from there.
+    A `loss` shapes the states; readouts are solved for by least squares all the same. The `device` is a GPU if there is
+    one, unless it is named. The state is written to `part` at every report and on interruption; `resume` continues from
+    there.
     """
     begin = time.process_time()
     with small_batches():
-        trainer = Trainer(net, data, config, torch.device("cuda" if torch.cuda.is_available() else "cpu"))
+        trainer = Trainer(net, data, config, torch_device(device), loss)
         if resume and part is not None:
             trainer.restore(part)
             begin -= trainer.elapsed
             report(f"continues after {trainer.elapsed / 60.0:.1f} min, step {trainer.done}")
-        elif part is not None and part.exists():
-            report(f"starts over and overwrites {part} of an interrupted training (--resume would continue it)")
         _descend(trainer, config, report, part)
         if part is not None:
             trainer.save(part)

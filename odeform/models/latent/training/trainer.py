@@ -23,6 +23,7 @@ from odeform.models.latent.training.readout import NormalEquations
 from odeform.models.latent.training.start import training_shape
 from odeform.models.latent.training.tree import fill, strip
 from odeform.models.training.descent import cosine_decay
+from odeform.models.training.loss import Loss
 from odeform.motion.reduced_space import POSE
 
 __all__ = ["CHUNK", "Trainer"]
@@ -41,8 +42,10 @@ def _soap(weights: list[nn.Parameter], rate: float) -> torch.optim.Optimizer:
 class Trainer:
     """A network in training. Readouts of decoders are solved for in each step, everything else is descended in."""
 
-    def __init__(self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device) -> None:
-        self.net, self.config, self.device = net.to(device), config, device
+    def __init__(
+        self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device, loss: Loss | None = None
+    ) -> None:
+        self.net, self.config, self.device, self.own_loss = net.to(device), config, device, loss
         self.metric = Metric(net.gains, data.space.gyration_radius)
         gains = net.gains.cpu().double().numpy()
         # frames first, as roll-outs have them
@@ -109,7 +112,10 @@ class Trainer:
             readout.add(features.detach()[part], truth[part][..., out], weights[part])
             decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
             predicted.append(decoder.readout(features))
-        return balanced(*self.metric(torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:])[-len(self.outputs) :])
+        compared = torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:]
+        if self.own_loss is not None:
+            return self.own_loss(*(1e-3 * self.metric.scale * y for y in compared[:2]), compared[2])
+        return balanced(*self.metric(*compared)[-len(self.outputs) :])
 
     def advance(self, share: float) -> None:
         """One step of descent, at this share of the training."""

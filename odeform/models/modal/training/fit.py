@@ -152,15 +152,11 @@ def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpoint, float]:
 def _with_qualities(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
     """With solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
 
-    Each body has its own: what a solver error does to a motion depends on it. Where the correction alone makes the
-    motion, none has an error, and the finest is that of all bodies.
+    Each body has its own: what a solver error does to a motion depends on it.
     """
     known = Validation(theta, val.times, val.reduced, np.ones(val.reduced.shape[:2], dtype=bool))
     candidates = [SolverSettings("limex", tolerance=tolerance, dtype="float64") for tolerance in TOLERANCES]
-    finest = QUALITIES["reference"]
-    chosen = with_qualities(checkpoint, known, EXACT, [*candidates, finest], SOLVER_SHARES)
-    qualities = {**chosen.config["qualities"], "reference": finest.to_json()}
-    return replace(chosen, config={**chosen.config, "qualities": qualities})
+    return with_qualities(checkpoint, known, EXACT, [*candidates, QUALITIES["reference"]], SOLVER_SHARES)
 
 
 def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:

@@ -19,11 +19,14 @@ SHARED = "all objects"
 class SavedLaws:
     """Laws by the name of their object, in a file that is written again whenever one is added."""
 
-    def __init__(self, path: Path, dataset: Dataset, seed: int, resume: bool = False) -> None:
-        """With `resume`, those that the file has. `InputError` if it is damaged or of another training."""
+    def __init__(self, path: Path | None, dataset: Dataset, seed: int, resume: bool = False) -> None:
+        """With `resume`, those that the file has; without a `path`, none are kept.
+
+        `InputError` if it is damaged or of another training.
+        """
         self.path = path
         self._training = {"data": _digest(dataset), "window_s": dataset.schema.window.stop, "seed": seed}
-        self._laws = self._read() if resume else {}
+        self._laws = {} if path is None or not resume else self._read(path)
 
     def get(self, name: str) -> MechanicalLaw | None:
         """None for a law that is not finished."""
@@ -32,27 +35,27 @@ class SavedLaws:
     def add(self, name: str, law: MechanicalLaw) -> None:
         """Keep a finished law."""
         self._laws[name] = law
+        if self.path is None:
+            return
         laws = {known: asdict(value) for known, value in self._laws.items()}
         atomic_write(self.path, json.dumps({"training": self._training, "laws": laws}, indent=1).encode())
 
-    def _read(self) -> dict[str, MechanicalLaw]:
+    def _read(self, path: Path) -> dict[str, MechanicalLaw]:
         try:
-            data = self.path.read_bytes()
+            data = path.read_bytes()
         except OSError as error:
-            raise InputError(f"--resume: {self.path}: {error.strerror}; expected an interrupted training") from None
+            raise InputError(f"--resume: {path}: {error.strerror}; expected an interrupted training") from None
         try:
-            known = parse_json(data, str(self.path))
+            known = parse_json(data, str(path))
             training = known["training"]
             laws = {
                 name: MechanicalLaw(**{key: float(value) for key, value in values.items()})
                 for name, values in known["laws"].items()
             }
         except (KeyError, TypeError, AttributeError, ValueError) as error:
-            raise InputError(f"--resume: {self.path}: not a state of this training: {error}") from None
+            raise InputError(f"--resume: {path}: not a state of this training: {error}") from None
         if training != self._training:
-            raise InputError(
-                f"--resume: {self.path}: state of another training: expected {self._training}, got {training}"
-            )
+            raise InputError(f"--resume: {path}: state of another training: expected {self._training}, got {training}")
         return laws
 
 

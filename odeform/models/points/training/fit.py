@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -24,6 +25,8 @@ from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.samplers import SAMPLERS
 from odeform.models.points.training.torch_arithmetic import Torch
 from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.loss import Loss, torch_device
+from odeform.models.training.part import read_part, write_part
 from odeform.models.training.run import Run
 from odeform.types import Arrays
 
@@ -63,8 +66,10 @@ def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dic
 class _Learner:
     """One training of one network."""
 
-    def __init__(self, network: PointNet, data: PointData, trial: Trial, seed: int, device: torch.device) -> None:
-        self.network, self.trial, self.scale_mm = network, trial, 1e3 * data.frame.scale
+    def __init__(
+        self, network: PointNet, data: PointData, trial: Trial, seed: int, device: torch.device, loss: Loss | None
+    ) -> None:
+        self.network, self.trial, self.scale_mm, self.own_loss = network, trial, 1e3 * data.frame.scale, loss
         sampler = SAMPLERS[network.sampling]
         self.train_split, self.val_split = (sampler(network, data, split, device) for split in ("train", "val"))
         shapes = list(layer_shapes(network.sizes(data.theta["train"].shape[1], trial.width)))
@@ -74,7 +79,7 @@ class _Learner:
         self.generator = torch.Generator().manual_seed(seed + 1)
         self.watched = self._draw_watched()
         self.best = (math.inf, self._snapshot())
-        self.done = 0
+        self.done, self.elapsed = 0, 0.0
 
     def _snapshot(self) -> Arrays:
         return {name: weight.detach().cpu().numpy().copy() for name, weight in self.weights.items()}
@@ -91,6 +96,9 @@ class _Learner:
         batch, truth, centre = train.batch(sample)
         weights = train.weights(sample)
         parts = self.network.predict(self.net, batch)
+        if self.own_loss is not None:
+            moved = (1e-3 * self.scale_mm * y for y in (sum_of(parts), truth))
+            return self.own_loss(*moved, weights.expand_as(truth)[..., 0])
         # of several parts the first is the motion of the whole body: each has a target of its own
         targets = [truth] if len(parts) == 1 else [centre, truth - centre]
         sizes = [1.0] if len(parts) == 1 else [1.0, train.finer]
@@ -123,36 +131,76 @@ class _Learner:
             self.best = (error, self._snapshot())
         return error
 
-    def train(self, budget: Budget, report: Callable[[str], None]) -> None:
-        begin, validated, share, validations = time.process_time(), 0, 0.0, 0
+    def train(self, budget: Budget, report: Callable[[str], None], keep: Callable[[dict[str, Any]], None]) -> None:
+        """Take steps until the budget is spent; hand the state to `keep` after each validation."""
+        begin, validated = time.process_time() - self.elapsed, self.done
+        share = self._spent(budget)
+        validations = int(share * VALIDATIONS)
         while share < 1.0:
             loss = self.advance(share)
-            spent = time.process_time() - begin
-            share = self.done / budget.steps if budget.steps is not None else spent / budget.seconds
+            self.elapsed = time.process_time() - begin
+            share = self._spent(budget)
             if share >= 1.0 or (share * VALIDATIONS >= validations + 1 and self.done >= validated + APART):
                 validations, validated = int(share * VALIDATIONS), self.done
                 error = self.validate()
                 report(f"{100 * share:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
+                keep(self.state())
+
+    def _spent(self, budget: Budget) -> float:
+        return self.done / budget.steps if budget.steps is not None else self.elapsed / budget.seconds
+
+    def state(self) -> dict[str, Any]:
+        """All that `restore` needs to go on bit-exactly."""
+        best = {name: torch.from_numpy(value) for name, value in self.best[1].items()}
+        weights = {name: weight.detach() for name, weight in self.weights.items()}
+        state = {"weights": weights, "optimiser": self.optimiser.state_dict(), "best": best, "error": self.best[0]}
+        return {**state, "generator": self.generator.get_state(), "done": self.done, "elapsed": self.elapsed}
+
+    @torch.no_grad()
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `state`."""
+        for name, weight in self.weights.items():
+            weight.copy_(state["weights"][name])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.generator.set_state(state["generator"])
+        self.best = state["error"], {name: value.numpy() for name, value in state["best"].items()}
+        self.done, self.elapsed = state["done"], state["elapsed"]
 
 
-def fit_points(
-    model: str, network: PointNet, data: PointData, budget: Budget, seed: int, report: Callable[[str], None]
-) -> Checkpoint:
-    """Choose among the trials, train, and return the checkpoint, without the body that viewers show."""
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    whole = 1.0 / (1.0 + SHARE * len(network.trials))
-    trials, begin = [], time.process_time()
+def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
+    """Choose among the trials, train, and return the checkpoint, without the body that viewers show.
+
+    The state is kept in `run.part` after each validation; a resumed training continues from there bit-exactly.
+    """
+    request, device = run.request, torch_device(run.device)
+    budget, whole = Budget(60.0 * request.minutes, request.steps), 1.0 / (1.0 + SHARE * len(network.trials))
+    sizes = [asdict(trial) for trial in network.trials]
+    training = {"model": request.model, "data": data.identity, "given": data.given, "seed": request.seed, "of": sizes}
+    known: dict[str, Any] = {"trials": [], "seconds": 0.0, "learner": {}}
+    if request.resume and run.part is not None:
+        known = read_part(run.part, training)
+        run.report(f"continues after {known['seconds'] / 60.0:.1f} min, with trial {len(known['trials']) + 1}")
+    trials, begin = known["trials"], time.process_time() - known["seconds"]
+
+    def keep(learner: dict[str, Any]) -> None:
+        if run.part is not None:
+            state = {"trials": trials, "seconds": time.process_time() - begin, "learner": learner}
+            write_part(run.part, training, state)
 
     def learn(trial: Trial, budget: Budget, title: str) -> _Learner:
-        learner = _Learner(network, data, trial, seed, device)
-        learner.train(budget, lambda line: report(f"{title}: {line}"))
+        learner = _Learner(network, data, trial, request.seed, device, run.loss)
+        if known["learner"]:
+            learner.restore(known["learner"])
+            known["learner"] = {}
+        learner.train(budget, lambda line: run.report(f"{title}: {line}"), keep)
         return learner
 
     with small_batches():
-        for trial in network.trials:
+        for trial in network.trials[len(trials) :]:
             title = f"trial of rate {trial.rate:g}, width {trial.width}"
             learner = learn(trial, budget.part(SHARE * whole), title)
             trials.append({**asdict(trial), "steps": learner.done, "val": learner.best[0]})
+            keep({})
         best = network.trials[int(np.argmin([trial["val"] for trial in trials]))]
         learner = learn(best, budget.part(whole), f"rate {best.rate:g}, width {best.width}")
     error, weights = learner.best
@@ -162,7 +210,7 @@ def fit_points(
     if network.sampling != "between":
         # networks of the time, or of the last frame, continue beyond the window
         schema = replace(schema, window=replace(schema.window, reach=AHEAD))
-    return point_checkpoint(model, schema, data.frame, data.mean, weights, config)
+    return point_checkpoint(request.model, schema, data.frame, data.mean, weights, config)
 
 
 def train_points(model: type[PointModel], run: Run) -> Checkpoint:
@@ -177,6 +225,5 @@ def train_points(model: type[PointModel], run: Run) -> Checkpoint:
     subsampling = FrameSubsampling(request.window, every, request.stagger and not between)
     data = prepare_points(run.dataset, subsampling, given)
     run.report(f"{request.model} on {len(data.theta['train'])} sequences of {data.moved['train'].shape[1]} frames")
-    budget = Budget(60.0 * request.minutes, request.steps)
-    checkpoint = fit_points(request.model, model.network, data, budget, request.seed, run.report)
+    checkpoint = fit_points(model.network, data, run)
     return replace(checkpoint, arrays=run.with_body(checkpoint.arrays, data.theta["train"]))

@@ -6,6 +6,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
+from odeform.dataset.training_data import inputs_identity
 from odeform.errors import InputError
 from odeform.motion.point_motion import MeanMotion, PointFrame
 from odeform.motion.reduced_space import to_canonical
@@ -34,6 +35,8 @@ class PointData:
     """(S, T, N, 3) float32 displacements from the mean motion by split, in units of the frame's scale."""
     observed: dict[str, Bools]
     """(S, T) by split: True where the frame is of the data, False where a spline fills it in."""
+    identity: str
+    """SHA-256 of all inputs: the sequences, the frames, those that are given."""
     given: int = 1
     """Frames from one observed frame to the next, for models that interpolate between them; 1 for all others."""
 
@@ -67,7 +70,8 @@ def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None
     window = Window(float(times[0]), float(times[-1]), 1.0 / float(times[1] - times[0]) / given)
     schema = replace(dataset.schema, window=window, needs_observations=given > 1)
     mean = MeanMotion(times, shifts)
-    return PointData(schema, frame, mean, frame.inputs(rest), first.weights, theta, moved, observed, given)
+    identity = inputs_identity(dataset, subsampling, count, given)
+    return PointData(schema, frame, mean, frame.inputs(rest), first.weights, theta, moved, observed, identity, given)
 
 
 def _displacements(

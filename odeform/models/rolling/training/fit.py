@@ -4,9 +4,11 @@ wrong it is beyond the window."""
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
@@ -25,6 +27,7 @@ from odeform.models.rolling.start import PUSHES, push_inputs, start_arrays
 from odeform.models.rolling.training.contact_fit import ROBUST, STEP, Motions, fit_law, law_error_mm, roll_out
 from odeform.models.rolling.training.readout_fit import ReadoutRows, fit_readout
 from odeform.models.training.continuation import HELD_OUT
+from odeform.models.training.part import read_part, write_part
 from odeform.models.training.pruning import LARGE
 from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.request import TrainRequest
@@ -84,7 +87,7 @@ RATES = 0.3  # s: errors of rates count as they are after this time
 def train_rolling(run: Run) -> Checkpoint:
     """Train on the data of `run`: contact parameters, readout, residual and solver settings, in this order."""
     data = run.reduced_data(patterns=True)
-    checkpoint = run.reduced_checkpoint(data, *fit_rolling_body(data, run.request, run.report))
+    checkpoint = run.reduced_checkpoint(data, *fit_rolling_body(data, run.request, run.report, run.part))
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
     if "correction" not in run.request.without:
@@ -98,14 +101,15 @@ def train_rolling(run: Run) -> Checkpoint:
 
 
 def fit_rolling_body(
-    data: TrainingData, request: TrainRequest, report: Callable[[str], None]
+    data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path | None = None
 ) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and settings of the checkpoint, without the correction.
+
+    Contact parameters are kept in `part` after each stage; a resumed training continues after the last one.
 
     `InputError` for data of a body that is not round, or neither rolls about one horizontal axis nor moves only up and
     down, and where frames of a push are left out.
     """
-    begin = time.process_time()
     axis, radius = _checked(data)
     # what does not turn stands on one corner
     without = request.without if data.space.rolling else (*request.without, "corners")
@@ -122,10 +126,22 @@ def fit_rolling_body(
     stages = FALLING if data.space.rolling is None else PUSHED
     counts = _steps(stages, request.steps)
     law = _without(first_law(len(materials), request.seed), without)
-    for stage, steps in zip(stages, counts, strict=True):
+    training = {"data": data.identity, "seed": request.seed, "without": list(without), "steps": counts}
+    known: dict[str, Any] = {"stages": 0, "seconds": 0.0}
+    if request.resume and part is not None:
+        known = read_part(part, training)
+        law = law.like(known["numbers"].numpy())
+        report(f"continues after {known['seconds'] / 60.0:.1f} min, with stage {known['stages'] + 1}")
+    begin = time.process_time() - known["seconds"]
+    for index, (stage, steps) in enumerate(zip(stages, counts, strict=True)):
         motions = {split: replace(of, step=stage.step) for split, of in motions.items()}
+        if index < known["stages"]:
+            continue
         some, free = motions["train"].landings(stage.frames), _free(law, without, stage.linear)
         law = fit_law(law, free, support, radius, some, steps, report, go_on, stage.robust, stage.damping)
+        if part is not None:
+            state = {"stages": index + 1, "numbers": torch.from_numpy(law.flat())}
+            write_part(part, training, {**state, "seconds": time.process_time() - begin})
     error = law_error_mm(law, support, radius, motions["val"])
     report(f"contact law alone: pose RMSE {error:.2f} mm (val)")
     share = min(sum(counts) / sum(stage.steps for stage in stages), 1.0)

@@ -1,0 +1,128 @@
+"""A base for families whose vector field is a module of PyTorch: what is left to write is the module."""
+
+import copy
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import torch
+from torch import nn
+
+from odeform.checkpoint import Checkpoint
+from odeform.models.integrated_model import IntegratedModel
+from odeform.models.latent.inference import Decoder, Field
+from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.solver.integrate import SolverSettings
+from odeform.types import Arrays, Floats
+
+if TYPE_CHECKING:
+    from odeform.models.training.run import Run
+
+__all__ = ["NeuralModel", "network_arrays"]
+
+PREFIX = "net."
+
+
+class NeuralModel(IntegratedModel):
+    """A model of reduced coordinates dz/dt = f(t, z, theta) whose f is a `torch.nn.Module`.
+
+    A subclass sets `model`, its name, and `network`, a module that is constructed as `network(P, C, **settings)` for P
+    parameters and C coordinates: shift, rotation vector, and coefficients of the deformation's modes (of a body that
+    rolls: of patterns that do not turn with it). It has three methods; (B,) motions are computed together, and theta
+    (B, P) is in [-1, 1]:
+
+    - `initial_state(theta)` -> (B, S), the state at time 0;
+    - `vector_field(t, z, theta)` -> (B, S), the slope per second of z (B, S) at t seconds, a number;
+    - `readout(t, z, theta)` -> (B, C), the coordinates in units of their root mean square, at t (B,) seconds. Their
+      value at time 0 is subtracted, so that a body starts at rest.
+
+    It is trained by Adam on whole motions, from a quarter of their length on, and keeps the weights that are best on
+    validation (`odeform.models.training.neural_fit`).
+
+    Examples:
+        >>> import odeform, torch
+        >>> class Network(torch.nn.Module):
+        ...     def __init__(self, parameters, coordinates):
+        ...         super().__init__()
+        ...         self.slope = torch.nn.Linear(coordinates + parameters, coordinates)
+        ...
+        ...     def initial_state(self, theta):
+        ...         return theta.new_zeros(len(theta), self.slope.out_features)
+        ...
+        ...     def vector_field(self, t, z, theta):
+        ...         return self.slope(torch.cat([z, theta], dim=1))
+        ...
+        ...     def readout(self, t, z, theta):
+        ...         return z
+        >>> class Linear(odeform.NeuralModel):
+        ...     model, network = "linear", Network
+        >>> odeform.register_model("linear", Linear)
+    """
+
+    network: type[nn.Module]
+    settings: ClassVar[Mapping[str, Any]] = {}
+    """Further arguments of `network`, plain values, which checkpoints store."""
+    rate: ClassVar[float] = 2e-3
+    """Learning rate, which decays to 0 along a cosine."""
+    batch: ClassVar[int] = 32
+    """Motions in a step of descent."""
+    resumable = True
+    descends = True
+
+    @classmethod
+    def train(cls, run: "Run") -> Checkpoint:
+        from odeform.models.training.neural_fit import train_neural
+
+        return train_neural(cls, run)
+
+    def _read(self, checkpoint: Checkpoint) -> None:
+        super()._read(checkpoint)
+        module = self.network(len(self.schema.learned), self.space.coordinates, **checkpoint.config["network"])
+        arrays = {k.removeprefix(PREFIX): v for k, v in checkpoint.arrays.items() if k.startswith(PREFIX)}
+        try:
+            module.load_state_dict({name: torch.tensor(value) for name, value in arrays.items()})
+        except RuntimeError as error:
+            raise ValueError(f"weights of {self.network.__name__}: {error}") from None
+        module.eval().requires_grad_(False)
+        self._scale = checkpoint.arrays["scale"].astype(float)
+        self._modules = {np.float32: module, np.float64: copy.deepcopy(module).double()}
+
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
+        """The initial value problem for theta (P,) in [-1, 1]: field, state (S,) at time 0, and readout."""
+        module: Any = self._modules[dtype]
+        known = torch.tensor(theta[None].astype(dtype))
+
+        def field(time: float, state: Floats) -> Floats:
+            with torch.inference_mode():
+                return module.vector_field(time, torch.from_numpy(state)[None], known)[0].numpy()
+
+        def decode(times: Floats, states: Floats) -> Floats:
+            at, rows = torch.tensor(times.astype(dtype)), torch.from_numpy(np.ascontiguousarray(states, dtype=dtype))
+            with torch.inference_mode():
+                return module.readout(at, rows, known.expand(len(rows), -1)).numpy().astype(float) * self._scale
+
+        with torch.inference_mode():
+            return field, module.initial_state(known)[0].numpy(), decode
+
+    def trajectory(
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
+    ) -> LatentTrajectory:
+        assert settings is not None
+        return self.integrate(theta, evaluated, settings, until)
+
+    def integrate(
+        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float
+    ) -> LatentTrajectory:
+        field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
+        fallback = SolverSettings("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
+
+        def precise() -> tuple[Field, Floats]:
+            return self.problem(theta, evaluated, np.float64)[:2]
+
+        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius, precise)
+
+
+def network_arrays(module: nn.Module) -> Arrays:
+    """The weights of a module, as a checkpoint stores them."""
+    return {PREFIX + name: value.detach().cpu().numpy() for name, value in module.state_dict().items()}
