@@ -9,7 +9,7 @@ import torch
 from torch import nn
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.integrated_model import IntegratedModel
+from odeform.models.integrated_model import Model
 from odeform.models.latent.inference import Decoder, Field
 from odeform.models.latent.latent_trajectory import LatentTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -24,7 +24,7 @@ __all__ = ["NeuralModel", "network_arrays"]
 PREFIX = "net."
 
 
-class NeuralModel(IntegratedModel):
+class NeuralModel(Model):
     """A model of reduced coordinates dz/dt = f(t, z, theta) whose f is a `torch.nn.Module`.
 
     A subclass sets `model`, its name, and `network`, a module that is constructed as `network(P, C, **settings)` for P
