@@ -9,11 +9,9 @@ import torch
 from torch import nn
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.integrated_model import Model
-from odeform.models.latent.inference import Decoder, Field
-from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.model import Model
+from odeform.models.solved import Problem
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
 
 if TYPE_CHECKING:
@@ -88,8 +86,7 @@ class NeuralModel(Model):
         self._scale = checkpoint.arrays["scale"].astype(float)
         self._modules = {np.float32: module, np.float64: copy.deepcopy(module).double()}
 
-    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type) -> tuple[Field, Floats, Decoder]:
-        """The initial value problem for theta (P,) in [-1, 1]: field, state (S,) at time 0, and readout."""
+    def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         module: Any = self._modules[dtype]
         known = torch.tensor(theta[None].astype(dtype))
 
@@ -97,30 +94,15 @@ class NeuralModel(Model):
             with torch.inference_mode():
                 return module.vector_field(time, torch.from_numpy(state)[None], known)[0].numpy()
 
-        def decode(times: Floats, states: Floats) -> Floats:
+        def readout(times: Floats, states: Floats) -> Floats:
             at, rows = torch.tensor(times.astype(dtype)), torch.from_numpy(np.ascontiguousarray(states, dtype=dtype))
             with torch.inference_mode():
                 return module.readout(at, rows, known.expand(len(rows), -1)).numpy().astype(float) * self._scale
 
         with torch.inference_mode():
-            return field, module.initial_state(known)[0].numpy(), decode
-
-    def trajectory(
-        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
-    ) -> LatentTrajectory:
-        assert settings is not None
-        return self.integrate(theta, evaluated, settings, until)
-
-    def integrate(
-        self, theta: Floats, evaluated: EvaluatedBasis, quality: SolverSettings, until: float
-    ) -> LatentTrajectory:
-        field, start, decode = self.problem(theta, evaluated, np.float32 if quality.dtype == "float32" else np.float64)
-        fallback = SolverSettings("rk4", step=1.0 / self.schema.window.rate, dtype=quality.dtype)
-
-        def precise() -> tuple[Field, Floats]:
-            return self.problem(theta, evaluated, np.float64)[:2]
-
-        return LatentTrajectory(field, decode, start, quality, fallback, until, self.space.gyration_radius, precise)
+            start = module.initial_state(known)[0].numpy()
+        origin = readout(np.zeros(1), start[None])
+        return Problem(field, start, lambda times, states: readout(times, states) - origin)
 
 
 def network_arrays(module: nn.Module) -> Arrays:

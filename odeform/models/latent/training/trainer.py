@@ -114,7 +114,8 @@ class Trainer:
             predicted.append(decoder.readout(features))
         compared = torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:]
         if self.own_loss is not None:
-            return self.own_loss(*(1e-3 * self.metric.scale * y for y in compared[:2]), compared[2])
+            guessed, known = (1e-3 * self.metric.scale * y for y in compared[:2])
+            return self.own_loss(guessed, known, compared[2])
         return balanced(*self.metric(*compared)[-len(self.outputs) :])
 
     def advance(self, share: float) -> None:

@@ -97,8 +97,8 @@ class _Learner:
         weights = train.weights(sample)
         parts = self.network.predict(self.net, batch)
         if self.own_loss is not None:
-            moved = (1e-3 * self.scale_mm * y for y in (sum_of(parts), truth))
-            return self.own_loss(*moved, weights.expand_as(truth)[..., 0])
+            guessed, known = (1e-3 * self.scale_mm * y for y in (sum_of(parts), truth))
+            return self.own_loss(guessed, known, weights.expand_as(truth)[..., 0])
         # of several parts the first is the motion of the whole body: each has a target of its own
         targets = [truth] if len(parts) == 1 else [centre, truth - centre]
         sizes = [1.0] if len(parts) == 1 else [1.0, train.finer]
