@@ -127,9 +127,8 @@ class _Decoder:
         (first,) = np.frombuffer(head, self.header).tolist()
         if self.decompress is None:
             letters = -(-width // 3) * 4
-            if encoded and data[:letters].endswith(
-                b"=" * (-width % 3)
-            ):  # header and content are encoded one by one, else together
+            # header and content are encoded one by one, or else together
+            if encoded and data[:letters].endswith(b"=" * (-width % 3)):
                 return self._bytes(data[letters:], 0, first, encoded, name)
             if encoded:
                 return self._bytes(data, 0, width + first, encoded, name)[width:]

@@ -143,6 +143,9 @@ def test_fields_of_displacements_in_one_file(tmp_path: Path) -> None:
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {f"displacement{k}": CORNERS for k in (0, 1, 3)}))
     with pytest.raises(InputError, match=r"a.vtk: frame 2 is missing between displacement1 and displacement3"):
         imported(root)
+    (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {"displacement0": CORNERS}))
+    with pytest.raises(InputError, match=r"a: expected at least 2 frames, got 1"):
+        imported(root)
 
 
 @pytest.mark.parametrize("names", [("times", "vertices"), ("t", "positions"), ("time", "points")])

@@ -23,7 +23,7 @@ def even_step(
     first: float = 0.0,
     hint: str = "",
 ) -> float | None:
-    """The step between numbers that increase; None for uneven decimals, which have no gap that is evident.
+    """The step between numbers that increase; None for one number, and for uneven decimals without an evident gap.
 
     Args:
         numbers: (T,) from the first of them on.
@@ -38,6 +38,8 @@ def even_step(
         InputError: Numbers are missing, or are integers without a common step.
     """
     steps = np.diff(numbers)
+    if not len(steps):
+        return None
     often = Counter(float(f"{step:.9g}") for step in steps).most_common(1)[0]
     likely = often[0] if often[1] > 1 else float(steps.min())
     for step, error in ((likely, 0.0), (float(np.median(steps)), 0.5 * rounding)):
