@@ -52,3 +52,12 @@ def test_a_default_contact_is_in_the_open_and_faces_the_way_asked_for(ball: Mesh
 def test_unless_asked_otherwise_a_contact_faces_up_and_towards_the_viewer(ball: Mesh) -> None:
     contact = default_contact(ball)
     assert contact.normal @ np.array([-0.6, -0.35, 0.72]) > 0.95
+
+
+def test_up_along_a_surface_is_as_far_up_as_it_goes() -> None:
+    for normal in ([0.6, 0.0, 0.8], [0.0, -1.0, 0.0], [-0.36, 0.48, -0.8]):
+        up = contact_axes(np.array(normal))[2]
+        assert np.allclose(up, (np.array([0.0, 0.0, 1.0]) - normal[2] * np.array(normal)) / math.hypot(*normal[:2]))
+    # on top and below there is no such direction: it is x
+    assert np.allclose(contact_axes(np.array([0.0, 0.0, 1.0])), [[0, 0, -1], [0, -1, 0], [1, 0, 0]])
+    assert contact_axes(np.array([0.1, 0.0, -0.995]) / math.hypot(0.1, 0.995))[2][0] > 0.9

@@ -170,3 +170,11 @@ def test_bodies_that_roll_have_patterns_in_place_of_modes() -> None:
     np.testing.assert_allclose(space.with_patterns(whole), y, rtol=1e-5, atol=1e-6)
     assert plain.with_modes(whole) is whole
     assert plain.with_patterns(whole) is whole
+
+
+def test_the_radius_of_gyration_is_that_of_the_masses() -> None:
+    rest = Mesh(
+        np.array([[0.3, 0.0, 0.4], [0.0, 0.2, 0.0], [0.0, 0.0, 0.1], [0.1, 0.1, 0.0]]), np.zeros((0, 3), np.int32)
+    )
+    space = make_space(rest, np.ones((4, 3, 1)), np.array([0.5, 0.25, 0.25, 0.0]), np.zeros(3))
+    assert space.gyration_radius == pytest.approx(np.sqrt(0.5 * 0.25 + 0.25 * 0.04 + 0.25 * 0.01))
