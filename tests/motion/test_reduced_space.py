@@ -8,7 +8,7 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import prepare
 from odeform.geometry.rigid import rotation_from_vector, rotation_z
 from odeform.models.base import Predictor
-from odeform.motion.reduced_space import POSE, ReducedSpace, decompose, make_space, rotation_of, to_canonical
+from odeform.motion.reduced_space import POSE, ReducedSpace, decompose, fit_modes, make_space, rotation_of, to_canonical
 from odeform.types import Mesh, MotionSequence
 
 HEADING = 0.9
@@ -132,3 +132,12 @@ def test_nothing_grows_by_more_than_three_tenths_of_what_was_trained() -> None:
     assert np.linalg.norm(later[3, :3]) == pytest.approx(3.0 * 1.3 * 0.4)
     assert np.array_equal(later[:, 6:], bounded[:, 6:])
     assert ReducedSpace.from_parts(space.to_json(), space.arrays(), Mesh(points, faces)).largest == (0.4, 2e-3)
+
+
+def test_modes_of_few_frames_are_those_of_many() -> None:
+    """Where frames are fewer than coordinates, they are decomposed in place of the covariance: the same modes."""
+    rng = np.random.default_rng(0)
+    weights, few = rng.dirichlet(np.ones(20)), rng.normal(size=(15, 20, 3))
+    one, other = fit_modes([few[:5], few[5:]], weights, 4), fit_modes([few] * 5, weights, 4)
+    products = np.einsum("n,nik,nil->kl", weights, one, other)
+    np.testing.assert_allclose(np.abs(products), np.eye(4), atol=1e-9)
