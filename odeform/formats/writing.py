@@ -79,7 +79,7 @@ def write_motion(
         >>> odeform.write_motion(motion, np.array([0.0, 0.5]), "ball_{frame}.ply")
         >>> odeform.write_motion(motion, np.arange(0.0, 1.0, 0.02), "ball.glb")
     """
-    path, times = Path(out), checked_times(times)
+    path, times = Path(out), checked_times(np.asarray(times))
     files = motion_files(path, len(times), truth is not None)
     _require_finite(motion, times)
     writer = writers()[path.suffix.lower()]

@@ -140,6 +140,10 @@ def decompose(sequence: MotionSequence, anchor: Vector, azimuth: float) -> tuple
 def fit_modes(locals_: list[Float[np.ndarray, "_ points 3"]], weights: Perpoint, modes: int) -> Basis:
     """POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the weights."""
     root = np.sqrt(weights)[:, None]
+    if sum(map(len, locals_)) < 3 * len(weights):  # of many points in few frames, the frames tell the modes
+        snapshots = np.concatenate([(local * root).reshape(len(local), -1) for local in locals_])
+        vectors = np.linalg.svd(snapshots, full_matrices=False)[2]
+        return vectors[:modes].T.reshape(len(weights), 3, -1) / root[..., None]
     covariance = np.zeros((3 * len(weights), 3 * len(weights)))
     for local in locals_:
         snapshots = (local * root).reshape(len(local), -1)

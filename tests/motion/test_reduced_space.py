@@ -12,6 +12,7 @@ from odeform.motion.reduced_space import (
     POSE,
     ReducedSpace,
     decompose,
+    fit_modes,
     make_space,
     motion_rmse,
     rotation_of,
@@ -178,3 +179,12 @@ def test_the_radius_of_gyration_is_that_of_the_masses() -> None:
     )
     space = make_space(rest, np.ones((4, 3, 1)), np.array([0.5, 0.25, 0.25, 0.0]), np.zeros(3))
     assert space.gyration_radius == pytest.approx(np.sqrt(0.5 * 0.25 + 0.25 * 0.04 + 0.25 * 0.01))
+
+
+def test_modes_of_few_frames_are_those_of_many() -> None:
+    """Where frames are fewer than coordinates, they are decomposed in place of the covariance: the same modes."""
+    rng = np.random.default_rng(0)
+    weights, few = rng.dirichlet(np.ones(20)), rng.normal(size=(15, 20, 3))
+    one, other = fit_modes([few[:5], few[5:]], weights, 4), fit_modes([few] * 5, weights, 4)
+    products = np.einsum("n,nik,nil->kl", weights, one, other)
+    np.testing.assert_allclose(np.abs(products), np.eye(4), atol=1e-9)
