@@ -25,6 +25,7 @@ from odeform.models.training.loss import Loss
 from odeform.models.training.request import TrainRequest
 from odeform.models.training.run import Run, train_model
 from odeform.schema import OBJECT
+from odeform.simulation.scenes.registry import surroundings_of
 from odeform.types import Arrays
 
 __all__ = ["fit", "print_line", "scored", "train"]
@@ -106,6 +107,8 @@ def fit(
     begin = time.process_time()
     if names := request.objects or dataset.objects:
         dataset = dataset.of(*names)
+    around = surroundings_of(dataset.schema)  # older data sets do not say
+    dataset = replace(dataset, schema=replace(dataset.schema, surroundings=around))
     dataset = dataset if sequences is None else _first(dataset, sequences)
     trained = train_model(Run(dataset, request, body_arrays(dataset), part, report, loss, device))
     # the processor time of all sittings of a resumed training
