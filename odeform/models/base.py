@@ -10,10 +10,12 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint, arrays_of_object
 from odeform.errors import InputError
+from odeform.models.batch_parameters import parameter_sets
 from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
+from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.trust import Trust
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.scenes.registry import find_scene
@@ -23,7 +25,7 @@ from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
-__all__ = ["Predictor", "check_finite"]
+__all__ = ["Predictor", "check_finite", "solved"]
 
 DEEPER = 1.25  # times the depth below the floor of trained motions, where that is more than other bodies may have
 
@@ -112,6 +114,10 @@ class Predictor(ABC):
             # what a damaged file has in the place of a number or a shape may raise anything
             raise InputError(f"checkpoint of {checkpoint.model}: missing or wrong {error}") from None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Predictors are pickled as their checkpoints, without what they keep."""
+        return type(self), (self.checkpoint,)
+
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
         """Take what this model needs; KeyError or ValueError where it is missing or wrong."""
@@ -152,11 +158,49 @@ class Predictor(ABC):
             InputError: for a shape, parameter, quality or observation that this model cannot use.
         """
         self._check_observed(observed)
-        window = self.schema.window
-        end = float(window.soft_clamped(np.array(window.stop if until is None else until)))
+        end = self._end(until)
         complete = self.complete(parameters)
         shape = self.rest_of(complete) if geometry is None else geometry
-        return self._solve(shape, complete, self._settings(quality, complete), end, observed)
+        return solved(self, shape, complete, self._settings(quality, complete), end, observed)
+
+    def solve_batch(
+        self,
+        parameters: Mapping[str, Any],
+        quality: str | SolverSettings = "balanced",
+        until: float | None = None,
+        geometry: Geometry | None = None,
+    ) -> MotionBatch:
+        """The motions of `geometry` under B sets of parameters, each as `solve` has it.
+
+        Args:
+            parameters: by name, arrays (B,), or (B, 3) for a vector, in the units of `schema`. A number, vector or name
+                is shared by all; defaults for the others.
+            quality, until, geometry: as of `solve`, for all motions.
+
+        Raises:
+            InputError: for arrays of different lengths or shapes, and what `solve` cannot use.
+
+        Examples:
+            >>> import numpy as np
+            >>> import odeform
+            >>> batch = odeform.load("kick").solve_batch({"mass": np.linspace(0.5, 1.0, 100), "force": 140.0})
+            >>> batch.vertices(0.2).shape, batch.pose(np.array([0.1, 0.2])).shape
+            ((100, 2306, 3), (100, 2, 4, 4))
+        """
+        self._check_observed(None)
+        sets = parameter_sets(self.schema, parameters, self.complete)
+        shape = self.rest_of(sets[0]) if geometry is None else geometry
+        return _solved_batch(self, shape, sets, self._settings(quality, sets[0]), self._end(until))
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        """Motions that are solved one by one; models that can solve many at once do."""
+        return MotionBatch(sets, lambda index: solved(self, geometry, sets[index], settings, until))
+
+    def _end(self, until: float | None) -> float:
+        window = self.schema.window
+        return float(window.soft_clamped(np.array(window.stop if until is None else until)))
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """All parameters, checked, with defaults for those not given (`Schema.complete`).
@@ -236,3 +280,30 @@ class Predictor(ABC):
         if quality not in known:
             raise InputError(f"unknown quality {quality!r}: expected one of {', '.join(known)}")
         return known[quality]
+
+
+def solved(
+    predictor: Predictor,
+    geometry: Geometry,
+    parameters: Parameters,
+    settings: SolverSettings | None,
+    until: float,
+    observed: MotionSequence | None = None,
+) -> Motion:
+    """The motion that `predictor` solves for what `Predictor.solve` fills in; pickled, it is solved again."""
+    motion = predictor._solve(geometry, parameters, settings, until, observed)
+    given = (predictor, geometry, parameters, settings, until, observed)
+    object.__setattr__(motion, "made_by", (solved, given))  # motions are frozen
+    return motion
+
+
+def _solved_batch(
+    predictor: Predictor,
+    geometry: Geometry,
+    sets: list[dict[str, Any]],
+    settings: SolverSettings | None,
+    until: float,
+) -> MotionBatch:
+    batch = predictor._solve_batch(geometry, sets, settings, until)
+    batch.made_by = _solved_batch, (predictor, geometry, sets, settings, until)
+    return batch

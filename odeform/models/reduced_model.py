@@ -1,18 +1,26 @@
 """What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.models.base import Predictor, check_finite
+from odeform.models.base import Predictor, check_finite, solved
 from odeform.models.continuation import ContinuedTrajectory, Dynamics, has_continuation, without_continuation
+from odeform.models.reduced_batches import ContinuedBatch, RolledBatch
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import InUse
+from odeform.motion.reduced_batch import BatchPart, BatchTrajectory, ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion, Trajectory
 from odeform.motion.reduced_space import ReducedSpace
 from odeform.motion.rolled_trajectory import RolledTrajectory
 from odeform.schema import Parameters
+from odeform.solver.batch_steps import can_batch
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
 
@@ -22,6 +30,8 @@ __all__ = ["ReducedModel"]
 class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
 
+    together: int = 0
+    """How many motions are solved at once, as many as need a few tens of megabytes; 0: one by one."""
     continues_itself: bool = False
     """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
 
@@ -87,6 +97,45 @@ class ReducedModel(Predictor):
         return ReducedMotion(
             self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
         )
+
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        """y(t) under each of B sets of parameters, solved at least to `until` seconds, without `dynamics`; asked of
+        models that solve motions `together`."""
+        raise NotImplementedError
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        if not self.together or settings is None or not can_batch(settings):
+            return super()._solve_batch(geometry, sets, settings, until)
+        given, limits, window = settings, self.trust.limits, self.schema.window
+
+        def part(some: Sequence[Parameters]) -> BatchPart:
+            azimuths = np.array([self.schema.azimuth(each) for each in some])
+            trajectory = self._continued_batch(geometry, some, given, until)
+            return BatchPart(trajectory, self.watched_body, limits, window, azimuths)
+
+        parts = [part(sets[first : first + self.together]) for first in range(0, len(sets), self.together)]
+        return ReducedBatch(
+            sets,
+            lambda index: solved(self, geometry, sets[index], settings, until),
+            window,
+            parts,
+            lambda azimuth: self.evaluate_basis(geometry, azimuth),
+        )
+
+    def _continued_batch(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        window = self.schema.window
+        if self.dynamics is None:
+            trajectory = self.batch_trajectory(geometry, sets, settings, until)
+        else:
+            solved = self.batch_trajectory(geometry, sets, settings, min(until, window.stop))
+            trajectory = ContinuedBatch(solved, self.dynamics, self.schema.batch_inputs(sets), window)
+        return trajectory if self.space.rolling is None else RolledBatch(trajectory, self.space)
 
     @cached_property
     def watched_body(self) -> WatchedBody:

@@ -10,7 +10,7 @@ from odeform.motion.changed_trajectory import ChangedTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.types import Floats, Times
 
-__all__ = ["LiftedTrajectory"]
+__all__ = ["LiftedTrajectory", "floor_lift"]
 
 MOST = 0.01  # m; a motion that would have to be lifted farther is lost, and is left to the watch
 
@@ -44,8 +44,7 @@ class LiftedTrajectory(ChangedTrajectory):
 
     def _by(self, y: Floats) -> Floats:
         """(T,) m by which coordinates (T, 6 + K) are lifted."""
-        deeper = self._limit - self._lowest(y)
-        return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite
+        return floor_lift(self._lowest(y), self._limit)
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K)."""
@@ -55,3 +54,9 @@ class LiftedTrajectory(ChangedTrajectory):
             y = y.copy()
             y[:, 2] += lift
         return y
+
+
+def floor_lift(lowest: Floats, limit: float) -> Floats:
+    """(T,) m by which bodies are lifted whose lowest points are at `lowest` (T,) m, and may be at `limit` m."""
+    deeper = limit - lowest
+    return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite

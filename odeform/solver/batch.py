@@ -1,8 +1,8 @@
 """Integration of many initial value problems at once, each with steps of its own.
 
-Every problem takes the steps that `odeform.solver.integrate.integrate` would take with it alone: what else is in a batch
-changes neither them nor its solution, beyond rounding in its field. What is shared is the field's arithmetic, in which
-one call for many states takes a fraction of many calls.
+Every problem takes the steps that `odeform.solver.integrate.integrate` would take with it alone: what else is in a
+batch changes neither them nor its solution, beyond rounding in its field. What is shared is the field's arithmetic, in
+which one call for many states takes a fraction of many calls.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from odeform.types import Floats, Times
 
 __all__ = ["BatchSolution", "integrate_batch"]
 
-NODES = 64  # that are made room for at first
+NODES = 192  # that are made room for at first
 
 
 @dataclass
@@ -64,8 +64,8 @@ class BatchSolution:
             s = np.where(step > 0.0, np.clip((times - begin) / step, 0.0, 1.0), 0.0)
         weights = [np.asarray(w).astype(self.states.dtype)[..., None] for w in hermite_weights(s, step)]
         middle = None if self.middles is None else self.middles[each, index]
-        ends = (rows[each, at] for rows in (self.states, self.slopes) for at in (index, following))
-        return between(weights, *ends, middle)
+        y0, y1, f0, f1 = (rows[each, at] for rows in (self.states, self.slopes) for at in (index, following))
+        return between(weights, y0, y1, f0, f1, middle)
 
     def _append(self, rows: Any, times: Any, states: Any, slopes: Any, middles: Any | None) -> None:
         at = self.counts[rows]
@@ -81,12 +81,6 @@ class BatchSolution:
         for name in ("states", "slopes") if self.middles is None else ("states", "slopes", "middles"):
             known = getattr(self, name)
             setattr(self, name, np.concatenate([known, np.zeros_like(known)], axis=1))
-
-    def _trim(self) -> None:
-        most = int(self.counts.max(initial=1))
-        self.times = self.times[:, :most].copy()
-        self.states, self.slopes = self.states[:, :most].copy(), self.slopes[:, :most].copy()
-        self.middles = None if self.middles is None else self.middles[:, :most].copy()
 
 
 def integrate_batch(
@@ -129,7 +123,6 @@ def integrate_batch(
             run.fixed(quality.step)
         else:
             run.controlled(method, quality.tolerance or 0.0)
-    solution._trim()
     return solution
 
 

@@ -6,12 +6,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from odeform.errors import InputError
+from odeform.solver.integrate import SolverSettings
+from odeform.solver.linearly_implicit import LinearlyImplicit
 from odeform.solver.method import Method
+from odeform.solver.registry import get_method
 from odeform.solver.runge_kutta import ExplicitRungeKutta, gemv, weights_of
 from odeform.solver.tableau import Tableau
 from odeform.types import Floats
 
-__all__ = ["BatchField", "BatchStages", "BatchStepper", "StiffBatchField", "batch_stepper"]
+__all__ = ["BatchField", "BatchStages", "BatchStepper", "StiffBatchField", "batch_stepper", "can_batch", "rms"]
 
 Rows = Int[np.ndarray, " rows"]
 Each = Float[np.ndarray, " rows"]
@@ -135,11 +138,16 @@ def rms(values: Any) -> Each:
     return np.sqrt(np.array([float(row.dot(row)) / row.size for row in values]))
 
 
+def can_batch(settings: SolverSettings) -> bool:
+    """Whether many problems can be solved at once with these settings: methods of others may not be able to."""
+    return isinstance(get_method(settings.method), ExplicitRungeKutta | LinearlyImplicit)
+
+
 def batch_stepper(method: Method, field: BatchField, start: Float[np.ndarray, "batch state"]) -> BatchStepper:
     """The stepper of `method` for states like `start`. `InputError` for a field that has no steps of its own, where the
     method asks for them."""
     if isinstance(method, ExplicitRungeKutta):
-        return BatchStages(method.tableau, *start.shape, start.dtype)
+        return BatchStages(method.tableau, start.shape[0], start.shape[1], start.dtype)
     if not isinstance(field, StiffBatchField):
         raise InputError(f"solver {method.name}: expected the field of a mechanical model")
     return _Implicit()

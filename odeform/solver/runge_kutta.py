@@ -52,12 +52,12 @@ class Stages:
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
         """One step from `state` (n,) with `slope` (n,) at `time`: the state after it, and the slope there."""
-        after = state
-        self._slopes[:, 0] = slope
-        for index, weighted, node in self._stages:
-            after = self._advanced(state, weighted, step)
+        after, kept, product = state, self._slopes, self._product
+        kept[:, 0] = slope
+        for index, (slopes, weights), node in self._stages:
+            after = product(step, slopes, weights, 1.0, state)
             slope = field(time + node * step, after)
-            self._slopes[:, index] = slope
+            kept[:, index] = slope
         return after, slope
 
     def error(self, step: float) -> Any:

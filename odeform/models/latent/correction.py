@@ -92,6 +92,19 @@ class Correction:
         spline = CubicSpline(self._times, frames)
         return lambda times: spline(np.clip(times, self._times[0], self._times[-1]))
 
+    def at(
+        self, theta: Float[np.ndarray, "batch parameters"], times: Float[np.ndarray, " times"]
+    ) -> Float[np.ndarray, "batch times y"]:
+        """(B, T, 6 + K) at theta (B, P) in [-1, 1] and (T,) s: as `over_time`, for many motions."""
+        times = np.clip(times, self._times[0], self._times[-1])
+        out = np.zeros((len(theta), len(times), self._coordinates))
+        for name, part in self.parts.items():
+            known = np.concatenate([part.mean[None], part.modes]).reshape(1 + len(part.modes), len(self._times), -1)
+            mean, modes = np.split(CubicSpline(self._times, known, axis=1)(times), [1])
+            weights = matern(theta / part.scales, part.theta, part.order) @ part.weights
+            out[..., PARTS[name]] = mean + np.tensordot(weights, modes, axes=1)
+        return out
+
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, by name; `from_arrays` reads them."""
         out = {f"{PREFIX}times": self._times}

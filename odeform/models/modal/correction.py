@@ -61,5 +61,10 @@ class Correction:
 
     def over_time(self, push: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
         """The regression of one push at times (T,) s in the trained window: a cubic spline through its frames."""
-        share = min(float(np.linalg.norm(push.force)) / max(self._weakest, 1e-9), 1.0)
-        return CubicSpline(self._times, share * self._regression.predict(push)[0])
+        every = self.over_times(push)
+        return lambda times: every(times)[0]
+
+    def over_times(self, pushes: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "batch times y"]]:
+        """As `over_time`, of B pushes: (T,) s -> (B, T, 6 + K)."""
+        share = np.minimum(np.linalg.norm(pushes.force, axis=1) / max(self._weakest, 1e-9), 1.0)
+        return CubicSpline(self._times, share[:, None, None] * self._regression.predict(pushes), axis=1)

@@ -65,6 +65,14 @@ class CarriedCorrection:
         _, basis = coordinates_of(body)
         self._coefficients = np.einsum("kni,nij,n->kj", values, basis, body.weights)
 
+    def over_times(self, pushes: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "batch times y"]]:
+        """(T,) s -> (B, T, 6 + K), of B pushes."""
+        each = [
+            self.over_time(ContactInputs(*(part[None] for part in one)))
+            for one in zip(pushes.contact, pushes.normal, pushes.force, strict=True)
+        ]
+        return lambda times: np.stack([known(times) for known in each])
+
     def over_time(self, push: ContactInputs) -> Callable[[Floats], Float[np.ndarray, "times y"]]:
         """(T,) s -> (T, 6 + K), as that of `Correction`, in the coordinates of the other body."""
         near = nearest_on(self._part.rest, push.contact[0] + self._offset)

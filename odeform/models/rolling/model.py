@@ -1,14 +1,14 @@
 """ODeform for a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under a learned law of
 contact."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
-from odeform.mechanics.rolling.dynamics import MOVING, STATE
+from odeform.mechanics.rolling.dynamics import MOVING, STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
@@ -16,17 +16,22 @@ from odeform.models.integrated_model import IntegratedModel
 from odeform.models.latent.correction import Correction
 from odeform.models.latent.inference import Decoder
 from odeform.models.latent.latent_trajectory import LatentTrajectory
+from odeform.models.reduced_batches import CorrectedBatch, LiftedBatch
+from odeform.models.rolling.batch import BegunBatch, ResumedBatch, batch_field
 from odeform.models.rolling.phases import Begun, Resumed
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start, push_inputs
+from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.corrected_trajectory import CorrectedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.lifted_trajectory import LiftedTrajectory
+from odeform.motion.lifted_trajectory import LiftedTrajectory, floor_lift
+from odeform.motion.reduced_batch import BatchTrajectory
 from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
+from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
-from odeform.types import Floats, Times, Vector
+from odeform.types import Floats, Geometry, Times, Vector
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
@@ -53,6 +58,7 @@ class RollingModel(IntegratedModel):
     """The motion of one round body in a plane, or up and down."""
 
     model = "rolling"
+    together = 256
     continues_itself = True
     ablations: ClassVar[Mapping[str, str]] = {
         "network": "coefficients of the contact law depend on the material alone",
@@ -103,10 +109,10 @@ class RollingModel(IntegratedModel):
         return field, (start * self._units).astype(dtype), decode
 
     def _decoded(self, states: Float[np.ndarray, "rows states"], material: Floats) -> Float[np.ndarray, "rows y"]:
-        """States (R, 8) of a body of this material (Q,) -> (R, 6 + S)."""
-        each = np.tile(material, (len(states), 1))
-        touch = 1e-3 * self.law.coefficients(each[:1])["touch"]
-        deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), each))
+        """States (R, 8) of a body of this material (Q,), or of a material each (R, Q) -> (R, 6 + S)."""
+        each = np.broadcast_to(material, (len(states), material.shape[-1]))
+        touch = 1e-3 * self.law.coefficients(each if material.ndim > 1 else each[:1])["touch"]
+        deformation = self._readout(inputs_of(states.T, np.broadcast_to(touch, len(states)), each))
         moved = states[:, :MOVING] - [0.0, self._clearance, 0.0]
         return np.concatenate([placed(moved, self._axis), deformation], axis=1)
 
@@ -148,16 +154,62 @@ class RollingModel(IntegratedModel):
 
         return self._lifted(Resumed(corrected, known.stop, resume))
 
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        theta, dtype, least = self.schema.batch_inputs(sets), _precision(settings), 1.0 / self.schema.window.rate
+        material, known = theta[:, self._materials], self.correction
+        start = np.zeros((len(theta), STATE))
+        # one by one, to the last bit: a landing that comes a moment later on a corner amplifies what differs
+        start[:, : 2 * MOVING] = [self._start.at(push_inputs(self.schema, each[None]))[0] for each in theta]
+        exact = (start * self._units).astype(dtype)
+
+        def readout(times: Times, states: Floats) -> Floats:
+            each = np.repeat(material, len(times), axis=0)
+            rows = states.reshape(len(each), STATE) / self._units
+            return self._decoded(rows, each).reshape(*states.shape[:2], -1)
+
+        def solved(begin: Floats, seconds: float) -> SolvedBatch:
+            field = batch_field(
+                lambda some: RollingDynamics(self.law, self._support, self._radius, some), material, self._units
+            )
+            return SolvedBatch(lambda: BatchProblem(field, begin, readout), settings, max(seconds, least))
+
+        resumed = known is not None and known.stop >= self.schema.window.stop
+        end = min(until, known.stop) if known is not None and resumed else until
+        rates = placed((exact.astype(float) / self._units)[:, MOVING : 2 * MOVING], self._axis)
+        begun = BegunBatch(
+            solved(exact, end - self.begin), self.begin, readout(np.zeros(1), exact[:, None].astype(float))[:, 0], rates
+        )
+        motion: BatchTrajectory = begun
+        if known is not None:
+            corrected = CorrectedBatch(begun, known.shares, lambda times: known.at(theta, times), known.stop)
+            motion = corrected
+            if resumed:
+
+                def resume() -> tuple[SolvedBatch, Floats]:
+                    times = np.array([known.stop - least, known.stop])
+                    added = corrected.reduced(times)[..., :POSE] - begun.reduced(times)[..., :POSE]
+                    more = np.stack([self._added_state(each) for each in added])
+                    again = (begun.states(known.stop) + self._units * more).astype(dtype)
+                    return solved(again, until - known.stop), readout(np.zeros(1), again[:, None])[:, 0, POSE:]
+
+                motion = ResumedBatch(corrected, known.stop, resume)
+        return LiftedBatch(motion, lambda y: floor_lift(self._lowest_points(y), self._lowest))
+
     def _added(self, own: Trajectory, corrected: Trajectory, time: float) -> Float[np.ndarray, "8"]:
         """What the correction adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
         so short that corrected frames do not tell the velocity."""
         frame = 1.0 / self.schema.window.rate
         times = np.array([time - frame, time])
-        added = corrected.reduced(times)[:, :POSE] - own.reduced(times)[:, :POSE]
+        return self._added_state(corrected.reduced(times)[:, :POSE] - own.reduced(times)[:, :POSE])
+
+    def _added_state(self, added: Float[np.ndarray, "2 6"]) -> Float[np.ndarray, "8"]:
+        """The same of what is added to the pose at the last two frames."""
         moved = np.stack([added[:, :3] @ np.cross(self._axis, UP), added[:, 2], added[:, 3:] @ self._axis], axis=1)
         if self.space.rolling is None:
             moved[:, [0, 2]] = 0.0
-        return np.concatenate([moved[1], (moved[1] - moved[0]) / frame, np.zeros(STATE - 2 * MOVING)])
+        return np.concatenate([moved[1], (moved[1] - moved[0]) * self.schema.window.rate, np.zeros(STATE - 2 * MOVING)])
 
     def _lifted(self, motion: Trajectory) -> LiftedTrajectory:
         return LiftedTrajectory(motion, self._lowest_points, self._lowest)

@@ -13,13 +13,13 @@ from odeform.motion.reduced_motion import Trajectory
 from odeform.motion.reduced_space import POSE
 from odeform.types import Floats, Times
 
-__all__ = ["Begun", "Resumed"]
+__all__ = ["Begun", "Push", "Resumed", "risen"]
 
 RISING = 0.04  # s
 
 
 @dataclass(frozen=True, eq=False)
-class _Push:
+class Push:
     """The motion during the push: from rest to where the ODE begins, with its velocity there."""
 
     begin: float
@@ -43,7 +43,7 @@ class Begun(ChangedTrajectory):
     def __init__(self, own: LatentTrajectory, begin: float, y: Floats, rate: Floats) -> None:
         """`y` (6 + S,) and the pose's `rate` (6,) per second are those at `begin` seconds."""
         super().__init__(own)
-        self._solved, self._push, self._first = own, _Push(begin, y[:POSE], rate), y
+        self._solved, self._push, self._first = own, Push(begin, y[:POSE], rate), y
 
     def state(self, time: float) -> Float[np.ndarray, "8"]:
         """That of the ODE at `time` seconds, after the push."""
@@ -63,7 +63,7 @@ class Begun(ChangedTrajectory):
         if later.any():
             after = times[later] - push.begin
             out[later] = self._first + self.own.reduced(after)
-            out[later, POSE:] *= _risen(after)[:, None]
+            out[later, POSE:] *= risen(after)[:, None]
         return out
 
 
@@ -97,11 +97,11 @@ class Resumed(ChangedTrajectory):
             (solved, end, given_up), after = self._later, times[later] - self._stop
             out = out.copy()
             # what the correction adds to the deformation gives way to what follows from the motion
-            out[later] = end + solved.reduced(after) - _risen(after)[:, None] * given_up
+            out[later] = end + solved.reduced(after) - risen(after)[:, None] * given_up
         return out
 
 
-def _risen(after: Times) -> Times:
+def risen(after: Times) -> Times:
     """(T,) from 0 to 1, in `RISING` s."""
     share = np.minimum(after / RISING, 1.0)
     return share**2 * (3.0 - 2.0 * share)
