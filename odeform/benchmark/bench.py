@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.benchmark.batch import batch_speed
 from odeform.benchmark.comparisons import comparisons
 from odeform.benchmark.objects import bench_objects
 from odeform.benchmark.precision import OperatingPoint, measure, operating_points, work_precision
@@ -92,7 +93,12 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
     points: list[OperatingPoint] = []
     with as_viewed():
         if isinstance(predictor, PerObject):
-            return {**result, "data": data, "objects": bench_objects(predictor, dataset)}
+            return {
+                **result,
+                "data": data,
+                "objects": bench_objects(predictor, dataset),
+                "batch": batch_speed(predictor),
+            }
         if not isinstance(predictor, ReducedModel):
             raise InputError(f"bench: expected a model of reduced coordinates, got {predictor.model}")
         result |= {"data": data, "latency": _latency(predictor)}
@@ -101,6 +107,7 @@ def bench(checkpoint: str, data: str | None = None) -> dict[str, Any]:
             result |= _solver(predictor, points)
         return {
             **result,
+            "batch": batch_speed(predictor),
             "limits": roofline(predictor),
             "scaling": scaling(predictor, SIZES),
             "peers": comparisons(predictor, dataset, points),

@@ -17,6 +17,9 @@ def report(result: Mapping[str, Any]) -> str:
     ]
     for part in (_objects,) if "objects" in result else (_latency, _solver, _speed, _comparisons):
         lines += part(result)
+    if batch := result.get("batch"):
+        title = "motions that are solved in one call, beside a loop, with their vertices at four times"
+        lines += _table(title, [batch], ("motions", "ms_a_motion", "loop_ms_a_motion"))
     if any("-" in line.split() for line in lines):
         lines += ["", "-: not measured"]
     return "\n".join(lines)

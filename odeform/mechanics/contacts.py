@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from odeform.types import Floats
 
@@ -36,7 +36,7 @@ class Contacts:
         return self.jacobian.reshape(batch, -1, size)
 
     def resistance(
-        self, velocity: Float[np.ndarray, "#steps batch velocities"], step: Float[np.ndarray, "steps 1 1"]
+        self, velocity: Float[np.ndarray, "#steps batch velocities"], step: Float[np.ndarray, "#steps #batch 1"]
     ) -> tuple[Floats, Floats]:
         """What C contacts add to the matrix (H, B, V, V) in kg and to the momentum (H, B, V) of each of H steps that
         ends with about `velocity`: springs and dampers along the normal, friction against sliding, all implicit."""
@@ -47,9 +47,24 @@ class Contacts:
         weights = np.empty((*force.shape, 3, 1))
         weights[..., 0, 0] = np.sqrt(time * active)
         weights[..., 1:, 0] = np.sqrt(step * self._drag(force, relative))[..., None]
-        rows = (weights * self.jacobian).reshape(*force.shape[:2], -1, self.jacobian.shape[-1])
         impulse = -(active * self.gap)[..., None, :] @ self.jacobian[:, :, 0]
+        if len(self.gap) > 1:
+            return self._squares(weights, ~(force <= 0.0)), impulse[..., 0, :]
+        rows = (weights * self.jacobian).reshape(*force.shape[:2], -1, self.jacobian.shape[-1])
         return rows.swapaxes(-1, -2) @ rows, impulse[..., 0, :]
+
+    def _squares(
+        self, weights: Float[np.ndarray, "steps batch contacts 3 1"], pressed: Bool[np.ndarray, "steps batch contacts"]
+    ) -> Float[np.ndarray, "steps batch velocities velocities"]:
+        """Products of the weighted rows of each motion with themselves, without those of contacts that do not press:
+        most of a batch's. These add nothing, but take as long."""
+        steps, batch, size = *pressed.shape[:2], self.jacobian.shape[-1]
+        out, some = np.empty((steps, batch, size, size)), np.asarray(pressed.any(axis=0))
+        for index in range(batch):
+            chosen = np.flatnonzero(some[index])
+            rows = (weights[:, index, chosen] * self.jacobian[index, chosen]).reshape(steps, -1, size)
+            np.matmul(rows.swapaxes(-1, -2), rows, out=out[:, index])
+        return out
 
     def forces(self, velocity: Float[np.ndarray, "batch velocities"]) -> Float[np.ndarray, "batch velocities"]:
         """What they do to the rate of the momentum, at these velocities."""

@@ -14,6 +14,7 @@ __all__ = ["WIDTHS", "Push", "make_push"]
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
 LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
+PARTS = ("modes", "squares", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,11 @@ class Push:
     """Of unit length."""
     forces: Float[np.ndarray, "batch 1"]
     """N along the guide."""
+
+    def some(self, rows: Ints) -> "Push":
+        """The pushes `rows` (R,)."""
+        each = {name: getattr(self, name)[rows] for name in PARTS}
+        return replace(self, **each)
 
     @cached_property
     def over(self) -> "Push":

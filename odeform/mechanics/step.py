@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
 from scipy.linalg import get_lapack_funcs
 
 from odeform.mechanics.body import ReducedBody
@@ -75,9 +74,9 @@ class Steps:
             for pushed in (True, False)
         }
 
-    def advance(self, state: State, step: float) -> tuple[State, Floats]:
-        """One step of second order: twice two half steps less a whole one. Also returns its error (B,) in m: how far
-        the two half steps are from the whole one."""
+    def advance(self, state: State, step: float | Floats) -> tuple[State, Floats]:
+        """One step of second order, of `step` seconds, or of (B,) for each motion its own: twice two half steps less a
+        whole one. Also returns its error (B,) in m: how far the two half steps are from the whole one."""
         # the whole step and the first half begin with the same contacts
         near = self._touching[state.pushed].near(state, step)
         begun = self._implicit(state, near, np.array([step, 0.5 * step]))
@@ -100,9 +99,9 @@ class Steps:
         self._add_masses(matrix, self._masses[: local.shape[1]])
         return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
 
-    def _implicit(self, state: State, near: Near, steps: Float[np.ndarray, " steps"]) -> State:
-        """The states (H, B) after one step of first order of each of H lengths in s."""
-        velocity, step = _turned(state.velocity, state.rotation), steps[:, None, None]
+    def _implicit(self, state: State, near: Near, steps: Floats) -> State:
+        """The states (H, B) after one step of first order of each of H lengths in s, (H,) or (H, B)."""
+        velocity, step = _turned(state.velocity, state.rotation), steps.reshape(len(steps), -1, 1)
         momentum, rate = self._free(state, velocity)
         momentum, size = momentum + step * rate, velocity.shape[1]
         masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.floor import Floor
@@ -78,27 +78,32 @@ class Touching:
         self._first = samples * np.arange(batch)[:, None]  # of each body, among all samples
         self._row = samples * np.arange(6)[:, None]
 
-    def near(self, state: State, step: float) -> Near:
-        """The samples that may touch something in a step of `step` seconds, and some more. There may be none."""
+    def near(self, state: State, step: float | Floats) -> Near:
+        """The samples that may touch something in a step of `step` seconds, one or (B,). There may be none. Where
+        another motion has more, others go along, which have no stiffness."""
         push = self._push
         _, place = _bent(push.points, push.rows, state)
         height = _heights(place[..., : push.support], self._level, state)
-        down = min(float(state.velocity[:, 2].min()), 0.0)
-        chosen = stand = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
+        down = np.minimum(state.velocity[:, 2], 0.0)
+        stand, real = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
+        chosen = stand
         if state.pushed:
             away = place[..., push.support :] - _centre(push, state)
             distance = np.sqrt((away * away).sum(axis=1))
             speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
-            way = (2.0 * step + self._law.push_damping) * float(np.sqrt((speed * speed).sum(axis=1).max()))
-            pushed = push.support + _nearest(distance, self._radius + MARGIN + way, PUSH)
-            chosen = np.concatenate([stand, pushed], axis=1)
+            way = (2.0 * step + self._law.push_damping) * np.sqrt((speed * speed).sum(axis=1))
+            pushed, touched = _nearest(distance, self._radius + MARGIN + way, PUSH)
+            chosen = np.concatenate([stand, push.support + pushed], axis=1)
+            real = np.concatenate([real, touched], axis=1)
+        springs = self._springs.reshape(4, -1).take(self._first + chosen, axis=1)
+        springs[0] *= real
         return Near(
             push,
             self._radius,
             push.points.ravel().take((3 * self._first + chosen)[:, None] + self._row[:3]),
             push.rows.reshape(-1, push.rows.shape[-1]).take((6 * self._first + chosen)[:, None] + self._row, axis=0),
             self._level.take(stand),
-            self._springs.reshape(4, -1).take(self._first + chosen, axis=1),
+            springs,
         )
 
 
@@ -121,10 +126,15 @@ def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
     return state.rotation.swapaxes(1, 2) @ place[..., None]
 
 
-def _nearest(gap: Floats, margin: float, most: int) -> Ints:
-    """(B, C) the samples with the smallest gaps, as many as the motion with the most below `margin` has, or `most`."""
-    count = min(int(np.count_nonzero(gap < margin, axis=1).max()), most)
-    return np.argpartition(gap, max(count, 1) - 1, axis=1)[:, :count]
+def _nearest(
+    gap: Float[np.ndarray, "batch samples"], margin: Float[np.ndarray, " batch"], most: int
+) -> tuple[Ints, Bool[np.ndarray, "batch contacts"]]:
+    """(B, C) the samples with the smallest gaps, as many as the motion with the most below its `margin` has, or `most`;
+    and which of them are below it."""
+    below = gap < margin[:, None]
+    count = min(int(np.count_nonzero(below, axis=1).max()), most)
+    chosen = np.argpartition(gap, max(count, 1) - 1, axis=1)[:, :count]
+    return chosen, np.take_along_axis(below, chosen, axis=1)
 
 
 def _axes(normals: Float[np.ndarray, "*batch 3"]) -> Rotations:

@@ -12,16 +12,20 @@ import numpy as np
 from odeform.checkpoint import Checkpoint, arrays_of_object, write_checkpoint
 from odeform.errors import InputError
 from odeform.geometry.upright import stand_up
+from odeform.models.batch_parameters import parameter_sets
 from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
+from odeform.models.rest import rest_from
+from odeform.models.solve import solved, solved_batch
 from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
+from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.trust import Trust
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.contacts import complete_push
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Arrays, Floats, Geometry, Mesh, MotionSequence, Times
+from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
 
 if TYPE_CHECKING:
     import torch
@@ -40,16 +44,6 @@ def check_finite(geometry: Geometry) -> None:
     """`InputError` for a shape without points, or with points that are not finite."""
     if not np.isfinite(geometry.points).all() or len(geometry.points) == 0:
         raise InputError("geometry: expected at least one point, all finite")
-
-
-def _rest(arrays: Arrays) -> Mesh:
-    mesh = Mesh(arrays["rest.points"], arrays["rest.faces"])
-    points, faces = mesh.points, mesh.faces
-    if points.ndim != 2 or faces.ndim != 2 or points.shape[1:] != (3,) or faces.shape[1:] != (3,) or not len(points):
-        raise ValueError(f"body with points {points.shape} and faces {faces.shape}")
-    if faces.dtype.kind not in "iu" or faces.min(initial=0) < 0 or faces.max(initial=0) >= len(points):
-        raise ValueError("faces of the body, which refer to points that do not exist")
-    return mesh
 
 
 class Predictor(ABC):
@@ -115,9 +109,9 @@ class Predictor(ABC):
             self.checkpoint = checkpoint
             self.schema = checkpoint.schema
             self.surroundings = surroundings_of(checkpoint.schema)
-            self.rest = _rest(checkpoint.arrays)
+            self.rest = rest_from(checkpoint.arrays)
             objects = {name: arrays_of_object(checkpoint.arrays, name) for name in self.schema.objects}
-            self._rests = {name: _rest(arrays) for name, arrays in objects.items() if "rest.points" in arrays}
+            self._rests = {name: rest_from(arrays) for name, arrays in objects.items() if "rest.points" in arrays}
             bodies = {"": checkpoint.arrays, **objects}
             bands = {name: error_band(arrays) for name, arrays in bodies.items()}
             self._bands = {name: band for name, band in bands.items() if band is not None}
@@ -134,6 +128,10 @@ class Predictor(ABC):
     def _is_of_odeform(self) -> bool:
         """Whether the class that reads the arrays is one of this package, and not one that a program registered."""
         return type(self).__module__.partition(".")[0] == "odeform"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Predictors are pickled as their checkpoints, without what they keep."""
+        return type(self), (self.checkpoint,)
 
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
@@ -178,7 +176,42 @@ class Predictor(ABC):
         end = self._end(until)
         complete = self.complete(parameters)
         shape = self.rest_of(complete) if geometry is None else stand_up(geometry)
-        return self._solve(shape, complete, self._settings(quality, complete), end, observed)
+        return solved(self, shape, complete, self._settings(quality, complete), end, observed)
+
+    def solve_batch(
+        self,
+        parameters: Mapping[str, Any],
+        quality: str | SolverSettings = "balanced",
+        until: float | None = None,
+        geometry: Geometry | None = None,
+    ) -> MotionBatch:
+        """The motions of `geometry` under B sets of parameters, each as `solve` has it.
+
+        Args:
+            parameters: by name, arrays (B,), or (B, 3) for a vector, in the units of `schema`. A number, vector or name
+                is shared by all; defaults for the others.
+            quality, until, geometry: as of `solve`, for all motions.
+
+        Raises:
+            InputError: for arrays of different lengths or shapes, and what `solve` cannot use.
+
+        Examples:
+            >>> import numpy as np
+            >>> import odeform
+            >>> batch = odeform.load("kick").solve_batch({"mass": np.linspace(0.5, 1.0, 100), "force": 140.0})
+            >>> batch.vertices(0.2).shape, batch.pose(np.array([0.1, 0.2])).shape
+            ((100, 2306, 3), (100, 2, 4, 4))
+        """
+        self._check_observed(None)
+        sets = parameter_sets(self.schema, parameters, self.complete)
+        shape = self.rest_of(sets[0]) if geometry is None else stand_up(geometry)
+        return solved_batch(self, shape, sets, self._settings(quality, sets[0]), self._end(until))
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        """Motions that are solved one by one; models that can solve many at once do."""
+        return MotionBatch(sets, lambda index: solved(self, geometry, sets[index], settings, until))
 
     def torch(
         self, parameters: Mapping[str, Any], times: Any, geometry: "Geometry | torch.Tensor | None" = None

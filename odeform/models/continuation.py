@@ -15,16 +15,17 @@ decides where the body goes nor outlasts the contact.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.locks import Lock
 from odeform.models.kernels.regression import Kernel, KernelRegression
 from odeform.motion.base import SolveStats
+from odeform.motion.batch_trajectory import BatchTrajectory, PiecewiseBatch
 from odeform.motion.reduced_space import POSE
 from odeform.motion.splines import catmull_rom
-from odeform.motion.trajectory import Piecewise, Trajectory
+from odeform.motion.trajectory import Moving, Piecewise, Trajectory
 from odeform.schema import Window
 from odeform.types import Arrays, Floats
 
@@ -32,6 +33,7 @@ __all__ = [
     "LATER_ERRORS",
     "Dynamics",
     "continued",
+    "continued_batch",
     "has_continuation",
     "spread_regression",
     "without_continuation",
@@ -158,38 +160,71 @@ def without_continuation(checkpoint: Checkpoint) -> Checkpoint:
 
 def continued(solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> Trajectory:
     """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on."""
-    return Piecewise(solved, window.stop, lambda: _Frames(solved, dynamics, theta, window))
+    return Piecewise(solved, window.stop, lambda: _Later(solved, _Frames(solved, dynamics, theta, window)))
+
+
+def continued_batch(
+    solved: BatchTrajectory, dynamics: Dynamics, theta: Float[np.ndarray, "batch parameters"], window: Window
+) -> BatchTrajectory:
+    """As `continued`, of many motions."""
+    return PiecewiseBatch(solved, window.stop, lambda: _LaterBatch(solved, _Frames(solved, dynamics, theta, window)))
 
 
 class _Frames:
-    """What the dynamics make of the last two frames of a window.
+    """What the dynamics make of the last two frames of a window, of one motion or of many.
 
     Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
     spline between them is exact for free flight.
     """
 
-    last_good = float("inf")
-
-    def __init__(self, solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> None:
-        self._dynamics, self._theta, self._solved = dynamics, theta, solved
+    def __init__(self, solved: Moving, dynamics: Dynamics, theta: Floats, window: Window) -> None:
+        self._dynamics, self._theta = dynamics, np.atleast_2d(theta)
         self._stop, self._rate = window.stop, window.rate
         # the first kept frame is one before the end of the window
-        self._frames = list(solved.reduced(window.stop - np.array([1.0, 0.0]) / window.rate))
+        first = solved.reduced(window.stop - np.array([1.0, 0.0]) / window.rate)
+        self._batch = first.shape[:-2]
+        self._frames = list(np.moveaxis(first.reshape(len(self._theta), *first.shape[-2:]), 1, 0))
         self._lock = Lock()
+
+    def reduced(self, times: Floats) -> Floats:
+        """(T,) seconds after the window -> (T, 6 + K), or (B, T, 6 + K)."""
+        frames = self._rate * (times - self._stop)
+        index = np.floor(frames).astype(int)
+        with self._lock:
+            while len(self._frames) < int(index.max()) + 4:
+                self._frames.append(self._dynamics.next(*self._frames[-2:], self._theta))
+            kept = np.stack(self._frames, axis=1)
+        four = [kept[:, index + k] for k in range(4)]
+        y = catmull_rom(*four, share=(frames - index)[:, None])
+        return y.reshape(*self._batch, *y.shape[1:])
+
+
+class _Later:
+    """The trajectory of frames after those that are solved."""
+
+    last_good = float("inf")
+
+    def __init__(self, solved: Trajectory, frames: _Frames) -> None:
+        self._solved, self.reduced = solved, frames.reduced
 
     @property
     def stats(self) -> SolveStats:
         """Those of the window."""
         return self._solved.stats
 
-    def reduced(self, times: Floats) -> Floats:
-        """(T,) seconds after the window -> (T, 6 + K)."""
-        frames = self._rate * (times - self._stop)
-        index = np.floor(frames).astype(int)
-        with self._lock:
-            while len(self._frames) < int(index.max()) + 4:
-                before, now = (frame[None] for frame in self._frames[-2:])
-                self._frames.append(self._dynamics.next(before, now, self._theta[None])[0])
-            kept = np.stack(self._frames)
-        four = [kept[index + k] for k in range(4)]
-        return catmull_rom(*four, share=(frames - index)[:, None])
+
+class _LaterBatch:
+    """As `_Later`, of many motions."""
+
+    def __init__(self, solved: BatchTrajectory, frames: _Frames) -> None:
+        self._solved, self.reduced = solved, frames.reduced
+
+    @property
+    def ok(self) -> Bool[np.ndarray, " batch"]:
+        """(B,) those of the window."""
+        return self._solved.ok
+
+    @property
+    def stats(self) -> list[SolveStats]:
+        """(B,) those of the window."""
+        return self._solved.stats

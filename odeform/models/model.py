@@ -1,7 +1,7 @@
 """What the three families of ODeform share: a motion is the solution of an ODE, read out, and a residual."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -12,10 +12,13 @@ from odeform.models.frontier import FrontierPoint
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.residual import Residual
 from odeform.models.solved import FINER, Problem, SolvedTrajectory
+from odeform.models.solved_batch import BatchProblem, SolvedBatch
+from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.trajectory import Adjusted, Trajectory
+from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats
+from odeform.types import Floats, Geometry, Times
 
 __all__ = ["Model"]
 
@@ -46,8 +49,15 @@ class Model(ReducedModel):
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """The initial value problem for theta (P,) in [-1, 1] on a body: field, initial state, and readout."""
 
+    def batch_problem(
+        self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
+    ) -> Callable[[], BatchProblem]:
+        """As `problem`, for theta (B, P) and azimuths (B,) in radians; asked of families that solve motions
+        `together`, whenever later times are asked for."""
+        raise NotImplementedError
+
     def residual_inputs(self, theta: Floats) -> Any:
-        """What the residual is regressed on, for theta (P,) in [-1, 1]: by default theta itself."""
+        """What the residual is regressed on, for theta (P,) in [-1, 1], or (B, P): by default theta itself."""
         return theta
 
     def integrate(
@@ -73,3 +83,13 @@ class Model(ReducedModel):
         if self.residual is None:
             return solved
         return Adjusted(solved, self.residual.adjustment(solved, self.residual_inputs(theta)))
+
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        theta, azimuths = self.schema.batch_inputs(sets), np.array([self.schema.azimuth(each) for each in sets])
+        make = self.batch_problem(theta, geometry, azimuths, getattr(np, settings.dtype))
+        solved = SolvedBatch(make, settings, until, 1.0 / self.schema.window.rate)
+        if self.residual is None:
+            return solved
+        return AdjustedBatch(solved, self.residual.adjustment(solved, self.residual_inputs(theta)))

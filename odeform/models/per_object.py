@@ -14,6 +14,7 @@ from odeform.checkpoint import Checkpoint, arrays_of_object
 from odeform.models.base import Predictor
 from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
+from odeform.motion.motion_batch import MotionBatch
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence
@@ -69,6 +70,9 @@ class PerObject(Predictor):
     def _is_of_odeform(self) -> bool:
         return self._kind.__module__.partition(".")[0] == "odeform"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return PerObject, (self.checkpoint, self._kind)
+
     def _read(self, checkpoint: Checkpoint) -> None:
         self.parts = {name: self._kind(_part(checkpoint, name)) for name in checkpoint.schema.objects}
         first = next(iter(self.parts.values()))
@@ -86,6 +90,12 @@ class PerObject(Predictor):
         observed: MotionSequence | None,
     ) -> Motion:
         return self.parts[parameters[OBJECT]]._solve(geometry, parameters, settings, until, observed)
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        # the object is the same for all
+        return self.parts[sets[0][OBJECT]]._solve_batch(geometry, sets, settings, until)
 
     def model_of(self, parameters: Parameters) -> Predictor:
         return self.parts[parameters[OBJECT]]

@@ -1,20 +1,35 @@
 """What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
-from odeform.models.continuation import Dynamics, continued, has_continuation, without_continuation
+from odeform.models.continuation import (
+    Dynamics,
+    continued,
+    continued_batch,
+    has_continuation,
+    without_continuation,
+)
+from odeform.models.solve import solved
+from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import InUse
+from odeform.motion.reduced_batch import BatchPart, ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import ReducedSpace
 from odeform.motion.trajectory import Adjusted, Trajectory
 from odeform.schema import Parameters
+from odeform.solver.batch_steps import can_batch
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Geometry, MotionSequence
+from odeform.types import Floats, Geometry, MotionSequence, Times
 
 __all__ = ["ReducedModel"]
 
@@ -22,6 +37,8 @@ __all__ = ["ReducedModel"]
 class ReducedModel(Predictor):
     """A predictor of reduced coordinates. Subclasses say how y(t) follows from the parameters."""
 
+    together: int = 0
+    """How many motions are solved at once, as many as need a few tens of megabytes; 0: one by one."""
     continues_itself: bool = False
     """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
 
@@ -87,6 +104,51 @@ class ReducedModel(Predictor):
         return ReducedMotion(
             self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
         )
+
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        """y(t) under each of B sets of parameters, solved at least to `until` seconds, without `dynamics`; asked of
+        models that solve motions `together`."""
+        raise NotImplementedError
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        if not self.together or settings is None or not can_batch(settings):
+            return super()._solve_batch(geometry, sets, settings, until)
+        given, limits, window = settings, self.trust.limits, self.schema.window
+
+        def part(some: Sequence[Parameters]) -> BatchPart:
+            azimuths = np.array([self.schema.azimuth(each) for each in some])
+            trajectory = self._continued_batch(geometry, some, given, until)
+            return BatchPart(trajectory, self.watched_body, limits, window, azimuths)
+
+        parts = [part(sets[first : first + self.together]) for first in range(0, len(sets), self.together)]
+        return ReducedBatch(
+            sets,
+            lambda index: solved(self, geometry, sets[index], settings, until),
+            window,
+            parts,
+            lambda azimuth: self.evaluate_basis(geometry, azimuth),
+        )
+
+    def _continued_batch(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        if self.dynamics is None:
+            trajectory = self.batch_trajectory(geometry, sets, settings, until)
+        else:
+            window = self.schema.window
+            known = self.batch_trajectory(geometry, sets, settings, min(until, window.stop))
+            trajectory = continued_batch(known, self.dynamics, self.schema.batch_inputs(sets), window)
+        if self.space.rolling is None:
+            return trajectory
+
+        def with_modes(_: Times, y: Floats) -> Floats:
+            return self.space.with_modes(y.reshape(-1, y.shape[-1])).reshape(*y.shape[:-1], -1)
+
+        return AdjustedBatch(trajectory, with_modes)
 
     @cached_property
     def watched_body(self) -> WatchedBody:

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from odeform.models.kernels.regression import Kernel, KernelRegression
 from odeform.models.kernels.ridge import ORDERS
 from odeform.motion.reduced_space import POSE
-from odeform.motion.trajectory import Adjustment, Trajectory
+from odeform.motion.trajectory import Adjustment, Moving
 from odeform.types import Arrays, Floats, Times
 
 __all__ = ["PARTS", "FrameRegression", "ParameterRegression", "Residual", "parameter_residual", "weight_of"]
@@ -29,8 +29,8 @@ PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(
 class FrameRegression(Protocol):
     """A regression of whole motions."""
 
-    def frames(self, inputs: Any) -> Float[np.ndarray, "times y"]:
-        """(T, 6 + K) at the residual's frames, from what causes the motion."""
+    def frames(self, inputs: Any) -> Float[np.ndarray, "*batch times y"]:
+        """(T, 6 + K) at the residual's frames, from what causes the motion; (B, T, 6 + K) from what causes several."""
         ...
 
 
@@ -49,13 +49,14 @@ class Residual:
         """s: the last of its frames."""
         return float(self.times[-1])
 
-    def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "times y"]]:
-        """(T,) s -> (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them."""
-        spline = CubicSpline(self.times, self.regression.frames(inputs))
+    def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "*batch times y"]]:
+        """(T,) s -> (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
+        several motions, (B, T, 6 + K)."""
+        spline = CubicSpline(self.times, self.regression.frames(inputs), axis=-2)
         return lambda times: spline(np.clip(times, self.times[0], self.times[-1]))
 
-    def adjustment(self, own: Trajectory, inputs: Any) -> Adjustment:
-        """Adds it to the motion `own` of the ODE; zero at time 0."""
+    def adjustment(self, own: Moving, inputs: Any) -> Adjustment:
+        """Adds it to the motion `own` of the ODE, or to each of several; zero at time 0."""
         added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
@@ -98,12 +99,12 @@ class ParameterRegression:
     """T and 6 + K."""
     parts: Mapping[str, RegressedPart]
 
-    def frames(self, inputs: Float[np.ndarray, " parameters"]) -> Float[np.ndarray, "times y"]:
-        """At theta (P,) in [-1, 1]."""
-        out = np.zeros(self.shape)
+    def frames(self, inputs: Float[np.ndarray, "*batch parameters"]) -> Float[np.ndarray, "*batch times y"]:
+        """(T, 6 + K) at theta (P,) in [-1, 1], or (B, T, 6 + K) at theta (B, P)."""
+        out = np.zeros((*inputs.shape[:-1], *self.shape))
         for name, part in self.parts.items():
-            found = part.regression(inputs[None])[0] @ part.modes + part.mean
-            out[:, PARTS[name]] = found.reshape(len(out), -1)
+            found = part.regression(np.atleast_2d(inputs)) @ part.modes + part.mean
+            out[..., PARTS[name]] = found.reshape(*out.shape[:-1], -1)
         return out
 
     def jet(self, theta: Float[np.ndarray, " parameters"]) -> Float[np.ndarray, "jet times y"]:

@@ -17,7 +17,7 @@ from odeform.solver.method import Field
 from odeform.solver.solution import Solution, Status
 from odeform.types import Floats, Times
 
-__all__ = ["Problem", "SolvedTrajectory"]
+__all__ = ["Problem", "SolvedTrajectory", "describe"]
 
 MOMENTS = 128  # times at which the error of the solver is measured
 FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in ((1e-6, 1e-4), (1e-9, 0.0))}
@@ -140,11 +140,11 @@ class SolvedTrajectory:
     def stats(self) -> SolveStats:
         """Solver, steps and elapsed time; if the solver failed, where, and the fixed steps computed instead."""
         first, rest = self._solution, self._rest
-        solver, status = _describe(self._settings), self._last.status.value
+        solver, status = describe(self._settings), self._last.status.value
         steps, evaluations = first.steps, first.evaluations
         if rest is not None:
             failed = f"{solver} failed at t = {first.end:.3f} s: {first.status.value}"
-            solver = f"{_describe(self._fallback)} ({failed})"
+            solver = f"{describe(self._fallback)} ({failed})"
             status = "fixed steps" if rest.status is Status.OK else f"fixed steps, {status}"
             steps, evaluations = steps + rest.steps, evaluations + rest.evaluations
         return SolveStats(
@@ -158,6 +158,7 @@ class SolvedTrajectory:
         )
 
 
-def _describe(settings: SolverSettings) -> str:
+def describe(settings: SolverSettings) -> str:
+    """Name the method of a solver with its step or tolerance."""
     value = f"h = {1e3 * settings.step:.3g} ms" if settings.step else f"tol {settings.tolerance:.0e}"
     return f"{settings.method}, {value}"

@@ -9,6 +9,7 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.geometry.likeness import Likeness
+from odeform.motion.remade import Remade
 from odeform.motion.trust import UNKNOWN, Trust
 from odeform.motion.watch import Stop, Watch
 from odeform.schema import Parameters, Schema
@@ -61,12 +62,15 @@ class SolveStats:
         return self.estimate()
 
 
-class Motion(ABC):
+class Motion(Remade, ABC):
     """The motion of one geometry under one set of parameters: P(t) = T(t) o D(t)(P0), Eq. 4 of arXiv:2607.20670.
 
     A rigid motion T follows a local deformation D of the N points P0. Any time can be evaluated, in any order; the
     result does not depend on earlier calls. Points are in scene axes. From where a motion is not physically possible
     (`odeform.motion.watch`), the last sound moment is shown, as `status` says.
+
+    One that a predictor solved can be pickled, for other processes of one's own: it is solved again where it is read,
+    to the same bits.
 
     Attributes:
         schema: That of the predictor.

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from odeform.motion.trajectory import Trajectory
+from odeform.motion.trajectory import Moving
 from odeform.types import Floats, Times
 
 __all__ = ["FloorProjection"]
@@ -23,33 +23,37 @@ class FloorProjection:
 
     def __init__(
         self,
-        own: Trajectory,
+        own: Moving,
         lowest: Callable[[Floats], Floats],
         limit: float,
         grid: Float[np.ndarray, " grid"] | None = None,
     ) -> None:
-        """`lowest` maps coordinates (T, 6 + K) of `own` to the height of the lowest point (T,) in m, which may be
+        """`lowest` maps coordinates (R, 6 + K) of `own` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
         With `grid`, in s, the change is linear between these times, and stays as it is after them.
         """
         self._own, self._lowest, self._limit, self._grid = own, lowest, limit, grid
 
-    def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "times y"]:
-        """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K)."""
-        by = self._by(y) if self._grid is None else np.interp(times, self._grid, self._on_grid)
+    def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
+        """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
+        by = self._by(y) if self._grid is None else self._between(times, self._grid).reshape(y.shape[:-1])
         if by.any():
             y = y.copy()
-            y[:, 2] += by
+            y[..., 2] += by
         return y
+
+    def _between(self, times: Times, grid: Times) -> Float[np.ndarray, "batch times"]:
+        """Of each motion, from the changes on the grid."""
+        return np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
 
     @cached_property
     def _on_grid(self) -> Floats:
-        """(G,) m at the times of the grid."""
+        """(G,) m at the times of the grid, or (B, G)."""
         assert self._grid is not None
         return self._by(self._own.reduced(self._grid))
 
     def _by(self, y: Floats) -> Floats:
-        """(T,) m by which coordinates (T, 6 + K) are raised."""
-        deeper = self._limit - self._lowest(y)
+        """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
+        deeper = self._limit - self._lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
         return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite

@@ -18,7 +18,7 @@ from odeform.motion.watch import Sample, Watch
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
-__all__ = ["ReducedMotion", "as_reduced"]
+__all__ = ["ReducedMotion", "as_reduced", "moved_points", "placements", "poses_of"]
 
 SEVERAL = 4  # points that are rotated as one: products with three rows leave most vector lanes unused
 BLOCK = 1 << 16  # points times frames that are worked on at once: they stay in the cache until they are rotated
@@ -70,37 +70,11 @@ class ReducedMotion(Motion):
 
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)
-        rotation, shift = self._rotation_shift(y)
-        # deformed and shifted in the body's own axes, which is one product for all times, then rotated
-        ahead = np.einsum("ti,tij->tj", shift + self.space.anchor, rotation)
-        weights = np.concatenate([ahead, np.ones((len(y), 1)), y[:, 6:]], axis=1).astype(np.float32)
-        rotations = rotation.swapaxes(-1, -2).astype(np.float32)
-        count = len(self.evaluated.points)
-        out = np.empty((len(y), 3 * count), dtype=np.float32)
-        size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
-
-        def fill(begin: int) -> None:
-            columns = slice(3 * begin, 3 * (begin + size))
-            _rotate(weights @ self.evaluated.rows[:, columns], rotations, out[:, columns])
-
-        begins = range(0, count, size)
-        if len(begins) >= MANY:
-            thread_map(fill, begins)
-        else:
-            for begin in begins:
-                fill(begin)
-        out = out.reshape(len(y), count, 3)
-        # P(0) is bit-exactly P0
-        out[~y.any(axis=1)] = self.evaluated.points
+        out = moved_points(self.evaluated, y, *placements(self.space, y, self.schema.azimuth(self.parameters)))
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
-        rotation, shift = self._rotation_shift(self._reduced(t))
-        rotation = rotation @ self._to_canonical_axes
-        out = np.zeros((len(rotation), 4, 4))
-        out[:, :3, :3] = rotation
-        out[:, :3, 3] = shift + self.space.anchor - rotation @ self.space.anchor
-        out[:, 3, 3] = 1.0
+        out = poses_of(self.space, self._reduced(t), self.schema.azimuth(self.parameters))
         return out[0] if np.ndim(t) == 0 else out
 
     def local(self, t: float | Times) -> Points | Frames:
@@ -175,6 +149,49 @@ def as_reduced(motion: Motion) -> ReducedMotion:
     if not isinstance(motion, ReducedMotion):
         raise InputError(f"expected a motion of reduced coordinates, got {type(motion).__name__}")
     return motion
+
+
+def placements(space: ReducedSpace, y: Floats, azimuth: float) -> tuple[Floats, Rotations]:
+    """Weights (T, 4 + K) of `EvaluatedBasis.rows`, which deform a body and shift it in its own axes, and rotations
+    (T, 3, 3) that follow, for rows; both float32. Of coordinates `y` (T, 6 + K) at an azimuth in radians."""
+    rotation, shift = rotation_of(y[:, :6], azimuth)
+    ahead = np.einsum("ti,tij->tj", shift + space.anchor, rotation)
+    weights = np.concatenate([ahead, np.ones((len(y), 1)), y[:, 6:]], axis=1).astype(np.float32)
+    return weights, rotation.swapaxes(-1, -2).astype(np.float32)
+
+
+def moved_points(evaluated: EvaluatedBasis, y: Floats, weights: Floats, rotations: Rotations) -> Frames:
+    """(T, N, 3) float32 metres: the points of a geometry under coordinates `y` (T, 6 + K), from their `placements`."""
+    count = len(evaluated.points)
+    out = np.empty((len(y), 3 * count), dtype=np.float32)
+    size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
+
+    def fill(begin: int) -> None:
+        columns = slice(3 * begin, 3 * (begin + size))
+        # one product for all times
+        _rotate(weights @ evaluated.rows[:, columns], rotations, out[:, columns])
+
+    begins = range(0, count, size)
+    if len(begins) >= MANY:
+        thread_map(fill, begins)
+    else:
+        for begin in begins:
+            fill(begin)
+    out = out.reshape(len(y), count, 3)
+    # P(0) is bit-exactly P0
+    out[~y.any(axis=1)] = evaluated.points
+    return out
+
+
+def poses_of(space: ReducedSpace, y: Floats, azimuth: float) -> Pose:
+    """(T, 4, 4) rigid parts in scene axes, metres, of coordinates `y` (T, 6 + K) at an azimuth in radians."""
+    rotation, shift = rotation_of(y[:, :6], azimuth)
+    rotation = rotation @ rotation_of(np.zeros(6), azimuth)[0].T
+    out = np.zeros((len(rotation), 4, 4))
+    out[:, :3, :3] = rotation
+    out[:, :3, 3] = shift + space.anchor - rotation @ space.anchor
+    out[:, 3, 3] = 1.0
+    return out
 
 
 def _turned(axes: Axes, rotation: Rotations) -> Axes:

@@ -10,10 +10,19 @@ from odeform.locks import Lock
 from odeform.motion.base import SolveStats
 from odeform.types import Floats, Times
 
-__all__ = ["Adjusted", "Adjustment", "Piecewise", "Trajectory"]
+__all__ = ["Adjusted", "Adjustment", "Moving", "Piecewise", "Trajectory"]
 
 Adjustment = Callable[[Times, Floats], Floats]
-"""(T,) seconds and coordinates (T, n) there -> coordinates (T, m)."""
+"""(T,) seconds and coordinates (T, n) there -> coordinates (T, m); of many motions, (B, T, n) -> (B, T, m)."""
+
+
+@runtime_checkable
+class Moving(Protocol):
+    """What has reduced coordinates over time: one motion, or many."""
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "*batch times y"]:
+        """(T,) seconds -> (T, 6 + K), or (B, T, 6 + K)."""
+        ...
 
 
 @runtime_checkable

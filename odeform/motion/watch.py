@@ -18,7 +18,7 @@ from odeform.motion.recent import Recent
 from odeform.schema import Window
 from odeform.types import Floats, Ints, Times
 
-__all__ = ["Sample", "Stop", "Watch"]
+__all__ = ["CHUNK", "COARSE", "FINER", "SOUND", "Sample", "Stop", "Watch", "energy_of", "faults_of"]
 
 FINER = 2  # grid times per trained frame: a body that falls at 3 m/s moves by 12 mm between them
 REFINED = 32  # parts of a grid interval, which are divided once more: 4 microseconds at 120 Hz
@@ -108,7 +108,7 @@ class Watch:
         """(T,) what is wrong, energy aside; `SOUND` where nothing is."""
         if not len(times):
             return np.zeros(0, dtype=int)
-        return _faults(self.sample(times), self._limits)
+        return faults_of(self.sample(times), self._limits)
 
     def _last_sound(self, time: float) -> Stop:
         """The last sound moment in the window before `time`, which is not sound."""
@@ -142,7 +142,7 @@ class Watch:
             return
         times = stop + self._step * np.arange(steps - 1, steps + CHUNK + 2)
         sample = self.sample(times)
-        faults = _faults(sample, self._limits)[1:-1]
+        faults = faults_of(sample, self._limits)[1:-1]
         driven = self._energy(times, sample) > self._limits.energy * self._most_energy
         faults[(faults == SOUND) & driven] = DRIVEN
         wrong = np.flatnonzero(faults[1:] != SOUND)
@@ -155,10 +155,7 @@ class Watch:
 
     def _energy(self, times: Times, sample: Sample) -> Floats:
         """(T - 2,) energy of the centre, per mass, at all but the first and the last of evenly spaced times."""
-        with np.errstate(all="ignore"):
-            speed = (sample.centre[2:] - sample.centre[:-2]) / (times[2:] - times[:-2])[:, None]
-            height = sample.centre[1:-1, 2] - self._ground
-            return self._limits.gravity * height + 0.5 * (speed**2).sum(axis=1)
+        return energy_of(times, sample.centre, self._ground, self._limits.gravity)
 
     @cached_property
     def _coarse(self) -> tuple[Times, Sample]:
@@ -176,7 +173,18 @@ class Watch:
         return float(self._energy(*self._coarse).max())
 
 
-def _faults(sample: Sample, limits: Limits) -> Ints:
+def energy_of(
+    times: Times, centres: Float[np.ndarray, "*batch times 3"], ground: float | Floats, gravity: float
+) -> Floats:
+    """(..., T - 2) energies of centres (..., T, 3) m above `ground` m, per mass, at all but the first and the last of
+    evenly spaced `times` (T,) s."""
+    with np.errstate(all="ignore"):
+        speed = (centres[..., 2:, :] - centres[..., :-2, :]) / (times[2:] - times[:-2])[:, None]
+        return gravity * (centres[..., 1:-1, 2] - ground) + 0.5 * (speed**2).sum(axis=-1)
+
+
+def faults_of(sample: Sample, limits: Limits) -> Ints:
+    """(T,) what is wrong with each moment, energy aside; `SOUND` where nothing is."""
     finite = np.isfinite(sample.lowest) & np.isfinite(sample.deformation) & np.isfinite(sample.centre).all(axis=1)
     out = np.where(finite, SOUND, NON_FINITE)
     with np.errstate(invalid="ignore"):

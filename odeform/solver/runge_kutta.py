@@ -13,7 +13,7 @@ from odeform.solver.method import Field
 from odeform.solver.tableau import Row, Tableau, rounded
 from odeform.types import Floats
 
-__all__ = ["ExplicitRungeKutta", "Stages", "gemv"]
+__all__ = ["ExplicitRungeKutta", "Stages", "Weights", "gemv", "weights_of"]
 
 
 def gemv(dtype: np.dtype) -> Callable[..., Any]:
@@ -31,7 +31,7 @@ class Stages:
     """
 
     def __init__(self, tableau: Tableau, start: Any) -> None:
-        weights = _weights(tableau, start.dtype)
+        weights = weights_of(tableau, start.dtype)
         self.evaluations = len(weights.stages)
         """Evaluations of the field per step."""
         self._slopes = np.empty((len(start), self.evaluations + 1), start.dtype, order="F")
@@ -52,12 +52,12 @@ class Stages:
 
     def step(self, field: Field, time: float, state: Any, slope: Any, step: float) -> tuple[Any, Any]:
         """One step from `state` (n,) with `slope` (n,) at `time`: the state after it, and the slope there."""
-        after = state
-        self._slopes[:, 0] = slope
-        for index, weighted, node in self._stages:
-            after = self._advanced(state, weighted, step)
+        after, kept, product = state, self._slopes, self._product
+        kept[:, 0] = slope
+        for index, (slopes, weights), node in self._stages:
+            after = product(step, slopes, weights, 1.0, state)
             slope = field(time + node * step, after)
-            self._slopes[:, index] = slope
+            kept[:, index] = slope
         return after, slope
 
     def error(self, step: float) -> Any:
@@ -70,7 +70,7 @@ class Stages:
         return self._advanced(state, self._middle, step)
 
 
-class _Weights(NamedTuple):
+class Weights(NamedTuple):
     """A tableau in one precision."""
 
     stages: list[Floats]
@@ -80,7 +80,8 @@ class _Weights(NamedTuple):
 
 
 @cache  # rounding fractions takes longer than a few steps
-def _weights(tableau: Tableau, dtype: np.dtype) -> _Weights:
+def weights_of(tableau: Tableau, dtype: np.dtype) -> Weights:
+    """Round the weights of a tableau to a precision."""
     last: tuple[Row, ...] = () if tableau.fsal else (tableau.b,)
     nodes = (*tableau.c[1:], *(Fraction(1) for _ in last))
     error = np.empty(0, dtype)
@@ -88,7 +89,7 @@ def _weights(tableau: Tableau, dtype: np.dtype) -> _Weights:
         # both are rounded before they are subtracted, which step control has always been computed with
         wide = np.promote_types(dtype, np.float64)
         error = (rounded(tableau.b, wide) - rounded(tableau.embedded, wide)).astype(dtype)
-    return _Weights(
+    return Weights(
         [rounded(row, dtype) for row in (*tableau.a[1:], *last)],
         [float(node) for node in nodes],
         error,

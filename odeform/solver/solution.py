@@ -9,7 +9,7 @@ import numpy as np
 from odeform.locks import Lock
 from odeform.types import Floats
 
-__all__ = ["Solution", "Status"]
+__all__ = ["Solution", "Status", "between", "hermite_weights"]
 
 
 class Status(Enum):
@@ -75,10 +75,10 @@ class Solution:
         step = self.times[index + 1] - self.times[index]
         s = min(max((time - self.times[index]) / step, 0.0), 1.0)
         middle = self.middles[index] if self.middles else None
-        weights = _weights(s, step)
+        weights = hermite_weights(s, step)
         y0, y1 = self.states[index : index + 2]
         f0, f1 = self.slopes[index : index + 2]
-        return _between(weights, y0, y1, f0, f1, middle)
+        return between(weights, y0, y1, f0, f1, middle)
 
     def sample(self, times: Floats) -> Any:
         """(T, n) states at `times` (T,) s, bit-identical to `at`."""
@@ -93,11 +93,11 @@ class Solution:
         )
         middle = np.stack([self.middles[i] for i in index]) if self.middles else None
         like = (len(times), *(1,) * (y0.ndim - 1))
-        weights = [weight.astype(y0.dtype).reshape(like) for weight in _weights(s, step)]
-        return _between(weights, y0, y1, f0, f1, middle)
+        weights = [weight.astype(y0.dtype).reshape(like) for weight in hermite_weights(s, step)]
+        return between(weights, y0, y1, f0, f1, middle)
 
 
-def _weights(s: Any, step: Any) -> list[Any]:
+def hermite_weights(s: Any, step: Any) -> list[Any]:
     """Cubic weights of both states and slopes at the fraction `s` of a step, `step` / 8, and the quartic bubble."""
     rest = 1.0 - s
     return [
@@ -110,7 +110,9 @@ def _weights(s: Any, step: Any) -> list[Any]:
     ]
 
 
-def _between(weights: list[Any], y0: Any, y1: Any, f0: Any, f1: Any, middle: Any | None) -> Any:
+def between(weights: list[Any], y0: Any, y1: Any, f0: Any, f1: Any, middle: Any | None) -> Any:
+    """The state within a step, by `hermite_weights`, from states and slopes at both ends: cubic, or quartic with the
+    state in the `middle`. States (n,), or arrays that broadcast."""
     w0, w1, v0, v1, eighth, bubble = weights
     cubic = w0 * y0 + w1 * y1 + v0 * f0 - v1 * f1
     if middle is None:

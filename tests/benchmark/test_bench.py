@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from odeform.benchmark import bench, comparisons, precision, roofline
+from odeform.benchmark import batch, bench, comparisons, precision, roofline
 from odeform.cli import main
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
@@ -31,6 +31,8 @@ def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
         (comparisons, "bundled_checkpoints", lambda: {f"kick/{m}": p for m, p in trained.items() if m != "nearest"}),
         (comparisons, "load", lambda name: full_load(trained[name.split("/")[1]])),
         (bench, "POINTS", 100),
+        (batch, "MOTIONS", 3),
+        (batch, "LOOP", 2),
         (bench, "SPLATS", 1000),
     ):
         monkeypatch.setattr(module, name, value)
@@ -71,6 +73,8 @@ def test_bench(
     }
     assert result["peers"]["this model"]["error_mm"] > 0.0
     assert {"gemm_gflops", "memory_gb_s", "decode_share_of_limit"} < set(result["limits"])
+    assert result["batch"]["motions"] == 3
+    assert min(result["batch"][key] for key in ("ms_a_motion", "loop_ms_a_motion")) > 0.0
     assert "mujoco, equal error: skipped, no time" in text
     for word in ("bosh3", "frontier", "pod-rbf", "decode_share_of_limit"):
         assert word in text

@@ -1,7 +1,7 @@
 """Code blocks of the README and the docs, with the marks that say how a test treats them.
 
 A comment before a block sets its mark: `<!-- test: slow -->` and `<!-- test: run -->` (a bash block whose commands are
-really run), `<!-- test: skip, REASON -->`, or `<!-- test: needs MODULE.CLASS.ATTRIBUTE -->`, where it is not there yet.
+really run), or `<!-- test: skip, REASON -->`.
 """
 
 import re

@@ -27,22 +27,11 @@ def python_pages(slow: bool) -> list[Path]:
     return sorted({b.page for b in of("python") if b.page != WORKED and (b.page in marked or not slow)})
 
 
-def is_there(mark: str) -> bool:
-    """Whether what a block needs exists: a class of a module and one of its attributes, by its full name."""
-    if not mark.startswith("needs "):
-        return True
-    module, kind, attribute = mark.removeprefix("needs ").rsplit(".", 2)
-    try:
-        return hasattr(getattr(importlib.import_module(module), kind), attribute)
-    except ModuleNotFoundError:
-        return False
-
-
 def run_python(page: Path, slow: bool) -> None:
     """The blocks of a page in order, in one namespace; lines of tracebacks are those of the page."""
     namespace: dict[str, object] = {"__name__": "docs"}
     for block in (b for b in blocks_of(page) if b.language == "python"):
-        if not block.mark.startswith("skip") and (slow or block.mark != "slow") and is_there(block.mark):
+        if not block.mark.startswith("skip") and (slow or block.mark != "slow"):
             exec(compile("\n" * block.line + block.code, str(page), "exec"), namespace)
 
 
@@ -111,4 +100,4 @@ def test_every_block_names_a_known_language():
 
 def test_every_mark_is_known_and_every_skip_has_a_reason():
     marks = {b.mark for b in BLOCKS}
-    assert all(mark in ("", "run", "slow") or mark.startswith(("skip, ", "needs ")) for mark in marks), marks
+    assert all(mark in ("", "run", "slow") or mark.startswith("skip, ") for mark in marks), marks

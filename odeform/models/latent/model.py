@@ -1,6 +1,6 @@
 """ODeform, ready to predict."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
@@ -10,22 +10,24 @@ from scipy.interpolate import CubicSpline
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.latent.config import ModelConfig
-from odeform.models.latent.inference import make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.latent.inference import make_batch_field, make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.latent.sensitivity import Sensitivities, make_sensitivities
 from odeform.models.latent.weights import check_weights
 from odeform.models.model import Model
 from odeform.models.residual import ParameterRegression, parameter_residual
 from odeform.models.solved import Problem
+from odeform.models.solved_batch import BatchProblem
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Times
+from odeform.types import Floats, Geometry, Times
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
 __all__ = ["PREFIX", "LatentModel"]
 
+DECODED = 32  # states at once: the features of many more leave the cache
 PREFIX = "net."
 """Prefix of the network's arrays in a checkpoint."""
 
@@ -36,6 +38,7 @@ class LatentModel(Model):
     model = "latent"
     resumable = True
     descends = True
+    together = 128
     ablations: ClassVar[Mapping[str, str]] = {
         "ode": "states stay as they start",
         "clock": "decoders are not conditioned on time",
@@ -59,6 +62,7 @@ class LatentModel(Model):
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
         self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
+        self._batch_fields = {d: make_batch_field(self.weights, self.config, d) for d in (np.float32, np.float64)}
         self.residual = parameter_residual(checkpoint.arrays, self.space.coordinates, self.config.parameters)
         self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
@@ -73,6 +77,24 @@ class LatentModel(Model):
         decode, start = self._decoder(theta), self._encode(self._pool(evaluated), theta, dtype)
         origin = decode(np.zeros(1), start[None])
         return Problem(self._fields[dtype](theta), start, lambda times, states: decode(times, states) - origin)
+
+    def batch_problem(
+        self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
+    ) -> Callable[[], BatchProblem]:
+        pooled = {each: self._pool(self.evaluate_basis(geometry, each)) for each in dict.fromkeys(azimuths.tolist())}
+        features = [np.stack(branch) for branch in zip(*(pooled[each] for each in azimuths.tolist()), strict=True)]
+        start = self._encode(features, theta, dtype)
+
+        def decoded(times: Times, states: Floats) -> Floats:
+            every, clock = np.repeat(theta, len(times), axis=0), np.tile(times, len(theta))
+            rows = states.reshape(len(every), -1)
+            parts = (slice(begin, begin + DECODED) for begin in range(0, len(every), DECODED))
+            y = np.concatenate([self._decoder(every[part])(clock[part], rows[part]) for part in parts])
+            return y.reshape(len(theta), len(times), -1)
+
+        origin = decoded(np.zeros(1), start[:, None])
+        field = self._batch_fields[dtype](theta)
+        return lambda: BatchProblem(field, start, lambda times, states: decoded(times, states) - origin)
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Float[np.ndarray, "jet times y"]:
         """(1 + P, T, 6 + K): the motion y of the trained body under theta (P,) in [-1, 1] at (T,) seconds, and its

@@ -1,17 +1,19 @@
 """ODeform for bodies of known shape and material: the ODE is reduced mechanics, with few learned numbers."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
 from odeform.mechanics.law import MechanicalLaw
-from odeform.mechanics.push import make_push
-from odeform.mechanics.pushed import PushedBody
+from odeform.mechanics.push import Push, make_push
+from odeform.mechanics.pushed import PushedBody, body_motion
+from odeform.mechanics.pushed_batch import PushedBodies
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import contact_residual
@@ -19,13 +21,16 @@ from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_
 from odeform.models.modal.elastic_body import ElasticBody
 from odeform.models.model import Model
 from odeform.models.solved import Problem
+from odeform.models.solved_batch import BatchProblem
+from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import ReducedSpace
-from odeform.motion.trajectory import Adjusted, Trajectory
+from odeform.motion.trajectory import Adjusted, Moving, Trajectory
+from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Basis, Floats, Times, Vector
+from odeform.types import Basis, Floats, Geometry, Times, Vectors
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
@@ -49,6 +54,7 @@ class ModalModel(Model):
     """The motion of one elastic body on the floor that a projectile pushes."""
 
     model = "modal"
+    together = 32
     accurate = QUALITIES["reference"]
     rescales_input = False
     fallback = SolverSettings("limex", step=2.5e-3, dtype="float64")
@@ -74,7 +80,7 @@ class ModalModel(Model):
         self.qualities = self.qualities or QUALITIES
         if "correction" in config:
             self.residual = contact_residual(checkpoint.arrays, config["correction"])
-        self._recent: Recent[tuple[ContactInputs, Vector]] = Recent(1)
+        self._recent: Recent[tuple[ContactInputs, Vectors]] = Recent(1)
 
     # these take a moment, and not every object of a checkpoint is looked at
 
@@ -97,40 +103,65 @@ class ModalModel(Model):
         """That of its coordinates."""
         return space_of(self.body, self._coordinates[1], self._largest)
 
-    def _pushed(self, theta: Floats) -> tuple[ContactInputs, Vector]:
-        """What pushes at theta (P,), relative to the mass centre, and the centre (3,) of the sphere."""
+    def _pushed(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[ContactInputs, Vectors]:
+        """What pushes at theta (B, P), relative to the mass centre, and the centres (B, 3) of the spheres."""
 
-        def found() -> tuple[ContactInputs, Vector]:
-            values = [p.denormalise(float(x)) for p, x in zip(self.schema.learned, theta, strict=True)]
-            contact, force = np.array(values[:3]), np.array(values[3:])
-            point, centre = checked_contact(self.rest, contact, force)
-            anchor = self.body.anchor
-            return ContactInputs(point.point[None] - anchor, point.normal[None], force[None]), centre - anchor
+        def found() -> tuple[ContactInputs, Vectors]:
+            values = [[p.denormalise(float(x)) for p, x in zip(self.schema.learned, row, strict=True)] for row in theta]
+            contacts, forces = np.split(np.array(values), [3], axis=1)
+            known = [checked_contact(self.rest, *one) for one in zip(contacts, forces, strict=True)]
+            points, normals = (np.stack([getattr(point, name) for point, _ in known]) for name in ("point", "normal"))
+            anchor, centres = self.body.anchor, np.stack([centre for _, centre in known])
+            return ContactInputs(points - anchor, normals, forces), centres - anchor
 
         return self._recent.get(theta.tobytes(), found)
 
+    def _push(self, theta: Float[np.ndarray, "batch parameters"]) -> Push:
+        inputs, centres = self._pushed(theta)
+        return make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centres, inputs.force)
+
+    def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> Callable[[Times, Floats], Floats]:
+        """That of states in the directions of deformation of one push."""
+        coordinates = self.coordinates.along(modes)
+        return lambda times, states: coordinates.reduced(*body_motion(states))
+
     def residual_inputs(self, theta: Floats) -> ContactInputs:
-        return self._pushed(theta)[0]
+        return self._pushed(np.atleast_2d(theta))[0]
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """Of one push; always in double precision."""
-        inputs, centre = self._pushed(theta)
-        push = make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centre[None], inputs.force)
-        pushed, coordinates = PushedBody(self.mechanics, push, self.pulse), self.coordinates.along(push.modes[0])
+        push = self._push(theta[None])
+        pushed = PushedBody(self.mechanics, push, self.pulse)
+        return Problem(pushed, pushed.start, self._readout(push.modes[0]))
 
-        def readout(times: Times, states: Floats) -> Floats:
-            return coordinates.reduced(*pushed.body_motion(states)[:3])
+    def batch_problem(
+        self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
+    ) -> Callable[[], BatchProblem]:
+        def make() -> BatchProblem:
+            push = self._push(theta)
+            bodies = PushedBodies(self.mechanics, push, self.pulse)
+            readouts = [self._readout(modes) for modes in push.modes]
 
-        return Problem(pushed, pushed.start, readout)
+            def readout(times: Times, states: Floats) -> Floats:
+                return np.stack([read(times, each) for read, each in zip(readouts, states, strict=True)])
+
+            return BatchProblem(bodies, bodies.start, readout)
+
+        return make
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        motion, body = super().trajectory(theta, evaluated, settings, until), self.watched_body
-        window = self.schema.window
+        motion = super().trajectory(theta, evaluated, settings, until)
+        return Adjusted(motion, self._projection(motion))
+
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        motion = super().batch_trajectory(geometry, sets, settings, until)
+        return AdjustedBatch(motion, self._projection(motion))
+
+    def _projection(self, motion: Moving) -> FloorProjection:
+        body, window = self.watched_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-
-        def lowest(y: Floats) -> Floats:
-            return body.sample(y, np.ones(len(y))).lowest
-
-        return Adjusted(motion, FloorProjection(motion, lowest, body.limit + SPARE, grid))
+        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)

@@ -57,7 +57,10 @@ class _Transferred:
     coefficients: Float[np.ndarray, "known coefficients"]
 
     def frames(self, inputs: ContactInputs) -> Floats:
-        """(T, 6 + K) of one push."""
+        """(T, 6 + K) of one push, (B, T, 6 + K) of several."""
+        if len(inputs.contact) > 1:
+            vectors = zip(inputs.contact, inputs.normal, inputs.force, strict=True)
+            return np.stack([self.frames(ContactInputs(*(vector[None] for vector in one))) for one in vectors])
         near, anchor = nearest_on(self.part.rest, inputs.contact[0] + self.offset), self.part.body.anchor
         there = ContactInputs(near.point[None] - anchor, near.normal[None], inputs.force)
         found = self.weight * self.known.regression.frames(there)

@@ -160,6 +160,9 @@ class UserBodyPredictor(ModalModel):
         self.knows_foreign_errors = self._band is not None
         self._sizes: Recent[float] = Recent(SIZES)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return UserBodyPredictor, (self.trained, self.own)
+
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
         return self.own.item.forces
 

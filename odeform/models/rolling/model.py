@@ -1,7 +1,7 @@
 """ODeform for a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under a learned law of
 contact."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
@@ -9,23 +9,28 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
-from odeform.mechanics.rolling.dynamics import MOVING, STATE
+from odeform.mechanics.rolling.dynamics import MOVING, STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.model import Model
 from odeform.models.residual import parameter_residual
+from odeform.models.rolling.batch import batch_field
 from odeform.models.rolling.phases import Push, rising
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import push_inputs, read_start
 from odeform.models.solved import Problem, SolvedTrajectory
+from odeform.models.solved_batch import BatchProblem, SolvedBatch
+from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.reduced_space import POSE
-from odeform.motion.trajectory import Adjusted, Piecewise, Trajectory
+from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
+from odeform.schema import Parameters
+from odeform.solver.batch_steps import BatchField
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
-from odeform.types import Floats, Times, Vector
+from odeform.types import Floats, Geometry, Times, Vector
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
@@ -40,17 +45,18 @@ UNTURNED = np.array([0.0, 1.0, 0.0])
 """The axis of a body that does not turn: any level one."""
 
 
-def placed(moved: Float[np.ndarray, "rows 3"], axis: Vector) -> Float[np.ndarray, "rows 6"]:
-    """(R, 3) ahead, up (m) and angle (rad), about the level unit vector `axis` -> (R, 6): shift (m), rotation vector.
-    The same of their rates."""
+def placed(moved: Float[np.ndarray, "*rows 3"], axis: Vector) -> Float[np.ndarray, "*rows 6"]:
+    """(..., 3) ahead, up (m) and angle (rad), about the level unit vector `axis` -> (..., 6): shift (m), rotation
+    vector. The same of their rates."""
     ahead = np.cross(axis, UP)
-    return np.concatenate([moved[:, :1] * ahead + moved[:, 1:2] * UP, moved[:, 2:] * axis], axis=1)
+    return np.concatenate([moved[..., :1] * ahead + moved[..., 1:2] * UP, moved[..., 2:] * axis], axis=-1)
 
 
 class RollingModel(Model):
     """The motion of one round body in a plane, or up and down."""
 
     model = "rolling"
+    together = 256
     continues_itself = True
     fallback = SolverSettings("rk4", step=1e-3, dtype="float64")
     finer = MappingProxyType(FINER)
@@ -92,75 +98,138 @@ class RollingModel(Model):
 
         Angle and spin of states are the way and the speed of the rim (`units_of`).
         """
-        material = theta[self._materials]
-        start = np.zeros(STATE)
-        start[: 2 * MOVING] = self._start(push_inputs(self.schema, theta[None]))[0]
-        pose = self._decoded(start[None], material)[0, :POSE]
-        push = Push(self.begin, pose, placed(start[None, MOVING : 2 * MOVING], self._axis)[0], self.space.coordinates)
+        start, readout = self._begun(theta)
+        return Problem(self._field(theta), start.astype(dtype), readout, self.begin)
+
+    def batch_problem(
+        self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
+    ) -> Callable[[], BatchProblem]:
+        start, readout = self._begun(theta)
+        return lambda: BatchProblem(self._batch_field(theta), start.astype(dtype), readout, self.begin)
+
+    def _field(self, theta: Floats) -> Field:
+        return make_field(self.law, self._support, self._radius, theta[self._materials])
+
+    def _batch_field(self, theta: Float[np.ndarray, "batch parameters"]) -> BatchField:
+        return batch_field(
+            lambda some: RollingDynamics(self.law, self._support, self._radius, some),
+            theta[:, self._materials],
+            self._units,
+        )
+
+    def _begun(self, theta: Float[np.ndarray, "*batch parameters"]) -> tuple[Floats, Callable[[Times, Floats], Floats]]:
+        """States (..., 8) when the push is over, and the readout from then on, for theta (..., P)."""
+        material = theta[..., self._materials]
+        # one by one, to the last bit: a landing that comes a moment later on a corner amplifies what differs
+        moving = [self._start(push_inputs(self.schema, each[None]))[0] for each in np.atleast_2d(theta)]
+        start = np.zeros((*theta.shape[:-1], STATE))
+        start[..., : 2 * MOVING] = np.reshape(moving, (*theta.shape[:-1], 2 * MOVING))
+        pose = self._decoded(start[..., None, :], material)[..., 0, :POSE]
+        rate = placed(start[..., MOVING : 2 * MOVING], self._axis)
+        push = Push(self.begin, pose, rate, self.space.coordinates)
 
         def readout(times: Times, states: Floats) -> Floats:
             y = self._decoded(states / self._units, material)
             # how the push deforms the body does not follow from the motion: it is regressed
-            y[:, POSE:] *= rising(times - self.begin)[:, None]
+            y[..., POSE:] *= rising(times - self.begin)[:, None]
             early = times < self.begin
-            y[early] = push(times[early])
+            y[..., early, :] = push(times[early])
             return y
 
-        return Problem(self._field(material), (start * self._units).astype(dtype), readout, self.begin)
+        return start * self._units, readout
 
-    def _field(self, material: Floats) -> Field:
-        return make_field(self.law, self._support, self._radius, material)
+    def _decoded(
+        self, states: Float[np.ndarray, "*batch times states"], material: Float[np.ndarray, "*batch materials"]
+    ) -> Float[np.ndarray, "*batch times y"]:
+        """States (..., T, 8) of bodies of materials (..., Q) -> (..., T, 6 + S)."""
+        rows, bodies, times = states.reshape(-1, STATE), np.atleast_2d(material), states.shape[-2]
+        touch = 1e-3 * self.law.coefficients(bodies)["touch"]
+        deformation = self._readout(inputs_of(rows.T, np.repeat(touch, times), np.repeat(bodies, times, axis=0)))
+        moved = rows[:, :MOVING] - [0.0, self._clearance, 0.0]
+        y = np.concatenate([placed(moved, self._axis), deformation], axis=1)
+        return y.reshape(*states.shape[:-1], -1)
 
-    def _decoded(self, states: Float[np.ndarray, "rows states"], material: Floats) -> Float[np.ndarray, "rows y"]:
-        """States (R, 8) of a body of this material (Q,) -> (R, 6 + S)."""
-        each = np.tile(material, (len(states), 1))
-        touch = 1e-3 * self.law.coefficients(each[:1])["touch"]
-        deformation = self._readout(inputs_of(states.T, np.repeat(touch, len(states)), each))
-        moved = states[:, :MOVING] - [0.0, self._clearance, 0.0]
-        return np.concatenate([placed(moved, self._axis), deformation], axis=1)
+    @property
+    def _restart(self) -> float | None:
+        """Seconds from which on motions are solved anew; None where they are not."""
+        stop = np.inf if self.residual is None else self.residual.stop
+        return stop if self.schema.window.stop <= stop < np.inf else None
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         assert settings is not None
-        stop, window = np.inf if self.residual is None else self.residual.stop, self.schema.window
-        restarts = window.stop <= stop < np.inf
-        motion = super().trajectory(theta, evaluated, settings, min(until, stop) if restarts else until)
-        if restarts:
+        stop = self._restart
+        motion = super().trajectory(theta, evaluated, settings, until if stop is None else min(until, stop))
+        if stop is not None:
             assert isinstance(motion, Adjusted)
             corrected = motion
             motion = Piecewise(motion, stop, lambda: self._restarted(theta, corrected, settings, stop, until))
         return Adjusted(motion, FloorProjection(motion, self._lowest_points, self._lowest))
 
+    def batch_trajectory(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        stop = self._restart
+        motion = super().batch_trajectory(geometry, sets, settings, until if stop is None else min(until, stop))
+        if stop is not None:
+            assert isinstance(motion, AdjustedBatch)
+            theta, corrected = self.schema.batch_inputs(sets), motion
+            motion = PiecewiseBatch(
+                motion, stop, lambda: self._restarted_batch(theta, corrected, settings, stop, until)
+            )
+        return AdjustedBatch(motion, FloorProjection(motion, self._lowest_points, self._lowest))
+
     def _restarted(
         self, theta: Floats, corrected: Adjusted, settings: SolverSettings, stop: float, until: float
     ) -> Trajectory:
         """What is solved from `stop` seconds on, from where the corrected motion is, and as it moves there."""
-        solved, material = corrected.own, theta[self._materials]
+        solved = corrected.own
         assert isinstance(solved, SolvedTrajectory)
-        added = self._units * self._added(solved, corrected, stop)
-        start = (solved.states(np.array([stop]))[0] + added).astype(settings.dtype)
-        end, first = corrected.reduced(np.array([stop]))[0], self._decoded(start[None] / self._units, material)[0]
+        start, readout = self._resumed(theta, solved, corrected, stop)
+        problem = Problem(self._field(theta), start.astype(settings.dtype), readout, stop)
+        return self._solved(problem, lambda: problem._replace(start=problem.start.astype(float)), settings, until)
+
+    def _restarted_batch(
+        self, theta: Floats, corrected: AdjustedBatch, settings: SolverSettings, stop: float, until: float
+    ) -> BatchTrajectory:
+        solved = corrected.own
+        assert isinstance(solved, SolvedBatch)
+        start, readout = self._resumed(theta, solved, corrected, stop)
+        problem = BatchProblem(self._batch_field(theta), start.astype(settings.dtype), readout, stop)
+        return SolvedBatch(lambda: problem, settings, until, 1.0 / self.schema.window.rate)
+
+    def _resumed(
+        self, theta: Floats, solved: SolvedTrajectory | SolvedBatch, corrected: Moving, stop: float
+    ) -> tuple[Floats, Callable[[Times, Floats], Floats]]:
+        """States (..., 8) of the corrected motions at `stop` seconds, and the readout from then on."""
+        material, times = theta[..., self._materials], np.array([stop])
+        start = solved.states(times)[..., 0, :] + self._units * self._added(solved, corrected, stop)
+        end, first = corrected.reduced(times), self._decoded(start[..., None, :] / self._units, material)
         # what the residual adds to the deformation gives way to what follows from the motion
-        given_up = np.concatenate([np.zeros(POSE), end[POSE:] - first[POSE:]])
+        given_up = end - first
+        given_up[..., :POSE] = 0.0
 
         def readout(times: Times, states: Floats) -> Floats:
             moved = self._decoded(states / self._units, material) - first
             return end + moved - rising(times - stop)[:, None] * given_up
 
-        problem = Problem(self._field(material), start, readout, stop)
-        return self._solved(problem, lambda: problem._replace(start=start.astype(float)), settings, until)
+        return start, readout
 
-    def _added(self, solved: Trajectory, corrected: Trajectory, time: float) -> Float[np.ndarray, "8"]:
+    def _added(self, solved: Moving, corrected: Moving, time: float) -> Float[np.ndarray, "*batch 8"]:
         """What the residual adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
         so short that corrected frames do not tell the velocity."""
-        frame = 1.0 / self.schema.window.rate
-        times = np.array([time - frame, time])
-        added = corrected.reduced(times)[:, :POSE] - solved.reduced(times)[:, :POSE]
-        moved = np.stack([added[:, :3] @ np.cross(self._axis, UP), added[:, 2], added[:, 3:] @ self._axis], axis=1)
+        rate = self.schema.window.rate
+        times = np.array([time - 1.0 / rate, time])
+        added = corrected.reduced(times)[..., :POSE] - solved.reduced(times)[..., :POSE]
+        moved = np.stack(
+            [added[..., :3] @ np.cross(self._axis, UP), added[..., 2], added[..., 3:] @ self._axis], axis=-1
+        )
         if self.space.rolling is None:
-            moved[:, [0, 2]] = 0.0
-        return np.concatenate([moved[1], (moved[1] - moved[0]) / frame, np.zeros(STATE - 2 * MOVING)])
+            moved[..., [0, 2]] = 0.0
+        before, now = moved[..., 0, :], moved[..., 1, :]
+        rest = np.zeros((*now.shape[:-1], STATE - 2 * MOVING))
+        return np.concatenate([now, (now - before) * rate, rest], axis=-1)
 
     def _lowest_points(self, y: Float[np.ndarray, "times y"]) -> Times:
         """(T, 6 + S) -> (T,) heights in m of the body's lowest point."""

@@ -19,15 +19,16 @@ class Push:
 
     begin: float
     """s."""
-    pose: Float[np.ndarray, "6"]
-    rate: Float[np.ndarray, "6"]
+    pose: Float[np.ndarray, "*batch 6"]
+    rate: Float[np.ndarray, "*batch 6"]
     coordinates: int
 
-    def __call__(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s from 0 to `begin` -> (T, 6 + S), without deformation."""
+    def __call__(self, times: Times) -> Float[np.ndarray, "*batch times y"]:
+        """(T,) s from 0 to `begin` -> (T, 6 + S), without deformation; of several pushes, (B, T, 6 + S)."""
         part = (times / self.begin)[:, None]
-        out = np.zeros((len(times), self.coordinates))
-        out[:, :POSE] = part**2 * (3.0 - 2.0 * part) * self.pose + part**2 * (part - 1.0) * self.begin * self.rate
+        pose, rate = self.pose[..., None, :], self.rate[..., None, :]
+        out = np.zeros((*self.pose.shape[:-1], len(times), self.coordinates))
+        out[..., :POSE] = part**2 * (3.0 - 2.0 * part) * pose + part**2 * (part - 1.0) * self.begin * rate
         return out
 
 

@@ -1,0 +1,91 @@
+"""Reduced coordinates of many motions over time, and those that are made of others."""
+
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from odeform.locks import Lock
+from odeform.motion.base import SolveStats
+from odeform.motion.trajectory import Adjustment
+from odeform.types import Times
+
+__all__ = ["AdjustedBatch", "BatchTrajectory", "Coordinates", "PiecewiseBatch"]
+
+Coordinates = Float[np.ndarray, "batch times y"]
+
+
+@runtime_checkable
+class BatchTrajectory(Protocol):
+    """Reduced coordinates of B motions over time, each as the `Trajectory` of that motion alone has them."""
+
+    @property
+    def ok(self) -> Bool[np.ndarray, " batch"]:
+        """(B,) whether the motion is solved as far as it was asked for. What is not is solved by itself."""
+        ...
+
+    @property
+    def stats(self) -> list[SolveStats]:
+        """How they were computed, without estimates of the solver's error."""
+        ...
+
+    def reduced(self, times: Times) -> Coordinates:
+        """(T,) seconds -> (B, T, 6 + K)."""
+        ...
+
+
+class AdjustedBatch:
+    """As `Adjusted`, of many motions: the adjustment is that of coordinates (B, T, n)."""
+
+    def __init__(self, own: BatchTrajectory, adjust: Adjustment) -> None:
+        self.own, self._adjust = own, adjust
+
+    @property
+    def ok(self) -> Bool[np.ndarray, " batch"]:
+        """(B,) of `own`."""
+        return self.own.ok
+
+    @property
+    def stats(self) -> list[SolveStats]:
+        """(B,) of `own`."""
+        return self.own.stats
+
+    def reduced(self, times: Times) -> Coordinates:
+        """(T,) s -> (B, T, 6 + K)."""
+        return self._adjust(times, self.own.reduced(times))
+
+
+class PiecewiseBatch:
+    """As `Piecewise`, of many motions."""
+
+    def __init__(self, own: BatchTrajectory, stop: float, make_later: Callable[[], BatchTrajectory]) -> None:
+        """`make_later` is called at most once; what it returns is asked for times after `stop` only."""
+        self.own, self._stop, self._make_later = own, stop, make_later
+        self._later: BatchTrajectory | None = None
+        self._lock = Lock()
+
+    @property
+    def ok(self) -> Bool[np.ndarray, " batch"]:
+        """(B,) of `own`, and of what follows it where that was asked for."""
+        return self.own.ok if self._later is None else self.own.ok & self._later.ok
+
+    @property
+    def stats(self) -> list[SolveStats]:
+        """(B,) of `own`."""
+        return self.own.stats
+
+    def reduced(self, times: Times) -> Coordinates:
+        """(T,) s -> (B, T, 6 + K)."""
+        later = times > self._stop
+        if not later.any():
+            return self.own.reduced(times)
+        with self._lock:
+            if self._later is None:
+                self._later = self._make_later()
+        after = self._later.reduced(times[later])
+        if later.all():
+            return after
+        y = np.empty((len(after), len(times), after.shape[2]))
+        y[:, ~later], y[:, later] = self.own.reduced(times[~later]), after
+        return y

@@ -1,0 +1,128 @@
+"""Many motions of a reduced model: their coordinates are computed together, in parts of a bounded size."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool
+
+from odeform.motion.base import LATEST, Motion, SolveStats
+from odeform.motion.batch_trajectory import BatchTrajectory, Coordinates
+from odeform.motion.batch_watch import BatchWatch
+from odeform.motion.body import WatchedBody
+from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.limits import Limits
+from odeform.motion.motion_batch import BatchPoses, BatchVertices, MotionBatch
+from odeform.motion.reduced_motion import moved_points, placements, poses_of
+from odeform.motion.watch import Sample
+from odeform.schema import Parameters, Window
+from odeform.types import Floats, Ints, Times
+
+__all__ = ["BatchPart", "ReducedBatch"]
+
+
+class BatchPart:
+    """Some of the motions of a batch, in their order."""
+
+    def __init__(
+        self, trajectory: BatchTrajectory, body: WatchedBody, limits: Limits, window: Window, azimuths: Times
+    ) -> None:
+        """`body` is the trained one, by which motions are watched over, `azimuths` (B,) are in radians."""
+        self.trajectory, self.azimuths = trajectory, azimuths
+        self._body, self._window = body, window
+        self.watch = BatchWatch(
+            limits, window, len(azimuths), lambda times: self._sample(times, trajectory.reduced(times))
+        )
+
+    def _sample(self, times: Times, y: Coordinates) -> Sample:
+        return self._body.sample(y.reshape(-1, y.shape[-1]), np.tile(self._window.passed(times), len(y)))
+
+    def reduced(self, times: Times) -> tuple[Coordinates, Bool[np.ndarray, " batch"]]:
+        """(B, T, 6 + K) at (T,) seconds of the clock, bounded, and which motions (B,) are sound there."""
+        y = self.trajectory.reduced(times)
+        sound = self.watch.sound(times, self._sample(times, y)) & self.trajectory.ok
+        windows = np.tile(self._window.passed(times), len(y))
+        return self._body.all.space.bounded(y.reshape(-1, y.shape[-1]), windows).reshape(y.shape), sound
+
+
+class ReducedBatch(MotionBatch):
+    """Motions that are solved in parts. One that is held at its last sound moment, or whose solver failed, is asked by
+    itself: it is as `Predictor.solve` has it."""
+
+    def __init__(
+        self,
+        sets: Sequence[Parameters],
+        one: Callable[[int], Motion],
+        window: Window,
+        parts: Sequence[BatchPart],
+        basis: Callable[[float], EvaluatedBasis],
+    ) -> None:
+        """`basis` evaluates that of the geometry at an azimuth in radians."""
+        super().__init__(sets, one)
+        self._window, self._parts, self._basis = window, parts, basis
+
+    @property
+    def stats(self) -> tuple[SolveStats, ...]:
+        """How each motion was computed, (B,)."""
+        known = [stats for part in self._parts for stats in part.trajectory.stats]
+        ok = np.concatenate([part.trajectory.ok for part in self._parts])
+
+        def stated(index: int) -> SolveStats:
+            if not ok[index]:
+                return self[index].stats
+            return replace(known[index], estimate=lambda: self[index].stats.solver_error_mm)
+
+        return tuple(stated(index) for index in range(len(self)))
+
+    @property
+    def status(self) -> tuple[str, ...]:
+        """(B,) as `Motion.status`: that of the solver, and from where on a motion is not physically possible."""
+        latest = float(self._window.soft_clamped(np.array(LATEST * self._window.stop)))
+        good = [part.watch.sound_throughout(latest) & part.trajectory.ok for part in self._parts]
+        return tuple("ok" if ok else self[index].status for index, ok in enumerate(np.concatenate(good)))
+
+    def vertices(self, t: float | Times) -> BatchVertices:
+        """(B, N, 3) float32 metres at time `t` in seconds; (B, T, N, 3) for (T,) times."""
+        count = len(self._basis(float(self._parts[0].azimuths[0])).points)
+
+        def move(azimuth: float, y: Coordinates, out: Floats, rows: Ints) -> None:
+            evaluated = self._basis(azimuth)
+            placed = placements(evaluated.space, y.reshape(-1, y.shape[-1]), azimuth)
+            weights, rotations = (each.reshape(*y.shape[:2], *each.shape[1:]) for each in placed)
+            for row, *one in zip(rows.tolist(), y, weights, rotations, strict=True):
+                # as of a single motion: products of more rows round differently
+                out[row] = moved_points(evaluated, *one)
+
+        return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
+
+    def pose(self, t: float | Times) -> BatchPoses:
+        """The rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
+
+        def place(azimuth: float, y: Coordinates, out: Floats, rows: Ints) -> None:
+            space = self._basis(azimuth).space
+            out[rows] = poses_of(space, y.reshape(-1, y.shape[-1]), azimuth).reshape(len(y), -1, 4, 4)
+
+        return self._filled(t, (4, 4), float, place, lambda motion, times: motion.pose(times))
+
+    def _filled(
+        self,
+        t: float | Times,
+        shape: tuple[int, int],
+        dtype: type,
+        together: Callable[[float, Coordinates, Floats, Ints], None],
+        alone: Callable[[Motion, Times], Floats],
+    ) -> Floats:
+        """(B, *shape), or (B, T, *shape) for (T,) times: of all motions of a part with one azimuth `together`, into
+        those rows of an array, or of a motion `alone`."""
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        clock = self._window.soft_clamped(times)
+        out, first = np.empty((len(self), len(times), *shape), dtype), 0
+        for part in self._parts:
+            y, sound = part.reduced(clock)
+            for azimuth in np.unique(part.azimuths[sound]):
+                members = np.flatnonzero(sound & (part.azimuths == azimuth))
+                together(float(azimuth), y[members], out, first + members)
+            for index in np.flatnonzero(~sound):
+                out[first + index] = alone(self[int(first + index)], times)
+            first += len(y)
+        return out[:, 0] if np.ndim(t) == 0 else out
