@@ -192,7 +192,8 @@ class _Frames:
         index = np.floor(frames).astype(int)
         with self._lock:
             while len(self._frames) < int(index.max()) + 4:
-                self._frames.append(self._dynamics.next(*self._frames[-2:], self._theta))
+                before, now = self._frames[-2:]
+                self._frames.append(self._dynamics.next(before, now, self._theta))
             kept = np.stack(self._frames, axis=1)
         four = [kept[:, index + k] for k in range(4)]
         y = catmull_rom(*four, share=(frames - index)[:, None])
