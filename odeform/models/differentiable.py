@@ -52,14 +52,14 @@ class _Linear(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, inputs: torch.Tensor, values: Array, jacobian: Callable[[], Array]) -> torch.Tensor:
-        ctx.jacobian, ctx.like = cache(jacobian), inputs  # rows of a Jacobian are asked for one after the other
+        ctx.jacobian = cache(jacobian)  # rows of a Jacobian are asked for one after the other
         return torch.tensor(values)
 
     @staticmethod
     @once_differentiable
     def backward(ctx: Any, *grads: torch.Tensor) -> tuple[torch.Tensor, None, None]:  # pyright: ignore[reportIncompatibleMethodOverride]
         jacobian = torch.from_numpy(np.ascontiguousarray(ctx.jacobian()))  # (P, ...)
-        return (jacobian.flatten(1) @ grads[0].flatten()).to(ctx.like), None, None
+        return (jacobian * grads[0]).sum(dim=tuple(range(1, jacobian.ndim))), None, None
 
 
 class _PerPoint(torch.autograd.Function):
