@@ -18,6 +18,7 @@ from odeform.formats.reading import read_geometry
 from odeform.formats.splat_inria import inria_bytes
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
+from odeform.models.names import ALIASES
 from odeform.models.registry import load
 from odeform.training.train import _data_command
 from odeform.types import GaussianSplats
@@ -31,7 +32,7 @@ def test_info(trained: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFi
     for model, path in trained.items():
         assert run("info", path) == 0
         result = json.loads(capsys.readouterr().out)
-        assert result["model"] == model
+        assert result["model"] == ALIASES.get(model, model)
         assert result["schema"]["scene"] == "kick"
         assert result["sha256"] == load(path).checkpoint.sha256
         assert result["scores"]["rmse_pooled_mm"] > 0.0
@@ -183,7 +184,7 @@ def test_evaluate(
     arguments = ("evaluate", trained["odeform"], trained["nearest"], trained["pod-rbf"], "--data", dataset.root)
     assert run(*arguments, "--json", report) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["model", "odeform", "nearest", "pod-rbf"]
+    assert [line.split()[0] for line in lines] == ["model", "latent", "nearest", "pod-rbf"]
     result = json.loads(report.read_text())
     for model, scores in result["models"].items():
         said = load(trained[model]).checkpoint.scores

@@ -50,7 +50,7 @@ class PushedBody:
 
     def __call__(self, time: float, state: Floats) -> Floats:
         """The slope of a state (20 + 2 K,) at `time` in s."""
-        now = unpacked(state[None], time < self.pulse)
+        now = unpacked(state[None], bool(time < self.pulse))
         return flat_slopes(now, self._steps.slope(now))[0]
 
     def advance(self, time: float, state: Floats, step: float) -> tuple[Floats, Floats, float]:

@@ -20,7 +20,7 @@ FILES = "ODEFORM_PLUGINS"
 _REGISTERED: dict[str, type[Predictor]] = {}
 
 
-def register_model(name: str, model: type[Predictor]) -> None:
+def register_model(name: str, model: type) -> None:
     """Make a model known by its name: to `odeform.train`, `odeform.load` and the viewer of this program.
 
     Args:

@@ -43,7 +43,7 @@ class FloorProjection:
             y[..., 2] += by
         return y
 
-    def _between(self, times: Times, grid: Times) -> Float[np.ndarray, "batch times"]:
+    def _between(self, times: Times, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "batch times"]:
         """Of each motion, from the changes on the grid."""
         return np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
 

@@ -167,7 +167,7 @@ def test_wrong_arrays_are_refused(flying: Dynamics) -> None:
     read = Dynamics.from_arrays(arrays, 8, 1)
     assert read is not None
     assert np.allclose(read.gains, flying.gains, rtol=1e-6)
-    assert read.pose.centers.shape == flying.pose.centers.shape
+    assert read.pose.inputs.shape == flying.pose.inputs.shape
     with pytest.raises(ValueError, match="shape"):
         Dynamics.from_arrays(arrays, 9, 1)
     with pytest.raises(ValueError, match="finite"):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +85,7 @@ def test_a_scene_of_another_name_than_its_own_is_an_error(monkeypatch: pytest.Mo
 def test_a_new_scene_makes_a_data_set(tmp_path: Path) -> None:
     made = simulate("slide", tmp_path, count=8, seed=1)
     assert [entry.status for entry in made.entries] == ["ok"] * 8
-    assert open_dataset(tmp_path).schema == SCHEMA
+    assert open_dataset(tmp_path).schema == replace(SCHEMA, surroundings=SCENE.surroundings)
     test = next(made.sequences("test"))
     assert np.array_equal(test.vertices, slide(test.parameters, rate=80.0).vertices)
 
