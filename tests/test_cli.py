@@ -186,8 +186,10 @@ def test_evaluate(
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["model", "latent", "nearest", "pod-rbf"]
     result = json.loads(report.read_text())
-    for model, scores in result["models"].items():
-        said = load(trained[model]).checkpoint.scores
+    names = ("odeform", "nearest", "pod-rbf")
+    assert list(result["models"]) == [ALIASES.get(name, name) for name in names]
+    for name, scores in zip(names, result["models"].values(), strict=True):
+        said = load(trained[name]).checkpoint.scores
         assert scores["rmse_pooled_mm"] == pytest.approx(said["rmse_pooled_mm"], rel=1e-6)
 
 

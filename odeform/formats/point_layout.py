@@ -46,7 +46,7 @@ class Layout:
     names: tuple[str, ...] = ()
 
     def rows(self, text: bytes) -> tuple[bytes, Ints]:
-        """The lines of points, with spaces between their numbers, and the number of each line."""
+        """The lines of N points, with spaces between their numbers, and the number (N,) of each line."""
         kept, numbers = [], []
         for number, line in enumerate(text.split(b"\n"), 1):
             line = line.strip()

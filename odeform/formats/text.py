@@ -37,7 +37,7 @@ def plain_text(data: bytes) -> bytes:
 
 
 def numbers_of(text: bytes, where: str, lines: Ints | range, dtype: Any = np.float64) -> NDArray[Any]:
-    """All numbers of `text`, which are separated by spaces and line ends; `lines` has the number of each of its lines.
+    """All numbers (N,) of `text`, between spaces and line ends; `lines` (L,) has the number of each of its lines.
 
     Raises:
         InputError: For anything that is no number, with its line.
@@ -112,7 +112,7 @@ class Lines:
         return self.text[self.starts[index] : self.stops[index]].decode("utf-8", "replace").strip()
 
     def without(self, chosen: NDArray[np.bool_], word: bytes) -> bytes:
-        """The chosen lines, which start with `word`, without it and without comments."""
+        """The lines that are `chosen` (L,), which start with `word`, without it and without comments."""
         lengths = self.stops + 1 - self._begins
         out = self.data[np.repeat(chosen, lengths)].copy()
         starts = np.cumsum(lengths[chosen]) - lengths[chosen] + (self.starts - self._begins)[chosen]
@@ -134,7 +134,7 @@ def words_per_line(text: bytes) -> Ints:
 
 
 def require_words(counts: Ints, expected: Sequence[int], where: str, lines: Ints, what: str) -> None:
-    """Raise `InputError` for the first line that has none of the expected numbers of words."""
+    """Raise `InputError` for the first of the lines (L,) whose count of words (L,) is none of the expected."""
     odd = np.flatnonzero(~np.isin(counts, expected))
     if len(odd):
         wanted = " or ".join(map(str, expected))

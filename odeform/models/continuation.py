@@ -159,7 +159,7 @@ def without_continuation(checkpoint: Checkpoint) -> Checkpoint:
 
 
 def continued(solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Window) -> Trajectory:
-    """A trajectory up to the end of the trained window, bit-exact, and the dynamics from there on."""
+    """A trajectory up to the end of the trained window, bit-exact, and the dynamics for theta (P,) from there on."""
     return Piecewise(solved, window.stop, lambda: _Later(solved, _Frames(solved, dynamics, theta, window)))
 
 

@@ -56,7 +56,7 @@ class Residual:
         return lambda times: spline(np.clip(times, self.times[0], self.times[-1]))
 
     def adjustment(self, own: Moving, inputs: Any) -> Adjustment:
-        """Adds it to the motion `own` of the ODE, or to each of several; zero at time 0."""
+        """Adds it to the coordinates (T, 6 + K) of the motion `own` of the ODE, or of several; zero at time 0."""
         added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:

@@ -129,7 +129,7 @@ class ModalModel(Model):
         return self._pushed(np.atleast_2d(theta))[0]
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
-        """Of one push; always in double precision."""
+        """Of one push, for theta (P,) in [-1, 1]; always in double precision."""
         push = self._push(theta[None])
         pushed = PushedBody(self.mechanics, push, self.pulse)
         return Problem(pushed, pushed.start, self._readout(push.modes[0]))
