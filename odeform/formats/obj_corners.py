@@ -34,7 +34,9 @@ class Corners:
 
 
 def read_corners(lines: Lines, is_vertex: NDArray[np.bool_], where: str) -> Corners:
-    """The faces of a file, of whose lines `is_vertex` (L,) marks the vertices. Negative numbers count back from the last vertex before the face.
+    """The faces of a file, of whose lines `is_vertex` (L,) marks the vertices.
+
+    Negative numbers count back from the last vertex before the face.
 
     Raises:
         InputError: For a face that refers to no vertex, or has fewer than three corners at the end of the file.
