@@ -12,8 +12,8 @@ from odeform.geometry.primitives import octasphere
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.shape import surface_weights
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.contact import RollingContact, first_law
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
-from odeform.mechanics.rolling.law import RollingLaw, first_law
 from odeform.mechanics.rolling.support import support_of
 from odeform.schema import Parameter, Schema, Window
 from odeform.types import Floats, MotionSequence
@@ -34,7 +34,7 @@ SCHEMA = Schema(
 )
 
 
-def true_law() -> RollingLaw:
+def true_law() -> RollingContact:
     """Heavier balls sink deeper and bounce less; all bounce less and slide more than by the first law of a fit."""
     law = first_law(1, seed=0)
     terms = law.terms.copy()

@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize
 
 from odeform.mechanics.body import ReducedBody
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.types import Floats, Perpoint
 
 __all__ = ["Floor", "stand"]
@@ -29,7 +29,7 @@ class Floor:
     """(K,) modal force of the floor at rest, which the body's own stress balances."""
 
 
-def stand(body: ReducedBody, law: MechanicalLaw) -> Floor:
+def stand(body: ReducedBody, law: ContactParameters) -> Floor:
     """The springs, and the height and tilt of the floor at which they carry the body without turning it.
 
     The equilibrium is the minimum of the potential energy of the springs and the weight, which is convex.

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from odeform.mechanics.body import ReducedBody
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.floor import GRAVITY, Floor, stand
-from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State, apart, extrapolated
 from odeform.mechanics.touching import Near, Touching
@@ -40,7 +40,7 @@ class Mechanics:
     """A body under a law of contact and material, and what it is pushed by."""
 
     body: ReducedBody
-    law: MechanicalLaw
+    law: ContactParameters
     projectile: Projectile
 
     @cached_property

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.floor import Floor
-from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State
 from odeform.mechanics.turns import skew
@@ -64,7 +64,7 @@ class Near:
 class Touching:
     """Finds where B pushed bodies may touch something."""
 
-    def __init__(self, push: Push, floor: Floor, law: MechanicalLaw, radius: float) -> None:
+    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float) -> None:
         """Spheres of `radius` m push for as long as states hold them."""
         self._push, self._law, self._radius, self._level = push, law, radius, floor.level
         batch, _, samples = push.points.shape

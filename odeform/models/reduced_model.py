@@ -21,7 +21,7 @@ from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.body import WatchedBody, watched_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.motion_batch import MotionBatch
-from odeform.motion.recent import InUse
+from odeform.motion.recent import InUse, geometry_key
 from odeform.motion.reduced_batch import BatchPart, ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import ReducedSpace
@@ -87,7 +87,7 @@ class ReducedModel(Predictor):
             return evaluate_basis(geometry, self.space, azimuth)
 
         # a basis holds its geometry, whose id therefore stays its own
-        return self._evaluated.get((id(geometry), azimuth), evaluated)
+        return self._evaluated.get((geometry_key(geometry), azimuth), evaluated)
 
     def _solve(
         self,

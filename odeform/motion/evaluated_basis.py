@@ -69,7 +69,7 @@ class EvaluatedBasis:
 def evaluate_basis(geometry: Geometry, space: ReducedSpace, azimuth: float) -> EvaluatedBasis:
     """Evaluate the basis on a geometry at rest in the scene, at an azimuth in radians."""
     rest = to_canonical(geometry.points, space.anchor, azimuth)
-    points, (count, modes) = np.asarray(geometry.points, dtype=np.float32), (len(rest), space.basis.modes)
+    points, (count, modes) = np.array(geometry.points, dtype=np.float32), (len(rest), space.basis.modes)
     rows = np.empty((STILL + modes, 3 * count), dtype=np.float32)
     values = rows[STILL:].reshape(modes, count, 3)
     space.basis.values(rest, out=values)

@@ -1,12 +1,25 @@
 """Small caches: of the values that were used last, and of those in use."""
 
+import zlib
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 from weakref import WeakValueDictionary
 
-__all__ = ["InUse", "Recent"]
+import numpy as np
+
+from odeform.types import Geometry
+
+__all__ = ["InUse", "Recent", "geometry_key"]
 
 Value = TypeVar("Value")
+
+
+def geometry_key(geometry: Geometry) -> Hashable:
+    """Identify a geometry and its points (N, 3) as they are now: a program may change them in place.
+
+    A value that is kept under this key has to hold the geometry, so that its id stays its own.
+    """
+    return id(geometry), zlib.crc32(np.ascontiguousarray(geometry.points))
 
 
 class Recent(Generic[Value]):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from odeform.geometry.likeness import Likeness, compare_shapes
 from odeform.motion.limits import Limits
-from odeform.motion.recent import Recent
+from odeform.motion.recent import Recent, geometry_key
 from odeform.schema import Parameters
 from odeform.types import Floats, Geometry, Mesh, Times
 
@@ -37,7 +37,7 @@ class Trust:
             return geometry, compare_shapes(geometry, self.bodies)
 
         # an entry holds its geometry, whose id therefore stays its own
-        return self._likeness.get(id(geometry), compared)[1]
+        return self._likeness.get(geometry_key(geometry), compared)[1]
 
 
 UNKNOWN = Trust()

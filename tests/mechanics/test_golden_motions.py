@@ -10,19 +10,19 @@ from scipy.spatial.transform import Rotation
 
 from odeform.geometry.primitives import octasphere
 from odeform.mechanics.body import ReducedBody, reduce_body, solid_of
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.elasticity import elastic_modes, tangent_stiffness
-from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import make_push
+from odeform.mechanics.rolling.contact import first_law
 from odeform.mechanics.rolling.dynamics import RollingDynamics
-from odeform.mechanics.rolling.law import first_law
 from odeform.mechanics.rolling.support import support_of
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.mechanics.warping import surface_turns
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats
 
-CONTACT = MechanicalLaw(
+CONTACT = ContactParameters(
     sink=6e-5,
     floor_damping=4e-3,
     floor_friction=0.45,

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from soft_block import SIZE, Block
 
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.floor import GRAVITY, stand
-from odeform.mechanics.law import MechanicalLaw
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import Push, make_push
 from odeform.mechanics.state import State
@@ -27,7 +27,7 @@ def pushed_at_the_side(block: Block, force: float) -> Push:
 class Free:
     """The block without a projectile, in steps of `step` seconds."""
 
-    def __init__(self, block: Block, law: MechanicalLaw, step: float) -> None:
+    def __init__(self, block: Block, law: ContactParameters, step: float) -> None:
         self.mechanics, self.push = Mechanics(block.body, law, SPHERE), pushed_at_the_side(block, 0.0)
         self.steps, self.step = Steps(self.mechanics, self.push), step
 
@@ -61,7 +61,7 @@ class Free:
 @pytest.mark.parametrize("spin", [[0.3, 12.0, 0.2], [8.0, 0.0, 5.0]])
 def test_a_free_rotor_turns_as_euler_says(block: Block, spin: list[float]) -> None:
     """About its middle axis of inertia, which is not stable, and about none."""
-    free, start, duration = Free(block, MechanicalLaw(), 1e-3), np.array(spin), 0.25
+    free, start, duration = Free(block, ContactParameters(), 1e-3), np.array(spin), 0.25
     inertia = block.body.solid.inertia
     end = free.after(free.state(np.array([0.0, 0.0, 1.0]), NOTHING, NOTHING, start), duration)
     rotation, found = end.rotation[0], end.velocity[0, 3:6]
@@ -80,7 +80,7 @@ def test_a_free_rotor_turns_as_euler_says(block: Block, spin: list[float]) -> No
 
 
 def test_a_thrown_body_falls_freely_and_its_modes_vibrate(block: Block) -> None:
-    free, duration = Free(block, MechanicalLaw(damping=0.0), 4e-4), 0.04
+    free, duration = Free(block, ContactParameters(damping=0.0), 4e-4), 0.04
     stiff, preload = free.modal
     bent = 1e-3 * np.random.default_rng(0).normal(size=len(stiff))
     speed = np.array([0.3, -0.2, 1.0])
@@ -90,7 +90,7 @@ def test_a_thrown_body_falls_freely_and_its_modes_vibrate(block: Block) -> None:
     np.testing.assert_allclose(end.velocity[0, :3], speed - [0.0, 0.0, GRAVITY * duration], atol=1e-12)
     expected = (bent + preload / stiff) * np.cos(np.sqrt(stiff) * duration) - preload / stiff
     np.testing.assert_allclose(end.modes[0, :3], expected[:3], atol=5e-5)
-    damped = Free(block, MechanicalLaw(damping=1.15), 4e-4).after(start, duration)
+    damped = Free(block, ContactParameters(damping=1.15), 4e-4).after(start, duration)
     ratio = 0.5 * 1.15 * block.body.solid.damping * stiff  # decay of the amplitude, 1/s
     rate = np.sqrt(stiff - ratio**2)
     phase = rate * duration
@@ -101,7 +101,7 @@ def test_a_thrown_body_falls_freely_and_its_modes_vibrate(block: Block) -> None:
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.3, 0.2, 0.0]])
 def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[float]) -> None:
     """Also on an edge, where most of it goes into spin."""
-    free = Free(block, MechanicalLaw(sink=2e-3, floor_damping=0.0, damping=0.0, floor_friction=0.0), 4e-4)
+    free = Free(block, ContactParameters(sink=2e-3, floor_damping=0.0, damping=0.0, floor_friction=0.0), 4e-4)
     stiff, preload = free.modal
     start = free.state(
         np.array([0.0, 0.0, 0.03]), np.array(turn), np.array([0.1, 0.2, -0.5]), NOTHING, -preload / stiff
@@ -111,14 +111,14 @@ def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[floa
     assert end.velocity[0, 2] > 0.2
     assert abs(free.energy(end) - free.energy(start)) < 2e-3 * falling
     np.testing.assert_allclose(end.velocity[0, :2], [0.1, 0.2], atol=1e-9)  # no friction
-    lossy = Free(block, MechanicalLaw(sink=2e-3, damping=0.0, floor_friction=0.0), 4e-4)
+    lossy = Free(block, ContactParameters(sink=2e-3, damping=0.0, floor_friction=0.0), 4e-4)
     assert free.energy(lossy.after(start, 0.12)) < free.energy(start) - 0.1 * falling
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.45])
 @pytest.mark.parametrize("heading", [0.0, 2.0])
 def test_a_sliding_body_stops_after_the_distance_of_coulomb(block: Block, friction: float, heading: float) -> None:
-    free = Free(block, MechanicalLaw(floor_friction=friction), 1e-3)
+    free = Free(block, ContactParameters(floor_friction=friction), 1e-3)
     speed = np.array([np.cos(heading), np.sin(heading), 0.0])
     moving = free.after(free.state(NOTHING, NOTHING, speed, NOTHING), 0.1)
     np.testing.assert_allclose(moving.velocity[0, :3], (1.0 - 0.1 * friction * GRAVITY) * speed, atol=2e-3)
@@ -129,7 +129,7 @@ def test_a_sliding_body_stops_after_the_distance_of_coulomb(block: Block, fricti
 
 @pytest.mark.parametrize("friction", [0.2, 0.3])
 def test_a_body_slides_once_it_is_pushed_harder_than_friction_holds(block: Block, friction: float) -> None:
-    law = MechanicalLaw(floor_friction=friction, push_friction=0.0)
+    law = ContactParameters(floor_friction=friction, push_friction=0.0)
     mechanics, mass = Mechanics(block.body, law, SPHERE), block.body.solid.mass
     limit = friction * mass * GRAVITY
 
@@ -150,7 +150,7 @@ def test_a_body_slides_once_it_is_pushed_harder_than_friction_holds(block: Block
 @pytest.mark.parametrize("friction", [0.25, 0.5])
 def test_a_sphere_rubs_along_what_it_pushes(block: Block, friction: float) -> None:
     """Pushed at a slant, the side of the body resists along the normal, and across it up to Coulomb's limit."""
-    law = MechanicalLaw(floor_friction=0.0, push_friction=friction)
+    law = ContactParameters(floor_friction=0.0, push_friction=friction)
     mechanics = Mechanics(block.body, law, SPHERE)
     across = np.array([0.0, 1.0, 0.0])
     force = 2.0 * np.array([np.sin(0.6), -np.cos(0.6), 0.0])
@@ -162,7 +162,7 @@ def test_a_sphere_rubs_along_what_it_pushes(block: Block, friction: float) -> No
 
 @pytest.mark.parametrize("sink", [5e-5, 1e-4])
 def test_a_block_sinks_as_far_as_its_springs_give(block: Block, sink: float) -> None:
-    floor, support = stand(block.body, MechanicalLaw(sink=sink)), block.body.support
+    floor, support = stand(block.body, ContactParameters(sink=sink)), block.body.support
     weight = block.body.solid.mass * GRAVITY
     assert floor.stiffness.sum() == pytest.approx(4.0 * weight / sink)
     depth = np.maximum(-(support.points[:, 2] + floor.level), 0.0)
@@ -179,7 +179,7 @@ def test_springs_balance_a_body_that_leans(block: Block) -> None:
     body = type(block.body)(
         block.body.solid, block.body.squares, type(support)(support.points, support.rows, uneven), block.body.surface
     )
-    floor = stand(body, MechanicalLaw())
+    floor = stand(body, ContactParameters())
     force = floor.stiffness * np.maximum(-(support.points[:, 2] + floor.level), 0.0)
     weight = body.solid.mass * GRAVITY
     assert force.sum() == pytest.approx(weight, rel=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from soft_block import DENSITY, SIZE, Block
 
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import WIDTHS, Push, make_push
 from odeform.mechanics.pushed import PushedBody
@@ -18,9 +18,9 @@ SPHERE = Projectile(0.012, 0.020)
 SOFT = 5  # of the block's 12 modes
 
 
-def pushed(block: Block, force: np.ndarray, law: MechanicalLaw | None = None) -> PushedBody:
+def pushed(block: Block, force: np.ndarray, law: ContactParameters | None = None) -> PushedBody:
     """A block that is pushed from the right."""
-    mechanics = Mechanics(block.body, law or MechanicalLaw(), SPHERE)
+    mechanics = Mechanics(block.body, law or ContactParameters(), SPHERE)
     push = make_push(block.body, SOFT, CONTACT[None], CONTACT[None] + 0.012 * NORMAL, force[None])
     return PushedBody(mechanics, push, PULSE)
 
@@ -52,7 +52,10 @@ def test_steps_converge_to_what_an_explicit_method_finds(block: Block) -> None:
 
 def test_free_flight_is_of_second_order(block: Block) -> None:
     push = pushed(block, 0.0 * NORMAL).push
-    field, generator = PushedBody(Mechanics(block.body, MechanicalLaw(), SPHERE), push, 0.0), np.random.default_rng(0)
+    field, generator = (
+        PushedBody(Mechanics(block.body, ContactParameters(), SPHERE), push, 0.0),
+        np.random.default_rng(0),
+    )
     start = field.start
     start[2], start[12 : 12 + field.directions] = 1.0, 1e-3 * generator.normal(size=field.directions)
     velocities = start[13 + field.directions :]
@@ -77,7 +80,7 @@ def test_a_step_may_end_anywhere_in_the_pulse(block: Block) -> None:
 
 
 def test_the_push_gives_the_body_its_momentum(block: Block) -> None:
-    field = pushed(block, -2.0 * NORMAL, MechanicalLaw(floor_friction=0.0))
+    field = pushed(block, -2.0 * NORMAL, ContactParameters(floor_friction=0.0))
     solution = integrate(field, field.start, SolverSettings("limex", step=5e-4, dtype="float64"), PULSE)
     body, projectile = (solution.states[-1][i] for i in (13 + field.directions, 19 + 2 * field.directions))
     mass = DENSITY * SIZE.prod()
@@ -121,7 +124,7 @@ def test_directions_yield_at_the_contact_as_all_modes_do(block: Block) -> None:
 
 
 def test_motions_do_not_depend_on_the_batch(block: Block) -> None:
-    mechanics = Mechanics(block.body, MechanicalLaw(), SPHERE)
+    mechanics = Mechanics(block.body, ContactParameters(), SPHERE)
     contacts = np.stack([CONTACT, CONTACT - np.array([0.0, 0.02, 0.0]), CONTACT - np.array([0.0, 0.0, 0.02])])
     forces = np.stack([-2.0 * NORMAL, -3.0 * NORMAL, np.array([-1.0, 0.5, -0.5])])
 

@@ -7,9 +7,9 @@ import pytest
 
 from odeform.geometry.primitives import octasphere
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.contact import COEFFICIENTS, PLAIN, RollingContact, first_law
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
-from odeform.mechanics.rolling.law import COEFFICIENTS, PLAIN, RollingLaw, first_law
 from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.solver.integrate import SolverSettings, integrate
@@ -25,7 +25,7 @@ def support() -> Support:
     return support_of(octasphere(RADIUS, 5).points, AXIS)
 
 
-def any_law(seed: int = 0) -> RollingLaw:
+def any_law(seed: int = 0) -> RollingContact:
     law = first_law(2, seed)
     flat = law.flat()
     return law.like(flat + 0.2 * np.random.default_rng(seed).normal(size=flat.shape))
@@ -50,7 +50,7 @@ def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
     assert (together[4] == -GRAVITY).any()
 
 
-def check_derivatives(law: RollingLaw, support: Support, chosen: Ints, accuracy: float = 1e-4) -> Floats:
+def check_derivatives(law: RollingContact, support: Support, chosen: Ints, accuracy: float = 1e-4) -> Floats:
     """Those of positions by the chosen numbers of a law, (T, M, 3, F), against differences."""
     rng, count, flat = np.random.default_rng(1), 30, law.flat()
     material, states = rng.uniform(-1.0, 1.0, (count, 2)), rng.normal(size=(STATE, count))
@@ -153,13 +153,13 @@ def test_numbers_of_a_law_go_forth_and_back() -> None:
 
 def test_damaged_laws_are_refused() -> None:
     arrays = any_law().arrays()
-    assert np.array_equal(RollingLaw.from_arrays(arrays, 2).flat(), any_law().flat())
+    assert np.array_equal(RollingContact.from_arrays(arrays, 2).flat(), any_law().flat())
     with pytest.raises(ValueError, match=r"law.bias: expected a finite array of shape \(16,\)"):
-        RollingLaw.from_arrays({**arrays, "law.bias": np.full(16, np.nan)}, 2)
+        RollingContact.from_arrays({**arrays, "law.bias": np.full(16, np.nan)}, 2)
     with pytest.raises(ValueError, match=r"law\.terms"):
-        RollingLaw.from_arrays(arrays, 3)
+        RollingContact.from_arrays(arrays, 3)
     with pytest.raises(KeyError):
-        RollingLaw.from_arrays({}, 2)
+        RollingContact.from_arrays({}, 2)
 
 
 @pytest.mark.parametrize("height", [-1e300, float("-inf"), float("nan")])

@@ -8,9 +8,9 @@ import pytest
 
 from odeform.geometry.primitives import octasphere
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.contact import COEFFICIENTS, PLACES, PLAIN, RollingContact, first_law
 from odeform.mechanics.rolling.dynamics import RollingDynamics, limited
 from odeform.mechanics.rolling.field import make_field, units_of
-from odeform.mechanics.rolling.law import COEFFICIENTS, PLACES, PLAIN, RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Status
@@ -26,7 +26,7 @@ MATERIAL = np.zeros(1)
 DEPTH = 0.01 * (GRAVITY / STIFFNESS) ** (1.0 / POWER)  # m, at rest
 
 
-def law_of(**given: float) -> RollingLaw:
+def law_of(**given: float) -> RollingContact:
     """Without damping, friction and resistance unless given, and without its network: logarithms of coefficients."""
     start = first_law(1, 0)
     plain = {"damping": NONE, "friction": NONE, "rolling": NONE, "damping_power": NONE, "grip": np.log(0.005)}
@@ -37,7 +37,7 @@ def law_of(**given: float) -> RollingLaw:
     return replace(start, terms=terms, last=np.zeros_like(start.last))
 
 
-def moved(law: RollingLaw, times: Any, support: Support = ROUND, **given: float) -> Floats:
+def moved(law: RollingContact, times: Any, support: Support = ROUND, **given: float) -> Floats:
     """(T, 8) states, from one where all but what is given is zero."""
     names = ("ahead", "height", "angle", "speed", "rising", "spin", "one", "two")
     start = UNITS * np.array([given.get(name, 0.0) for name in names])

@@ -10,7 +10,7 @@ from odeform.errors import InputError
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.step import Projectile
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.training.fit import _checkpoint
@@ -37,7 +37,7 @@ def pushed(name: str) -> Pushes:
 def trained() -> PerObject:
     """A model of the donut, with the law as it is before training."""
     schema = replace(SCENE.schema, objects=("donut",))
-    part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), MechanicalLaw(), PULSE)
+    part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE)
     part = replace(part, config={**part.config, "largest": (0.5, 0.1)})
     return PerObject(joined(schema, {"donut": part}), model_class(part.model))
 

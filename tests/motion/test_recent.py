@@ -4,6 +4,7 @@ import gc
 import weakref
 
 import numpy as np
+import pytest
 
 import odeform
 from odeform.motion.recent import InUse, Recent
@@ -44,3 +45,18 @@ def test_a_model_forgets_shapes_that_nothing_shows() -> None:
     gc.collect()
     assert [shape() is not None for shape in alive] == [True, False, True]
     assert np.isfinite(shown.vertices(0.1)).all()
+
+
+@pytest.mark.parametrize("name", ["mass-elastic", "contact-force"])
+def test_a_shape_that_was_changed_in_place_moves_as_it_is_now(name: str) -> None:
+    predictor = odeform.load(name)
+    mesh = Mesh(predictor.rest.points.copy(), predictor.rest.faces)
+    first = predictor.solve(mesh, until=0.1)
+    before = first.vertices(0.1).copy()
+    assert not first.foreign
+    mesh.points[:] += np.float32([0.01, 0.0, 0.05])
+    again, other = predictor.solve(mesh, until=0.1), predictor.solve(Mesh(mesh.points.copy(), mesh.faces), until=0.1)
+    np.testing.assert_array_equal(again.vertices(0.1), other.vertices(0.1))
+    np.testing.assert_array_equal(again.vertices(0.0), mesh.points)
+    assert again.foreign == other.foreign
+    np.testing.assert_array_equal(first.vertices(0.1), before)

@@ -11,7 +11,7 @@ from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
 from odeform.geometry.contact import RADIUS
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.step import Projectile
 from odeform.models.modal.coordinates import coordinates_of
 from odeform.models.modal.elastic_body import elastic_body
@@ -19,7 +19,7 @@ from odeform.models.modal.model import ModalModel
 from odeform.models.modal.training import contact_fit as mechanical_law
 from odeform.models.modal.training import fit as mechanical
 from odeform.models.modal.training.contact_fit import fit_law, relative_errors
-from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
+from odeform.models.modal.training.parameter_cache import SHARED, ParameterCache
 from odeform.models.modal.training.pushes import Pushes
 from odeform.models.per_object import PerObject
 from odeform.motion.reduced_space import POSE
@@ -28,7 +28,7 @@ from odeform.simulation.scenes.contact_force import PULSE, SCENE
 from odeform.training.train import train
 from odeform.types import MotionSequence
 
-LAW = MechanicalLaw(floor_friction=0.6, stiffness=0.8)
+LAW = ContactParameters(floor_friction=0.6, stiffness=0.8)
 SPHERE = Projectile(RADIUS, SCENE.fixed["projectile_mass_kg"])
 SPLITS = ("train", "train", "train", "val", "test")
 
@@ -54,7 +54,7 @@ def motions(drawn: list[dict]) -> Pushes:
 
 @pytest.mark.slow
 def test_the_law_is_found_again(motions: Pushes) -> None:
-    start = MechanicalLaw()
+    start = ContactParameters()
     before = np.square(relative_errors(motions, motions.predicted(start, PULSE, 2.5e-3))).sum()
     names = ("floor_friction", "stiffness")
     found = fit_law([motions], PULSE, start, names, lambda _: None)
@@ -112,8 +112,8 @@ def test_a_trained_checkpoint_predicts_pushes(
 @pytest.mark.slow
 def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "model.safetensors"
-    laws = SavedLaws(tmp_path / "model.safetensors.part", dataset, 0)
-    laws.add(SHARED, MechanicalLaw())
+    laws = ParameterCache(tmp_path / "model.safetensors.part", dataset, 0)
+    laws.add(SHARED, ContactParameters())
     laws.add("donut", LAW)
 
     def fit(*given: object, **more: object) -> None:
@@ -149,7 +149,7 @@ def test_frames_after_the_window_are_not_trained_on(
 ) -> None:
     seen = []
 
-    def fit(given: Dataset, laws: SavedLaws, seed: int, report: object, correct: bool) -> None:
+    def fit(given: Dataset, laws: ParameterCache, seed: int, report: object, correct: bool) -> None:
         seen.append((given.schema.window.stop, seed, correct))
         raise InputError("enough")
 

@@ -10,7 +10,7 @@ from rolls import AXIS, BALL, RADIUS, rolls, true_law
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
-from odeform.mechanics.rolling.law import first_law
+from odeform.mechanics.rolling.contact import first_law
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.base import Predictor
 from odeform.models.rolling.model import RollingModel

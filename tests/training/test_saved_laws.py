@@ -8,37 +8,37 @@ import pytest
 
 from odeform.dataset.index import Dataset, Entry
 from odeform.errors import InputError
-from odeform.mechanics.law import MechanicalLaw
-from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
+from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.models.modal.training.parameter_cache import SHARED, ParameterCache
 from odeform.simulation.scenes.contact_force import SCENE
 
 ENTRIES = (Entry("one", "train", {"object": "cat"}, "a"), Entry("two", "test", {"object": "cat"}, "b"))
 DATA = Dataset(Path("pushes"), SCENE.schema, ENTRIES, lambda entry: None, {})  # pyright: ignore[reportArgumentType]
-LAW = MechanicalLaw(floor_friction=0.7)
+LAW = ContactParameters(floor_friction=0.7)
 
 
 def test_laws_are_known_again(tmp_path: Path) -> None:
-    laws = SavedLaws(tmp_path / "part", DATA, 0)
+    laws = ParameterCache(tmp_path / "part", DATA, 0)
     assert laws.get(SHARED) is None
-    laws.add(SHARED, MechanicalLaw())
+    laws.add(SHARED, ContactParameters())
     laws.add("cat", LAW)
-    again = SavedLaws(tmp_path / "part", DATA, 0, resume=True)
+    again = ParameterCache(tmp_path / "part", DATA, 0, resume=True)
     assert again.get("cat") == LAW
-    assert again.get(SHARED) == MechanicalLaw()
+    assert again.get(SHARED) == ContactParameters()
     assert again.get("dog") is None
     # a training that starts over knows none
-    assert SavedLaws(tmp_path / "part", DATA, 0).get("cat") is None
+    assert ParameterCache(tmp_path / "part", DATA, 0).get("cat") is None
 
 
 def test_those_of_another_training_are_refused(tmp_path: Path) -> None:
-    SavedLaws(tmp_path / "part", DATA, 0).add("cat", LAW)
+    ParameterCache(tmp_path / "part", DATA, 0).add("cat", LAW)
     window = replace(SCENE.schema, window=replace(SCENE.schema.window, stop=0.1))
     others = (replace(DATA, entries=(replace(ENTRIES[0], sha256="c"),)), replace(DATA, schema=window))
     for data, seed in ((DATA, 1), *((other, 0) for other in others)):
         with pytest.raises(InputError, match="state of another training"):
-            SavedLaws(tmp_path / "part", data, seed, resume=True)
+            ParameterCache(tmp_path / "part", data, seed, resume=True)
     # test motions do not decide anything
-    assert SavedLaws(tmp_path / "part", replace(DATA, entries=ENTRIES[:1]), 0, resume=True).get("cat") == LAW
+    assert ParameterCache(tmp_path / "part", replace(DATA, entries=ENTRIES[:1]), 0, resume=True).get("cat") == LAW
 
 
 @pytest.mark.parametrize(
@@ -47,16 +47,16 @@ def test_those_of_another_training_are_refused(tmp_path: Path) -> None:
 def test_damaged_states_are_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "part").write_text(text)
     with pytest.raises(InputError):
-        SavedLaws(tmp_path / "part", DATA, 0, resume=True)
+        ParameterCache(tmp_path / "part", DATA, 0, resume=True)
     with pytest.raises(InputError, match="expected an interrupted training"):
-        SavedLaws(tmp_path / "none", DATA, 0, resume=True)
+        ParameterCache(tmp_path / "none", DATA, 0, resume=True)
 
 
 def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
-    laws = SavedLaws(tmp_path / "part", DATA, 0)
+    laws = ParameterCache(tmp_path / "part", DATA, 0)
     laws.add("cat", LAW)
     saved = json.loads((tmp_path / "part").read_text())
     saved["laws"]["cat"]["stiffness"] = "soft"
     (tmp_path / "part").write_text(json.dumps(saved))
     with pytest.raises(InputError, match="not a state"):
-        SavedLaws(tmp_path / "part", DATA, 0, resume=True)
+        ParameterCache(tmp_path / "part", DATA, 0, resume=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.training.contact_fit import fit_law
 from odeform.models.modal.training.fit import SEQUENCES
@@ -25,7 +25,7 @@ MOTIONS = 20  # of an object
 EVALUATIONS = 2  # of the errors and their derivatives
 
 
-def law_without(trained: PerObject, dataset: Dataset, name: str, report: Callable[[str], None]) -> MechanicalLaw:
+def law_without(trained: PerObject, dataset: Dataset, name: str, report: Callable[[str], None]) -> ContactParameters:
     """One law fitted to training motions of all objects but `name`, as `odeform train` fits it to all.
 
     It starts from the median of the others' own laws, so that few evaluations suffice.
@@ -40,11 +40,11 @@ def law_without(trained: PerObject, dataset: Dataset, name: str, report: Callabl
             bodies.append(read_pushes(few, "train", part.body))
     if not bodies:
         raise InputError(f"expected a model of several objects, got one of {', '.join(trained.parts)}")
-    start = MechanicalLaw(*np.exp(np.median(np.log(laws), axis=0)).tolist())
+    start = ContactParameters(*np.exp(np.median(np.log(laws), axis=0)).tolist())
     return fit_law(bodies, dataset.fixed["pulse_s"], start, report=report, evaluations=EVALUATIONS)
 
 
-def without(trained: PerObject, name: str, law: MechanicalLaw) -> PerObject:
+def without(trained: PerObject, name: str, law: ContactParameters) -> PerObject:
     """The model as if it had been trained without an object: the others, all with this `law`."""
     checkpoint = trained.checkpoint
     parts = {other: part for other, part in checkpoint.config["objects"].items() if other != name}

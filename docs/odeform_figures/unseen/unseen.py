@@ -14,7 +14,7 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.io import atomic_write
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.shape_band import SHAPE_BAND, ShapeErrors, coverage, fit_shape_band
 from odeform.models.modal.user_body import UserBodyPredictor, resting_body, takes_user_bodies
 from odeform.models.per_object import PerObject
@@ -119,11 +119,11 @@ def _kept(plan: Plan, key: str, make: Callable[[], UnseenShape]) -> UnseenShape:
     return simulated(_file(plan, key), make, plan.pushes, plan.seed, plan.workers)
 
 
-def _law(trained: PerObject, dataset: Dataset, name: str, path: Path) -> MechanicalLaw:
+def _law(trained: PerObject, dataset: Dataset, name: str, path: Path) -> ContactParameters:
     if not path.exists():
         law = law_without(trained, dataset, name, print)
         atomic_write(path, json.dumps(asdict(law), indent=1).encode())
-    return MechanicalLaw(**json.loads(path.read_text()))
+    return ContactParameters(**json.loads(path.read_text()))
 
 
 def _measured(model: PerObject, shape: UnseenShape) -> Measured:

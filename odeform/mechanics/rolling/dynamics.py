@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.law import ADJUSTED, INPUTS, PLACES, REACHING, RollingLaw
+from odeform.mechanics.rolling.contact import ADJUSTED, INPUTS, PLACES, REACHING, RollingContact
 from odeform.mechanics.rolling.support import Support
 from odeform.types import Floats, Ints
 
@@ -97,7 +97,7 @@ class RollingDynamics:
     """The field of M motions at once."""
 
     def __init__(
-        self, law: RollingLaw, support: Support, radius: float, material: Float[np.ndarray, "motions materials"]
+        self, law: RollingContact, support: Support, radius: float, material: Float[np.ndarray, "motions materials"]
     ) -> None:
         """`radius` is that of the body in m, `material` that of each motion."""
         self.law, self.support, self.radius, self.material = law, support, radius, material

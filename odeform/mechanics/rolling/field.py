@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.contact import ADJUSTED, INPUTS, PLACES, REACHING, RollingContact
 from odeform.mechanics.rolling.dynamics import (
     AHEAD,
     AROUND,
@@ -23,7 +24,6 @@ from odeform.mechanics.rolling.dynamics import (
     STATE,
     UPWARD,
 )
-from odeform.mechanics.rolling.law import ADJUSTED, INPUTS, PLACES, REACHING, RollingLaw
 from odeform.mechanics.rolling.support import Support
 from odeform.solver.method import Field
 from odeform.solver.runge_kutta import gemv
@@ -43,7 +43,7 @@ def units_of(radius: float) -> Float[np.ndarray, "8"]:
     return units
 
 
-def make_field(law: RollingLaw, support: Support, radius: float, material: Floats) -> Field:
+def make_field(law: RollingContact, support: Support, radius: float, material: Floats) -> Field:
     """(t, state (8,) in `units_of(radius)`) -> its slope, for the material (Q,) of one body of `radius` m."""
     logs = {name: float(value[0]) for name, value in law.coefficients(material[None]).items()}
     bases = np.array([logs[name] for name in ADJUSTED])

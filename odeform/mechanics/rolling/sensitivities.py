@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from odeform.mechanics.rolling.contact import ADJUSTED, COEFFICIENTS, INPUTS, PLAIN, REACHING, material_terms
 from odeform.mechanics.rolling.dynamics import (
     AHEAD,
     DEEP,
@@ -23,7 +24,6 @@ from odeform.mechanics.rolling.dynamics import (
     RollingDynamics,
     limited,
 )
-from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, INPUTS, PLAIN, REACHING, material_terms
 from odeform.types import Floats, Ints
 
 __all__ = ["roll_out_with_sensitivities"]

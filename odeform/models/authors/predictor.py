@@ -16,7 +16,7 @@ from odeform.models.authors.motion import FrameMotion
 from odeform.models.authors.network import Networks, normalisation
 from odeform.models.base import Predictor
 from odeform.motion.base import SolveStats
-from odeform.motion.recent import Recent
+from odeform.motion.recent import Recent, geometry_key
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Frames, GaussianSplats, Geometry, Mesh, MotionSequence
@@ -61,7 +61,7 @@ class AuthorsModel(Predictor):
         def moved() -> tuple[Geometry, Geometry]:
             return geometry, replace(geometry, points=np.asarray(geometry.points, dtype=float) - offset)
 
-        return self._in_body_frame.get((id(geometry), tuple(offset)), moved)[1]
+        return self._in_body_frame.get((geometry_key(geometry), tuple(offset)), moved)[1]
 
     def _solve(
         self,

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.push import Push, make_push
 from odeform.mechanics.pushed import PushedBody, body_motion
 from odeform.mechanics.pushed_batch import PushedBodies
@@ -72,7 +72,7 @@ class ModalModel(Model):
     def _read(self, checkpoint: Checkpoint) -> None:
         config = checkpoint.config
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
-        self.law, self.pulse = MechanicalLaw(**config["law"]), float(config["pulse_s"])
+        self.law, self.pulse = ContactParameters(**config["law"]), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest = float(shift), float(deformation)

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
+from odeform.mechanics.rolling.contact import RollingContact
 from odeform.mechanics.rolling.dynamics import MOVING, STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
-from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.model import Model
 from odeform.models.residual import parameter_residual
@@ -86,7 +86,7 @@ class RollingModel(Model):
         self._radius = float(config["radius_m"])
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
-        self.law = RollingLaw.from_arrays(arrays, len(self._materials))
+        self.law = RollingContact.from_arrays(arrays, len(self._materials))
         self._start = read_start(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.space.coordinates - POSE)
         self.residual = parameter_residual(arrays, self.space.coordinates, len(learned))

@@ -11,7 +11,7 @@ from odeform.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
 from odeform.cli import main
 from odeform.errors import InputError
 from odeform.geometry.contact import nearest_on
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.contact.regression import PARTS
 from odeform.models.error_band import NOMINAL
 from odeform.models.modal.elastic_body import elastic_body
@@ -42,7 +42,7 @@ def part(name: str) -> Checkpoint:
         {
             "largest": [0.5, 0.1],
             "body": body.to_json(),
-            "law": MechanicalLaw().__dict__,
+            "law": ContactParameters().__dict__,
             "pulse_s": PULSE,
             "projectile": {"radius": 0.02, "mass": 0.02},
             "qualities": QUALITIES,
@@ -159,7 +159,7 @@ def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, 
 
 
 def test_an_object_that_is_left_out_is_gone_and_the_others_have_one_law(trained: PerObject) -> None:
-    law = MechanicalLaw(floor_friction=0.123)
+    law = ContactParameters(floor_friction=0.123)
     found = without(trained, "donut", law)
     assert tuple(found.parts) == ("bottle",)
     assert found.parts["bottle"].law == law  # pyright: ignore[reportAttributeAccessIssue]

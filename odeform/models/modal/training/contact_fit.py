@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.training.pushes import Pushes
 from odeform.motion.reduced_space import POSE
 from odeform.types import Floats
@@ -16,7 +16,7 @@ __all__ = ["FINE", "described", "fit_law", "relative_errors"]
 STEP, FINE = 2.5e-3, 1e-3  # s, of the integration while a law is fitted, and of motions by the one that is found
 RANGE = 30.0  # factor by which a number may differ from where it starts
 EVALUATIONS = 5  # of the errors and their derivatives
-NAMES = tuple(asdict(MechanicalLaw()))
+NAMES = tuple(asdict(ContactParameters()))
 
 
 def relative_errors(pushes: Pushes, predicted: Floats) -> Floats:
@@ -32,11 +32,11 @@ def relative_errors(pushes: Pushes, predicted: Floats) -> Floats:
 def fit_law(
     bodies: Sequence[Pushes],
     pulse: float,
-    start: MechanicalLaw,
+    start: ContactParameters,
     names: Sequence[str] = NAMES,
     report: Callable[[str], None] = print,
     evaluations: int | None = None,
-) -> MechanicalLaw:
+) -> ContactParameters:
     """The law with the smallest squared relative errors over all bodies, by Gauss-Newton in logarithms.
 
     Rigid motion and deformation of each body count alike. Errors and their derivatives are evaluated `EVALUATIONS`
@@ -44,7 +44,7 @@ def fit_law(
     """
     first = asdict(start)
 
-    def law(x: Floats) -> MechanicalLaw:
+    def law(x: Floats) -> ContactParameters:
         return replace(start, **{name: first[name] * float(np.exp(v)) for name, v in zip(names, x, strict=True)})
 
     def errors(x: Floats) -> Floats:
@@ -64,6 +64,6 @@ def fit_law(
     return law(found.x)
 
 
-def described(law: MechanicalLaw) -> str:
+def described(law: ContactParameters) -> str:
     """In one line."""
     return ", ".join(f"{name} {value:.3g}" for name, value in asdict(law).items())

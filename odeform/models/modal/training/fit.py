@@ -11,13 +11,13 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.base import Predictor
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.model import EXACT, QUALITIES, ModalModel
 from odeform.models.modal.training import contact_fit
 from odeform.models.modal.training.contact_fit import FINE, described, fit_law, relative_errors
-from odeform.models.modal.training.parameter_cache import SHARED, SavedLaws
+from odeform.models.modal.training.parameter_cache import SHARED, ParameterCache
 from odeform.models.modal.training.pushes import Pushes, read_pushes
 from odeform.models.modal.training.residual_fit import fit_correction
 from odeform.models.per_object import PerObject, joined
@@ -55,12 +55,12 @@ def train_modal(run: Run) -> Checkpoint:
     window = dataset.schema.window
     last = (FrameSubsampling(request.window).count(dataset.schema) - 1) / window.rate
     dataset = replace(dataset, schema=replace(dataset.schema, window=replace(window, stop=last)))
-    laws = SavedLaws(run.part, dataset, request.seed, request.resume)
+    laws = ParameterCache(run.part, dataset, request.seed, request.resume)
     return fit_mechanical(dataset, laws, request.seed, run.report, "correction" not in request.without)
 
 
 def fit_mechanical(
-    dataset: Dataset, laws: SavedLaws, seed: int, report: Callable[[str], None], correct: bool = True
+    dataset: Dataset, laws: ParameterCache, seed: int, report: Callable[[str], None], correct: bool = True
 ) -> Checkpoint:
     """Train on the objects of a data set of the scene `contact-force`; laws that are finished are kept in `laws`, and
     those that it has are not fitted again.
@@ -85,7 +85,7 @@ def fit_mechanical(
     shared = laws.get(SHARED)
     if shared is None:
         some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
-        shared = fit_law(some, pulse, MechanicalLaw(), report=report)
+        shared = fit_law(some, pulse, ContactParameters(), report=report)
         laws.add(SHARED, shared)
     bodies = [
         _Body(
@@ -130,8 +130,8 @@ class _Body:
     """(S, P) inputs by split."""
     train: Pushes
     val: Pushes
-    shared: MechanicalLaw
-    own: MechanicalLaw | None
+    shared: ContactParameters
+    own: ContactParameters | None
     """Its law, if an interrupted training has finished it."""
     pulse: float
     seed: int
@@ -139,7 +139,7 @@ class _Body:
     correct: bool
 
 
-def _fitted(body: _Body) -> tuple[MechanicalLaw, Checkpoint, float]:
+def _fitted(body: _Body) -> tuple[ContactParameters, Checkpoint, float]:
     """Its law, its checkpoint, and the seconds of processor time that they took."""
     begin = time.process_time()
     law = _law(body) if body.own is None else body.own
@@ -183,7 +183,7 @@ def _measured(asked: tuple[Checkpoint, Floats, Pushes]) -> Checkpoint:
     return _with_qualities(*asked)
 
 
-def _law(body: _Body) -> MechanicalLaw:
+def _law(body: _Body) -> ContactParameters:
     """Of that of all bodies and its own, fitted to several draws of its motions, the one with the smallest error on all
     training and validation motions.
 
@@ -196,7 +196,7 @@ def _law(body: _Body) -> MechanicalLaw:
         for some in draws
     ]
 
-    def error(law: MechanicalLaw) -> float:
+    def error(law: ContactParameters) -> float:
         total = 0.0
         for pushes in (body.train, body.val):
             errors = relative_errors(pushes, pushes.predicted(law, body.pulse, FINE))
@@ -219,7 +219,7 @@ def _checkpoint(
     schema: Schema,
     theta: Floats,
     pushes: Pushes,
-    law: MechanicalLaw,
+    law: ContactParameters,
     pulse: float,
     correction: Checkpointed | None = None,
 ) -> Checkpoint:

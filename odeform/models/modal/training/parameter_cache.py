@@ -8,15 +8,15 @@ from pathlib import Path
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.io import atomic_write, parse_json
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 
-__all__ = ["SHARED", "SavedLaws"]
+__all__ = ["SHARED", "ParameterCache"]
 
 SHARED = "all objects"
 """The name of the law that is fitted to all objects together."""
 
 
-class SavedLaws:
+class ParameterCache:
     """Laws by the name of their object, in a file that is written again whenever one is added."""
 
     def __init__(self, path: Path | None, dataset: Dataset, seed: int, resume: bool = False) -> None:
@@ -28,11 +28,11 @@ class SavedLaws:
         self._training = {"data": _digest(dataset), "window_s": dataset.schema.window.stop, "seed": seed}
         self._laws = {} if path is None or not resume else self._read(path)
 
-    def get(self, name: str) -> MechanicalLaw | None:
+    def get(self, name: str) -> ContactParameters | None:
         """None for a law that is not finished."""
         return self._laws.get(name)
 
-    def add(self, name: str, law: MechanicalLaw) -> None:
+    def add(self, name: str, law: ContactParameters) -> None:
         """Keep a finished law."""
         self._laws[name] = law
         if self.path is None:
@@ -40,7 +40,7 @@ class SavedLaws:
         laws = {known: asdict(value) for known, value in self._laws.items()}
         atomic_write(self.path, json.dumps({"training": self._training, "laws": laws}, indent=1).encode())
 
-    def _read(self, path: Path) -> dict[str, MechanicalLaw]:
+    def _read(self, path: Path) -> dict[str, ContactParameters]:
         try:
             data = path.read_bytes()
         except OSError as error:
@@ -49,7 +49,7 @@ class SavedLaws:
             known = parse_json(data, str(path))
             training = known["training"]
             laws = {
-                name: MechanicalLaw(**{key: float(value) for key, value in values.items()})
+                name: ContactParameters(**{key: float(value) for key, value in values.items()})
                 for name, values in known["laws"].items()
             }
         except (KeyError, TypeError, AttributeError, ValueError) as error:

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.geometry.contact import checked_contact
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import make_push
 from odeform.mechanics.step import Mechanics, Projectile
@@ -63,7 +63,7 @@ class Pushes:
         names = ("contacts", "normals", "centres", "forces", "reduced", "left_out")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
-    def predicted(self, law: MechanicalLaw, pulse: float, step: float) -> Float[np.ndarray, "pushes times y"]:
+    def predicted(self, law: ContactParameters, pulse: float, step: float) -> Float[np.ndarray, "pushes times y"]:
         """Their motions by mechanics alone, in steps of `step` seconds, which divide the frames."""
         mechanics = Mechanics(self.body.reduced(), law, self.projectile)
         push = make_push(mechanics.body, self.body.dynamic, self.contacts, self.centres, self.forces)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from odeform.mechanics.law import MechanicalLaw
+from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.contact.regression import PARTS, fit_contact_regression
 from odeform.models.modal.training.contact_fit import FINE
@@ -22,7 +22,7 @@ SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
 PRIOR = 0.1  # weight of a gain of one, relative to that of the motions
 
 
-def fit_correction(train: Pushes, val: Pushes, law: MechanicalLaw, pulse: float) -> tuple[Arrays, dict[str, Any]]:
+def fit_correction(train: Pushes, val: Pushes, law: ContactParameters, pulse: float) -> tuple[Arrays, dict[str, Any]]:
     """Arrays and settings of the correction of one body: see `odeform.models.modal.correction`.
 
     Each coefficient of the deformation has the gain of least squares. Shift, rotation and deformation have the share

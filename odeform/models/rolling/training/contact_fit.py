@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from odeform.mechanics.rolling.contact import RollingContact
 from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, RollingDynamics
-from odeform.mechanics.rolling.law import RollingLaw
 from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support
 from odeform.types import Bools, Floats, Ints
@@ -60,7 +60,7 @@ class Motions:
         return replace(self, moved=self.moved[:count], seen=self.seen[:count])
 
 
-def roll_out(law: RollingLaw, support: Support, radius: float, motions: Motions) -> Floats:
+def roll_out(law: RollingContact, support: Support, radius: float, motions: Motions) -> Floats:
     """(T, 8, M) states in the frames of `motions`."""
     dynamics = RollingDynamics(law, support, radius, motions.material)
     return dynamics.roll_out(motions.start, *_half_frames(motions))[1::2]
@@ -82,7 +82,7 @@ def _missed(states: Floats, motions: Motions, radius: float, robust: float) -> t
     return np.arcsinh(apart), scale / np.sqrt(1.0 + apart**2)
 
 
-def law_error_mm(law: RollingLaw, support: Support, radius: float, motions: Motions) -> float:
+def law_error_mm(law: RollingContact, support: Support, radius: float, motions: Motions) -> float:
     """Pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
     states = roll_out(law, support, radius, motions)[:, :MOVING]
     apart = (states.swapaxes(1, 2) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
@@ -98,7 +98,9 @@ class _Normal:
     slope: Float[np.ndarray, " free"]
 
 
-def _normal(law: RollingLaw, free: Ints, support: Support, radius: float, motions: Motions, robust: float) -> _Normal:
+def _normal(
+    law: RollingContact, free: Ints, support: Support, radius: float, motions: Motions, robust: float
+) -> _Normal:
     total = _Normal(0.0, np.zeros((len(free), len(free))), np.zeros(len(free)))
     count, share = len(motions.material), 1.0 / (MOVING * motions.seen[:: motions.every].sum())
     for at in range(0, count, TOGETHER):
@@ -115,7 +117,7 @@ def _normal(law: RollingLaw, free: Ints, support: Support, radius: float, motion
 
 
 def fit_law(
-    law: RollingLaw,
+    law: RollingContact,
     free: Ints,
     support: Support,
     radius: float,
@@ -125,7 +127,7 @@ def fit_law(
     go_on: Callable[[], bool] = lambda: True,
     robust: float = ROBUST,
     damping: float = 1e-2,
-) -> RollingLaw:
+) -> RollingContact:
     """The law after at most `steps` steps of Levenberg and Marquardt, in which the numbers with the indices
     `free` (F,) change; `radius` is in m, and errors count in full up to about `robust` mm.
     `damping` is that of the first step: 1 where the law is far off, and its derivatives tell little.
@@ -133,7 +135,7 @@ def fit_law(
     It ends earlier where a step gains hardly anything, and when `go_on` says so.
     """
 
-    def cost_of(trial: RollingLaw) -> float:
+    def cost_of(trial: RollingContact) -> float:
         states = roll_out(trial, support, radius, motions)
         missed = _missed(states, motions, radius, robust)[0]
         return float(np.square(missed).sum() / (MOVING * motions.seen[:: motions.every].sum()))

@@ -15,8 +15,8 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.errors import InputError
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling.contact import ADJUSTED, COEFFICIENTS, RollingContact, first_law
 from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, STATE
-from odeform.mechanics.rolling.law import ADJUSTED, COEFFICIENTS, RollingLaw, first_law
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.continuation import LATER_ERRORS
 from odeform.models.kernels.regression import KernelRegression
@@ -243,7 +243,7 @@ def _with_one(inputs: Floats) -> Float[np.ndarray, "motions rows"]:
     return np.concatenate([np.ones((len(inputs), 1)), inputs], axis=1)
 
 
-def _without(law: RollingLaw, parts: Sequence[str]) -> RollingLaw:
+def _without(law: RollingContact, parts: Sequence[str]) -> RollingContact:
     """The law from which a fit without some of its `parts` starts: without corners, they are hardly felt."""
     terms, last = law.terms.copy(), law.last.copy()
     if "corners" in parts:
@@ -254,7 +254,7 @@ def _without(law: RollingLaw, parts: Sequence[str]) -> RollingLaw:
     return replace(law, terms=terms, last=last)
 
 
-def _free(law: RollingLaw, without: Sequence[str], linear: bool) -> Ints:
+def _free(law: RollingContact, without: Sequence[str], linear: bool) -> Ints:
     """Indices of the numbers that are fitted, of all but the parts that are left out. With `linear`, only of those that
     are constant or linear in the material, without the network and the place of rest."""
     flags = {field.name: np.ones_like(getattr(law, field.name)) for field in fields(law)}
@@ -267,10 +267,10 @@ def _free(law: RollingLaw, without: Sequence[str], linear: bool) -> Ints:
     empty |= {"first", "bias", "last"} if linear or "network" in without else set()
     for name in empty:
         flags[name][:] = 0.0
-    return np.flatnonzero(RollingLaw(**flags).flat())
+    return np.flatnonzero(RollingContact(**flags).flat())
 
 
-def _rows(data: TrainingData, law: RollingLaw, support: Support, radius: float, motions: Motions) -> ReadoutRows:
+def _rows(data: TrainingData, law: RollingContact, support: Support, radius: float, motions: Motions) -> ReadoutRows:
     """Those of motions under the law, so that what is read out of them knows what the law is wrong about."""
     states = roll_out(law, support, radius, motions)
     count = len(states)

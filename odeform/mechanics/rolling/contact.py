@@ -21,7 +21,7 @@ __all__ = [
     "PLACES",
     "PLAIN",
     "REACHING",
-    "RollingLaw",
+    "RollingContact",
     "first_law",
     "material_terms",
 ]
@@ -51,7 +51,7 @@ INPUTS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class RollingLaw:
+class RollingContact:
     """The numbers of one law."""
 
     terms: Float[np.ndarray, "coefficients terms"]
@@ -66,11 +66,11 @@ class RollingLaw:
         """All numbers in one axis."""
         return np.concatenate([getattr(self, field.name).ravel() for field in fields(self)])
 
-    def like(self, flat: Float[np.ndarray, " numbers"]) -> "RollingLaw":
+    def like(self, flat: Float[np.ndarray, " numbers"]) -> "RollingContact":
         """A law of the same sizes with the numbers (n,) of `flat`."""
         shapes = [getattr(self, field.name).shape for field in fields(self)]
         parts = np.split(flat, np.cumsum([np.prod(shape) for shape in shapes])[:-1])
-        return RollingLaw(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
+        return RollingContact(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
     def coefficients(self, material: Float[np.ndarray, "motions materials"]) -> dict[str, Floats]:
         """By name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
@@ -82,7 +82,7 @@ class RollingLaw:
         return {f"law.{field.name}": getattr(self, field.name) for field in fields(self)}
 
     @classmethod
-    def from_arrays(cls, arrays: Arrays, materials: int) -> "RollingLaw":
+    def from_arrays(cls, arrays: Arrays, materials: int) -> "RollingContact":
         """KeyError for a missing array, ValueError unless they are finite and of their shapes."""
         like = first_law(materials, 0)
         return cls(**finite_arrays(arrays, "law.", {f.name: getattr(like, f.name).shape for f in fields(cls)}))
@@ -94,13 +94,13 @@ def material_terms(material: Float[np.ndarray, "motions materials"]) -> Float[np
     return np.concatenate([np.ones((len(material), 1)), material, material[:, left] * material[:, right]], axis=1)
 
 
-def first_law(materials: int, seed: int) -> RollingLaw:
+def first_law(materials: int, seed: int) -> RollingContact:
     """The law that a training starts from: independent of the material, with a network that adds nothing yet."""
     rng, inputs = np.random.default_rng(seed), INPUTS + materials
     starts = [*COEFFICIENTS.values(), *PLAIN.values()]
     terms = np.zeros((len(starts), material_terms(np.zeros((1, materials))).shape[1]))
     terms[:, 0] = starts
-    return RollingLaw(
+    return RollingContact(
         terms,
         np.zeros((len(PLACES), 1 + materials)),
         0.7 * rng.normal(size=(inputs, HIDDEN)),

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-__all__ = ["MechanicalLaw"]
+__all__ = ["ContactParameters"]
 
 
 @dataclass(frozen=True)
-class MechanicalLaw:
+class ContactParameters:
     """Contact and material of reduced mechanics.
 
     Fits to training motions start from these values, which an earlier fit found.
