@@ -19,7 +19,7 @@ def geometry_key(geometry: Geometry) -> Hashable:
 
     A value that is kept under this key has to hold the geometry, so that its id stays its own.
     """
-    return id(geometry), zlib.crc32(np.ascontiguousarray(geometry.points))
+    return id(geometry), zlib.crc32(np.ascontiguousarray(geometry.points).data)
 
 
 class Recent(Generic[Value]):
