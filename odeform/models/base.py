@@ -190,7 +190,9 @@ class Predictor(ABC):
         Args:
             parameters: by name, arrays (B,), or (B, 3) for a vector, in the units of `schema`. A number, vector or name
                 is shared by all; defaults for the others.
-            quality, until, geometry: as of `solve`, for all motions.
+            quality: as of `solve`, for all motions.
+            until: as of `solve`.
+            geometry: as of `solve`.
 
         Raises:
             InputError: for arrays of different lengths or shapes, and what `solve` cannot use.
