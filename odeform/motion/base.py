@@ -149,7 +149,7 @@ class Motion(Remade, ABC):
     def deformation_rms(self, times: Times) -> Times:
         """(T,) root-mean-square local displacement over the surface in metres, at (T,) seconds."""
 
-    @property
+    @cached_property
     def likeness(self) -> Likeness | None:
         """How similar the shape is to the trained bodies; None where the checkpoint does not hold them."""
         return self.trust.likeness(self.geometry)

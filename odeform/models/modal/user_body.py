@@ -141,7 +141,7 @@ class UserBodyPredictor(ModalModel):
         self.trained, self.own = trained, own
         body, checkpoint = own.body, part.checkpoint
         self.distance = shape_distance(Mesh(body.points.astype(np.float32), body.faces), part.rest)
-        # a correction is that of the trained body: what similar shapes get of it is added below; and so are solver
+        # a residual is that of the trained body: what similar shapes get of it is added below; and so are solver
         # errors, which were not measured on this one
         of_trained = ("correction", "qualities", "frontier")
         kept = {key: value for key, value in checkpoint.config.items() if key not in of_trained}

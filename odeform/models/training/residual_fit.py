@@ -23,9 +23,9 @@ EXPLAINED = 0.05  # share of a part's mean square residual on validation, from w
 
 
 def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
-    """The checkpoint of a trained ODE with a correction of those parts of y that it improves on validation.
+    """Return the checkpoint of a trained ODE with a residual of those parts of y that it improves on validation.
 
-    Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the correction fades from
+    Unchanged where no part is improved, and where a spline filled in frames. With `fading`, the residual fades from
     the first of these frames to the last, and its kernel is chosen for those before: chance landings later on would
     hide how smooth a push is in the parameters.
     """
@@ -63,7 +63,7 @@ def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int,
 
 
 def _left(fading: tuple[int, int]) -> Floats:
-    """What is left of a correction, in the frames up to the last of `fading`."""
+    """What is left of a residual, in the frames up to the last of `fading`."""
     begin, end = fading
     share = np.clip((np.arange(end + 1) - begin) / (end - begin), 0.0, 1.0)
     return 1.0 - share**2 * (3.0 - 2.0 * share)

@@ -1,5 +1,4 @@
-"""The correction of a mechanical model: which share of each part of the motion is the mechanics', and the regression of
-what that leaves."""
+"""The residual of a modal model: the weight of each part of the mechanics' motion, and the regression of what is left."""
 
 from typing import Any
 
@@ -23,7 +22,7 @@ PRIOR = 0.1  # weight of a gain of one, relative to that of the motions
 
 
 def fit_correction(train: Pushes, val: Pushes, law: ContactParameters, pulse: float) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and settings of the correction of one body: see `odeform.models.modal.correction`.
+    """Return arrays and settings of the residual of one body: see `odeform.models.modal.contact_residual`.
 
     Each coefficient of the deformation has the gain of least squares. Shift, rotation and deformation have the share
     with the smallest squared error on training motions, each predicted from all others, and validation motions
