@@ -1,4 +1,5 @@
-"""The residual of a modal model: the weight of each part of the mechanics' motion, and the regression of what is left."""
+"""The residual of a modal model: the weight of each part of the mechanics' motion, and the regression of what that
+leaves."""
 
 from typing import Any
 
