@@ -79,6 +79,20 @@ def test_a_step_may_end_anywhere_in_the_pulse(block: Block) -> None:
     assert ends[0] == pytest.approx(ends[1], rel=0.01)
 
 
+def test_the_end_of_the_pulse_ends_a_step(block: Block) -> None:
+    """A step over it is one up to it, and one that does the rest of the way without the sphere."""
+    field, step = pushed(block, -2.0 * NORMAL), 1e-3
+    moving = integrate(field, field.start, SolverSettings("limex", step=step, dtype="float64"), 0.9 * PULSE).states[-1]
+    for before in (0.2 * step, 0.7 * step):
+        first, _, error = field.advance(PULSE - before, moving, before)
+        after, slope, rest = field.advance(PULSE, first, step - before)
+        whole = field.advance(PULSE - before, moving, step)
+        np.testing.assert_allclose(whole[0], after, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(whole[1], slope, rtol=1e-9, atol=1e-9)
+        assert whole[2] == pytest.approx(error + rest)
+        assert np.abs(after - first).max() > 1e-4
+
+
 def test_the_push_gives_the_body_its_momentum(block: Block) -> None:
     field = pushed(block, -2.0 * NORMAL, ContactParameters(floor_friction=0.0))
     solution = integrate(field, field.start, SolverSettings("limex", step=5e-4, dtype="float64"), PULSE)

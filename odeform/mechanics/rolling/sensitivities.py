@@ -123,21 +123,21 @@ def _linearised(dynamics: RollingDynamics, at: Contacts, free: Ints) -> _Linear:
     inside = (at.exponents > EXPONENTS[0]) & (at.exponents < EXPONENTS[1])
     adjusted = np.stack([by[name] for name in ADJUSTED], axis=2) * inside
 
-    # through the network: of what it is told, and of its weights
+    # through the network: of its inputs, and of its weights
     behind = (adjusted @ law.last.T) * (1.0 - at.hidden**2)
-    told = behind @ law.first[:INPUTS].T / np.array([DEEP, UPWARD, 1.0, AHEAD])
-    by_sliding = by["sliding"] + told[..., 2] * np.sign(at.sliding)
+    by_input = behind @ law.first[:INPUTS].T / np.array([DEEP, UPWARD, 1.0, AHEAD])
+    by_sliding = by["sliding"] + by_input[..., 2] * np.sign(at.sliding)
 
     deep = (at.depth > DEPTHS[0]) & (at.depth < DEPTHS[1])
-    by_gap, share = 100.0 * deep * (by["depth"] + told[..., 0]), dynamics.share[rows]
+    by_gap, share = 100.0 * deep * (by["depth"] + by_input[..., 0]), dynamics.share[rows]
     settled = at.reached * dynamics.settled[rows]
     felt = at.strong[:, ADJUSTED.index("corners")]
     bent = felt * dynamics.support.bends(at.angle) + ((at.apart**2 - 1.0) * settled).sum(axis=1) / REACHING**2
     by_state = [
         -by_gap,
         by_gap * (at.settled_slopes + share * at.corner_slopes) + by["slope"] * bent,
-        by_sliding + told[..., 3] * np.sign(fast),
-        by["up"] + told[..., 1],
+        by_sliding + by_input[..., 3] * np.sign(fast),
+        by["up"] + by_input[..., 1],
         by["spin"] - dynamics.lever[rows] * by_sliding,
     ]
 
