@@ -157,6 +157,17 @@ def test_predict_tells_of_a_shape_that_was_not_trained(tmp_path: Path, capsys: p
             assert ("not trained" in str(arrays["notes"])) == (name == "box")
 
 
+@pytest.mark.parametrize(
+    ("name", "family"), [("mass-elastic", "latent"), ("kick", "rolling"), ("contact-force", "modal")]
+)
+def test_info_says_what_a_model_is_made_of(name: str, family: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("info", name) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["model"] == family
+    assert ("neural ODE" in said["made_of"]) == (family == "latent")
+    assert ("no network" in said["made_of"]) == (family == "modal")
+
+
 def test_info_tells_which_shapes_were_trained(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("info", "kick") == 0
     (body,) = json.loads(capsys.readouterr().out)["trained_shapes"]

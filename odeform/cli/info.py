@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> None:
     checkpoint = predictor.checkpoint
     result = {
         "schema": checkpoint.schema.to_json(),
-        "model": checkpoint.model,
+        "model": predictor.model,
+        "made_of": predictor.made_of,
         "predicts": "the final state only" if predictor.final_only else "motions",
         "size_bytes": checkpoint.size_bytes,
         "numbers": sum(int(array.size) for array in checkpoint.arrays.values()),

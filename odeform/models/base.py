@@ -70,6 +70,8 @@ class Predictor(ABC):
 
     model: str
     """The name under which checkpoints and the command line know this class."""
+    made_of: str = ""
+    """What it has of neural networks, of mechanics and of regression, in words."""
     qualities: Mapping[str, SolverSettings] = {}
     """Solver settings by name (draft, balanced, reference); empty for models that do not integrate."""
     frontier: tuple[FrontierPoint, ...] = ()

@@ -76,7 +76,7 @@ class PerObject(Predictor):
     def _read(self, checkpoint: Checkpoint) -> None:
         self.parts = {name: self._kind(_part(checkpoint, name)) for name in checkpoint.schema.objects}
         first = next(iter(self.parts.values()))
-        self.model = self._kind.model
+        self.model, self.made_of = self._kind.model, self._kind.made_of
         self.qualities, self.frontier = first.qualities, first.frontier
         self.rescales_input, self.extrapolates = first.rescales_input, first.extrapolates
         self.final_only = first.final_only

@@ -36,6 +36,10 @@ class LatentModel(Model):
     """Latent neural ODEs for pose and deformation (the paper's model, one latent state per object)."""
 
     model = "latent"
+    made_of = (
+        "neural networks: two latent neural ODEs between encoders and decoders, as in the paper; "
+        "where it helps, a kernel regression adds what they leave unexplained"
+    )
     resumable = True
     descends = True
     together = 128

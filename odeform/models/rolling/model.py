@@ -56,6 +56,10 @@ class RollingModel(Model):
     """The motion of one round body in a plane, or up and down."""
 
     model = "rolling"
+    made_of = (
+        "mechanics: a round body that flies, lands and rolls, with fitted contact coefficients that a small network "
+        "adjusts; a second network reads the deformation off the state; the push is regressed on the parameters"
+    )
     together = 256
     continues_itself = True
     fallback = SolverSettings("rk4", step=1e-3, dtype="float64")
