@@ -51,6 +51,8 @@ def test_shapes(tab: Tab, drop: Predictor, suffix: str, tmp_path: Path) -> None:
     mesh = trimesh.load(_exported(tab, f"current frame ({suffix})", tmp_path), process=False, force="mesh")
     request = tab.app.request()
     expected = tab.app.session.motion(request.columns[0], request).vertices(0.3)
+    if suffix == ".glb":  # y points up in glTF, by its specification
+        expected = expected[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     found = np.asarray(mesh.vertices)  # pyright: ignore[reportAttributeAccessIssue]
     # readers split vertices at seams, so each is compared with its nearest
     off = np.linalg.norm(found[:, None] - expected[None], axis=2)
