@@ -73,6 +73,11 @@ class ReducedBody:
     surface: Samples
     """Where something may touch it."""
 
+    @cached_property
+    def reach(self) -> float:
+        """Metres from the mass centre to the farthest sample of the support."""
+        return float(np.sqrt((self.support.points**2).sum(axis=1).max()))
+
     def near(self, points: Float[np.ndarray, "batch 3"], count: int) -> Ints:
         """(B, count) indices of the samples of the surface nearest to each point, m relative to the mass centre."""
         return self.surface.tree.query(points, min(count, len(self.surface.points)))[1].reshape(len(points), -1)

@@ -70,7 +70,9 @@ class Steps:
         self._spread = np.full(6 + size, 1.0 / solid.mass)
         self._spread[:3], self._spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
         self._touching = {
-            pushed: Touching(push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius)
+            pushed: Touching(
+                push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius, mechanics.body.reach
+            )
             for pushed in (True, False)
         }
 

@@ -64,9 +64,10 @@ class Near:
 class Touching:
     """Finds where B pushed bodies may touch something."""
 
-    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float) -> None:
-        """Spheres of `radius` m push for as long as states hold them."""
-        self._push, self._law, self._radius, self._level = push, law, radius, floor.level
+    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float, reach: float) -> None:
+        """Spheres of `radius` m push for as long as states hold them; no sample of the support is farther than `reach`
+        m from the mass centre."""
+        self._push, self._law, self._radius, self._level, self._reach = push, law, radius, floor.level, reach
         batch, _, samples = push.points.shape
         self._springs = np.empty((4, batch, samples))
         stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
@@ -84,7 +85,8 @@ class Touching:
         push = self._push
         _, place = _bent(push.points, push.rows, state)
         height = _heights(place[..., : push.support], self._level, state)
-        down = np.minimum(state.velocity[:, 2], 0.0)
+        spin = np.sqrt((state.velocity[:, 3:6] ** 2).sum(axis=1))
+        down = np.minimum(state.velocity[:, 2] - self._reach * spin, 0.0)
         stand, real = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
         chosen = stand
         if state.pushed:

@@ -11,9 +11,10 @@ from jaxtyping import Float
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.flat import body_motion
 from odeform.mechanics.push import Push, make_push
-from odeform.mechanics.pushed import PushedBody, body_motion
-from odeform.mechanics.pushed_batch import PushedBodies
+from odeform.mechanics.pushed import PushedBody
+from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import contact_residual
@@ -143,7 +144,7 @@ class ModalModel(Model):
     ) -> Callable[[], BatchProblem]:
         def make() -> BatchProblem:
             push = self._push(theta)
-            bodies = PushedBodies(self.mechanics, push, self.pulse)
+            bodies = pushed_bodies(self.mechanics, push, self.pulse)
             readouts = [self._readout(modes) for modes in push.modes]
 
             def readout(times: Times, states: Floats) -> Floats:
