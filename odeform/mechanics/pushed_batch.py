@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from odeform.compiling import compiles
-from odeform.mechanics.flat import flat_slopes, packed, start_of, unpacked
+from odeform.mechanics.flat import flat_slopes, packed, unpacked
 from odeform.mechanics.floor import GRAVITY
 from odeform.mechanics.push import Push
 from odeform.mechanics.step import Mechanics, Steps
@@ -30,12 +30,13 @@ class PushedBodies:
     def __init__(self, mechanics: Mechanics, push: Push, pulse: float) -> None:
         """Projectiles push for `pulse` seconds from time 0 on."""
         self._mechanics, self._push, self._pulse = mechanics, push, pulse
+        self._preload = mechanics.preload(push)
         self._known: dict[bool, tuple[bytes, Steps]] = {}
 
     @property
     def start(self) -> Float[np.ndarray, "batch state"]:
         """(B, 20 + 2 K): at rest."""
-        return np.tile(start_of(self._push.squares.shape[1]), (len(self._push.squares), 1))
+        return self._mechanics.start(self._push)
 
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
         """The slopes of states (R, 20 + 2 K) at `times` (R,) in s of the pushes `rows`."""
@@ -82,7 +83,8 @@ class PushedBodies:
         key, (last, steps) = rows.tobytes(), self._known.get(pushing, (b"", None))
         if steps is None or last != key:
             whole = self._push if pushing else self._push.over
-            steps = Steps(self._mechanics, whole if len(rows) == len(whole.squares) else whole.some(rows))
+            some = whole if len(rows) == len(whole.squares) else whole.some(rows)
+            steps = Steps(self._mechanics, some, self._preload[rows])
             self._known[pushing] = key, steps
         return steps
 
@@ -111,7 +113,7 @@ class CompiledBodies:
             grip=grip,
             level=floor.level,
             squares=law.stiffness * push.squares,
-            preload=floor.preload @ push.modes,
+            preload=mechanics.preload(push),
             inertia=np.ascontiguousarray(solid.inertia, dtype=float),
             spread=spread,
             centres=np.ascontiguousarray(push.centres, dtype=float),
@@ -133,7 +135,7 @@ class CompiledBodies:
     @property
     def start(self) -> Float[np.ndarray, "batch state"]:
         """(B, 20 + 2 K): at rest."""
-        return np.tile(start_of(self._push.squares.shape[1]), (len(self._push.squares), 1))
+        return self._mechanics.start(self._push)
 
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
         """The slopes of states (R, 20 + 2 K) at `times` (R,) in s of the pushes `rows`."""
