@@ -9,7 +9,7 @@ from jaxtyping import Float
 from odeform.motion.trajectory import Moving
 from odeform.types import Floats, Times
 
-__all__ = ["FloorProjection"]
+__all__ = ["FloorProjection", "raised"]
 
 MOST = 0.01  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
 
@@ -37,11 +37,9 @@ class FloorProjection:
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
-        by = self._by(y) if self._grid is None else self._between(times, self._grid).reshape(y.shape[:-1])
-        if by.any():
-            y = y.copy()
-            y[..., 2] += by
-        return y
+        if self._grid is None:
+            return raised(y, self._lowest, self._limit)
+        return _moved_up(y, self._between(times, self._grid).reshape(y.shape[:-1]))
 
     def _between(self, times: Times, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "batch times"]:
         """Of each motion, from the changes on the grid."""
@@ -51,9 +49,22 @@ class FloorProjection:
     def _on_grid(self) -> Floats:
         """(G,) m at the times of the grid, or (B, G)."""
         assert self._grid is not None
-        return self._by(self._own.reduced(self._grid))
+        return _missing(self._own.reduced(self._grid), self._lowest, self._limit)
 
-    def _by(self, y: Floats) -> Floats:
-        """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
-        deeper = self._limit - self._lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
-        return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite
+
+def raised(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Float[np.ndarray, "*batch times y"]:
+    """Coordinates (..., T, 6 + K), each moment raised by itself; `lowest` and `limit` as of `FloorProjection`."""
+    return _moved_up(y, _missing(y, lowest, limit))
+
+
+def _moved_up(y: Floats, by: Floats) -> Floats:
+    if by.any():
+        y = y.copy()
+        y[..., 2] += by
+    return y
+
+
+def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Floats:
+    """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
+    deeper = limit - lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
+    return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite
