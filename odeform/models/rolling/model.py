@@ -17,7 +17,7 @@ from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.model import Model
 from odeform.models.residual import parameter_residual
-from odeform.models.rolling.phases import Push, rising
+from odeform.models.rolling.phases import RISING, Push, rising
 from odeform.models.rolling.readout import Readout, inputs_of
 from odeform.models.rolling.start import Start, push_inputs, read_start
 from odeform.models.solved import Problem, SolvedTrajectory
@@ -149,10 +149,10 @@ class RollingModel(Model):
 
         def readout(times: Times, states: Floats) -> Floats:
             y = decoded(states / self._units)
-            # how the push deforms the body does not follow from the motion: it is regressed
-            y[..., POSE:] *= rising(times - self.begin)[:, None]
-            early = times < self.begin
-            if early.any():
+            if times.min(initial=np.inf) < self.begin + RISING:
+                # how the push deforms the body does not follow from the motion: it is regressed
+                y[..., POSE:] *= rising(times - self.begin)[:, None]
+                early = times < self.begin
                 y[..., early, :] = push(times[early])
             return y
 
@@ -169,7 +169,10 @@ class RollingModel(Model):
 
         def decoded(states: Float[np.ndarray, "*batch times states"]) -> Float[np.ndarray, "*batch times y"]:
             rows, times = states.reshape(-1, STATE), states.shape[-2]
-            inputs = inputs_of(rows.T, np.repeat(touch, times), np.repeat(material, times, axis=0))
+            each = (
+                (touch, material) if len(touch) == 1 else (np.repeat(part, times, axis=0) for part in (touch, material))
+            )
+            inputs = inputs_of(rows.T, *each)
             y = np.concatenate([self._placed(rows[:, :MOVING]), self._readout(inputs)], axis=1)
             return y.reshape(*states.shape[:-1], -1)
 

@@ -20,7 +20,7 @@ SIZE = 192
 
 
 def inputs_of(
-    states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, " rows"], material: Float[np.ndarray, "rows q"]
+    states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, "#rows"], material: Float[np.ndarray, "#rows q"]
 ) -> Float[np.ndarray, "rows inputs"]:
     """What the deformation follows from: depths now and before, how the contact moves, and which side is down.
 
