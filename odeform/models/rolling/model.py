@@ -169,10 +169,9 @@ class RollingModel(Model):
 
         def decoded(states: Float[np.ndarray, "*batch times states"]) -> Float[np.ndarray, "*batch times y"]:
             rows, times = states.reshape(-1, STATE), states.shape[-2]
-            each = (
-                (touch, material) if len(touch) == 1 else (np.repeat(part, times, axis=0) for part in (touch, material))
-            )
-            inputs = inputs_of(rows.T, *each)
+            repeated = 1 if len(bodies) == 1 else times  # of one body, they are broadcast
+            of_rows = (np.repeat(part, repeated, axis=0) for part in (touch, material))
+            inputs = inputs_of(rows.T, *of_rows)
             y = np.concatenate([self._placed(rows[:, :MOVING]), self._readout(inputs)], axis=1)
             return y.reshape(*states.shape[:-1], -1)
 
