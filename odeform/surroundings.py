@@ -1,4 +1,4 @@
-"""What is around a body and acts on it: a floor, gravity, a sphere that pushes. Data sets and checkpoints keep it."""
+"""Describes what acts on a body: a floor, gravity, a sphere that pushes. Data sets and checkpoints keep it."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ class Contacts:
     pulse: float
     """Seconds from 0 on during which the sphere pushes."""
     radius: float
-    """Of the sphere in metres."""
+    """Radius of the sphere in metres."""
 
     def forces_on(self, name: str) -> tuple[float, float]:
         """Weakest and strongest force on an object in newton; those of the first for an unknown one."""
@@ -35,7 +35,7 @@ class Surroundings:
     gravity: float = GRAVITY
     """m/s^2, along -z."""
     contacts: Contacts | None = None
-    """In scenes in which a sphere pushes a body."""
+    """The sphere, in scenes in which one pushes a body."""
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Surroundings":

@@ -1,4 +1,4 @@
-"""What a panel is and what it is built from."""
+"""Defines what a panel is and what it is built from."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -97,7 +97,7 @@ class Page:
     controls: Controls = field(default_factory=Controls)
     panels: list[Panel] = field(default_factory=list)
     hotkeys: dict[str, str] = field(default_factory=dict)
-    """What each hot key does, in words; see `add_hotkey`."""
+    """Says in words what each hot key does; see `add_hotkey`."""
     _on_columns_changed: list[Callable[[], None]] = field(default_factory=list)
 
     @property
@@ -146,7 +146,7 @@ class Page:
         self._on_columns_changed.append(action)
 
     def columns_changed(self) -> None:
-        """To be called after a change of the columns or their shape."""
+        """Tells the panels of a change of the columns or their shape."""
         for action in self._on_columns_changed:
             action()
         self.wake()

@@ -145,7 +145,7 @@ def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats)
 
 
 def push_excess(push: Push, forces: tuple[float, float]) -> dict[str, str]:
-    """In what a push is beyond those of the training data, and how far these go, in words."""
+    """Says in words in what a push is beyond those of the training data, and how far these go."""
     excess = {}
     if push.strength > forces[1] * (1.0 + 1e-6):
         excess["force"] = f"trained up to {forces[1]:g} N"
@@ -177,7 +177,7 @@ def first_push(frame: Frame) -> tuple[Push, str] | None:
 
 
 def outside_of_push(frame: Frame) -> list[str]:
-    """What of the push of the first visible model is outside of its training; empty in scenes without one."""
+    """Says what of the first visible model's push is outside of its training; empty in scenes without one."""
     shown, found = _first_model(frame), first_push(frame)
     if shown is None or shown.column.predictor is None or found is None:
         return []

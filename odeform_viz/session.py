@@ -28,7 +28,7 @@ MUCH = 0.2  # of the largest deformation, above which a body counts as deformed 
 SLOW = 0.1  # s from a new motion to its first frame; slower columns are computed after the others
 
 SolveInputs = tuple[Mapping[str, float], str | SolverSettings, RecordedMotion | None]
-"""What a motion depends on besides the shape: parameters, quality, and the record that observed frames come from."""
+"""Lists what a motion depends on besides the shape: parameters, quality, and the record of observed frames."""
 
 
 def settings_of(predictor: Predictor, quality: str) -> str | SolverSettings:
@@ -90,7 +90,7 @@ class Session:
             return source.solve(column.geometry, parameters, quality, observed=_observed_frames(source, record))
 
     def new_compared_motion(self, column: Column, truth: RecordedMotion, request: ViewRequest) -> Motion:
-        """As `new_motion`, but of the mesh of `truth` (`truth_of`), vertex by vertex."""
+        """Solves the motion of `new_motion` for the mesh of `truth` (`truth_of`), vertex by vertex."""
         source = column.predictor
         assert source is not None
         parameters, quality, record = self._inputs(column, source, request)
@@ -160,7 +160,8 @@ class Session:
             return float(times[np.argmax(self.motion(column, request).deformation_rms(times))])
 
     def first_impact(self, request: ViewRequest) -> tuple[float, float]:
-        """From when to when, in s, the first visible column is deformed much for the first time; equal if never."""
+        """Finds from when to when, in s, the first visible column is deformed much for the first time; equal if
+        never."""
         column = next((column for column in request.columns if column.visible), None)
         if column is None:
             return (request.time, request.time)

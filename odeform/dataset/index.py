@@ -112,7 +112,8 @@ def assign_splits(count: int, seed: int) -> list[str]:
 
 
 def assign_splits_in_blocks(count: int, seed: int, standard: int) -> list[str]:
-    """As `assign_splits` in each block of ten, up to `standard` sequences; all further ones are for training.
+    """Assigns splits as `assign_splits` does in each block of ten, up to `standard` sequences; the rest is for
+    training.
 
     A longer list starts with the shorter one.
     """

@@ -1,4 +1,4 @@
-"""What reduced models are trained on: one reduced trajectory for each sequence of a data set."""
+"""Prepares what reduced models are trained on: one reduced trajectory for each sequence of a data set."""
 
 import hashlib
 import json
@@ -30,7 +30,7 @@ class TrainingData:
     """Parameters and reduced motions of the splits train and val."""
 
     schema: Schema
-    """With the window and frame rate of the training."""
+    """The scene's schema, with the window and frame rate of the training."""
     space: ReducedSpace
     times: Floats
     """(T,) seconds of the frames."""
@@ -143,7 +143,7 @@ def _frames(dataset: Dataset, recorded: MotionSequence, count: int) -> MotionSeq
 
 
 def _body(dataset: Dataset, count: int) -> _Body:
-    """From the first training sequence."""
+    """Takes the body from the first training sequence."""
     first = next(dataset.sequences("train"), None)
     if first is None:
         raise InputError(f"{dataset.root}: no sequence in split train")

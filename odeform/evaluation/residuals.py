@@ -1,4 +1,4 @@
-"""What a model does on data it was made from: errors, for its error band, and depths, for the watch over motions."""
+"""Measures a model on data it was made from: errors, for its error band, and depths, for the plausibility check."""
 
 import itertools
 

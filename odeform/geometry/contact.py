@@ -1,4 +1,4 @@
-"""Where a sphere touches a surface and a force pushes it inward: the contacts of the scene `contact-force`."""
+"""Finds where a sphere touches a surface and a force pushes it inward: the contacts of `contact-force`."""
 
 import math
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class SurfacePoint:
 
 
 class _Surface:
-    """What all searches of nearest points on a mesh share."""
+    """Holds what all searches of nearest points on a mesh need."""
 
     def __init__(self, mesh: Mesh) -> None:
         points = np.asarray(mesh.points, dtype=float)

@@ -37,7 +37,7 @@ class FittedShape:
     region: Region | None
     """The part that moves, in the units of the file; None for all of it."""
     transform: Similarity
-    """From the file to the scene (metres)."""
+    """Maps the file's coordinates to the scene (metres)."""
     geometry: Geometry
     """The part that moves, at rest in the scene."""
     remainder: Geometry | None

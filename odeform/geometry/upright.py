@@ -1,4 +1,4 @@
-"""Which axis of a shape points up: what its file says, else for a mesh a guess, else z.
+"""Finds which axis of a shape points up: what its file says, else for a mesh a guess, else z.
 
 The viewer, the command line and `fit_to` follow this one rule.
 """

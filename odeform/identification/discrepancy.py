@@ -26,7 +26,7 @@ __all__ = ["LEAST", "NOMINAL", "PREFIX", "TWO_SIDED", "Discrepancy", "calibrate"
 NOMINAL, TWO_SIDED = 0.9, 1.6449
 """Nominal coverage of the intervals, and the matching number of standard deviations of a normal distribution."""
 PREFIX = "discrepancy."
-"""Of its arrays in a checkpoint."""
+"""Prefixes the names of its arrays in a checkpoint."""
 FLOOR_MM = 2e-3  # error of a cause from rounding of the data
 FIRST_SPAN = 0.025  # s; each span of time is twice as long as all before it
 DISCOUNT = 2.0
@@ -65,7 +65,7 @@ class Discrepancy:
 
 
 def stored_discrepancy(predictor: Predictor) -> Discrepancy | None:
-    """That of a predictor's checkpoint; None where it has none. `InputError` for a damaged one."""
+    """Reads the discrepancy of a predictor's checkpoint; None where it has none. `InputError` for a damaged one."""
     arrays = predictor.checkpoint.arrays
     if f"{PREFIX}times" not in arrays:
         return None

@@ -59,7 +59,7 @@ class Observation:
             raise InputError("observation: expected times of at least 0 and positive noise")
 
     def subsampled(self, points: int = MOST_POINTS, frames: int = MOST_FRAMES) -> "Observation":
-        """At most `points` points and `frames` frames, evenly chosen: more take time and add little."""
+        """Keeps at most `points` points and `frames` frames, evenly chosen: more take time and add little."""
         kept, at = _evenly(len(self.rest), points), _evenly(len(self.times), frames)
         positions = self.positions[at][:, kept]
         return Observation(self.rest[kept], self.times[at], positions, self.heading, self.noise_mm)

@@ -70,7 +70,7 @@ def _identified(
 
 
 def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:
-    """That of the checkpoint, else measured on the data set."""
+    """Reads the discrepancy of the checkpoint, else measures it on the data set."""
     if (stored := stored_discrepancy(predictor)) is not None:
         return stored
     progress = Progress("calibrate", 100)

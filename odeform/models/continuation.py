@@ -65,7 +65,7 @@ class Dynamics:
     width: float
     """Metres below `touch` over which contacts set in."""
     gains: Float[np.ndarray, "features"]
-    """Of all features."""
+    """The inverse length scales of all features."""
     pose: KernelRegression
     """Its features are those without the side that is down."""
     deformation: KernelRegression
@@ -166,12 +166,12 @@ def continued(solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Win
 def continued_batch(
     solved: BatchTrajectory, dynamics: Dynamics, theta: Float[np.ndarray, "batch parameters"], window: Window
 ) -> BatchTrajectory:
-    """As `continued`, of many motions."""
+    """Continues many motions as `continued` does one."""
     return PiecewiseBatch(solved, window.stop, lambda: _LaterBatch(solved, _Frames(solved, dynamics, theta, window)))
 
 
 class _Frames:
-    """What the dynamics make of the last two frames of a window, of one motion or of many.
+    """Continues the last two frames of a window by the dynamics, of one motion or of many.
 
     Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
     spline between them is exact for free flight.
@@ -210,22 +210,22 @@ class _Later:
 
     @property
     def stats(self) -> SolveStats:
-        """Those of the window."""
+        """Statistics of the window's solution."""
         return self._solved.stats
 
 
 class _LaterBatch:
-    """As `_Later`, of many motions."""
+    """Continues many motions as `_Later` does one."""
 
     def __init__(self, solved: BatchTrajectory, frames: _Frames) -> None:
         self._solved, self.reduced = solved, frames.reduced
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:
-        """(B,) those of the window."""
+        """(B,) statistics of the window's solutions."""
         return self._solved.ok
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) those of the window."""
+        """(B,) statistics of the window's solutions."""
         return self._solved.stats

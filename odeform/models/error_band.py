@@ -35,7 +35,7 @@ class ErrorBand:
     """
 
     def __init__(self, arrays: Arrays) -> None:
-        """From `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
+        """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)

@@ -94,7 +94,7 @@ def load_model(checkpoint: Checkpoint) -> Predictor:
 
 
 def load_continuous(name: str | Path) -> Predictor:
-    """Like `load`, with `InputError` for a network that only knows its training frames."""
+    """Loads as `load` does; `InputError` for a network that only knows its training frames."""
     predictor = load(name)
     if not predictor.extrapolates:
         raise InputError(
@@ -104,7 +104,7 @@ def load_continuous(name: str | Path) -> Predictor:
 
 
 def load_reduced(name: str | Path) -> ReducedModel:
-    """Like `load`, with `InputError` for a model that is not of reduced coordinates."""
+    """Loads as `load` does; `InputError` for a model that is not of reduced coordinates."""
     predictor = load(name)
     if not isinstance(predictor, ReducedModel):
         raise InputError(f"checkpoint {name}: expected a model of reduced coordinates, got {predictor.model}")

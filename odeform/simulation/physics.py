@@ -110,7 +110,7 @@ def energy_gain(bound: float = 0.05, gravity: float = GRAVITY, driven: float = 0
 def energy_gained(
     times: Times, poses: Pose, points: Points, shares: Perpoint, gravity: float = GRAVITY, driven: float = 0.1
 ) -> float:
-    """By how much the energy of the rigid motion later exceeds its largest in the first `driven` of the time; relative.
+    """Measures by how much the energy of the rigid motion later exceeds its largest in the first `driven`; relative.
 
     `poses` (T, 4, 4) at `times` (T,) s move `points` (N, 3) m, which have their `shares` (N,) of the mass.
     """
@@ -163,4 +163,4 @@ def _volume(points: Points, faces: Faces) -> float:
 
 
 STANDARD_CHECKS = (inverted_faces(), edge_strain(), volume_drift(), floor_penetration(), energy_gain())
-"""Those of a soft body over a floor under standard gravity."""
+"""Checks a soft body over a floor under standard gravity."""

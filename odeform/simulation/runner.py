@@ -45,7 +45,7 @@ def _one(entry: Entry, simulate: Callable[..., MotionSequence], rate: float, ste
 
 
 def _faults(sequence: MotionSequence, rate: float) -> Iterator[str]:
-    """What is wrong with a sequence simulated at `rate` Hz. Each check assumes that those before it passed."""
+    """Says what is wrong with a sequence simulated at `rate` Hz. Each check assumes that those before it passed."""
     times, vertices, faces, weights = sequence.times, sequence.vertices, sequence.faces, sequence.weights
     if times.ndim != 1 or len(times) < 2:
         yield f"times: expected (T,) with at least 2 frames, got shape {times.shape}"

@@ -81,7 +81,7 @@ def _evaluated(predictor: Predictor, case: Case, geometry: Geometry, begin: floa
 
 
 def _status(motion: Motion, times: Times) -> str:
-    """That of the solver, and what a motion is held for at any of the (T,) `times` in seconds."""
+    """Joins the solver's status and why a motion is clamped at any of the (T,) `times` in seconds."""
     held = next((stop.reason for stop in map(motion.stop_at, times.tolist()) if stop is not None), "")
     return (
         motion.stats.status

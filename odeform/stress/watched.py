@@ -22,8 +22,8 @@ FAR = 10.0  # windows; nothing moves any more
 
 @dataclass(frozen=True)
 class Shown:
-    """What is shown of one motion: the largest depth below the floor in metres, the number of frames that are not
-    finite, and the seconds from which on it is held, if it is."""
+    """Holds what is shown of one motion: the largest depth below the floor in metres, the number of frames that
+    are not finite, and the seconds from which on it is clamped, if it is."""
 
     depth: float
     non_finite: int

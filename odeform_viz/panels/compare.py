@@ -33,7 +33,7 @@ def pinned_label(name: str, parameters: Mapping[str, Any], schema: Schema) -> st
 
 
 def swept_names(schema: Schema) -> tuple[str, ...]:
-    """What can be swept: each parameter; in scenes in which a sphere pushes, the force and the objects."""
+    """Lists what can be swept: each parameter; in scenes in which a sphere pushes, the force and the objects."""
     names = tuple(p.name for p in schema.learned)
     return ("force", OBJECT)[: 1 + (len(schema.objects) > 1)] if contacts_of(schema) else names
 

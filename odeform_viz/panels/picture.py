@@ -124,8 +124,8 @@ def _draw(client: viser.ClientHandle, width: int, height: int) -> Picture:
 
 
 def _render(client: viser.ClientHandle, width: int, height: int) -> Picture:
-    """What the browser draws. `InputError` if it takes too long; viser's own limit is one of the wall clock, which may
-    jump."""
+    """Asks the browser for what it draws. `InputError` if it takes too long; viser's own limit is one of the wall
+    clock, which may jump."""
     drawn: Future[Picture] = Future()
 
     def render() -> None:

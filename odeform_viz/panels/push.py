@@ -1,4 +1,4 @@
-"""What a sphere pushes, where and how hard: an object, a contact to click, and a force in the contact's frame."""
+"""Sets what a sphere pushes, where and how hard: an object, a contact to click, a force in the contact's frame."""
 
 import math
 import threading
@@ -70,7 +70,7 @@ class PushPanel(Panel):
         return gui.add_slider(name, -WIDEST, WIDEST, 0.5, 0.0, marks=marks, hint=hint)
 
     def parameters(self) -> dict[str, Any]:
-        """Those of the scene. `InputError` for values that no control can have."""
+        """Returns the scene's parameters. `InputError` for values that no control can have."""
         with self._lock:
             self._follow_surface()
             values = self._values()
@@ -140,7 +140,7 @@ class PushPanel(Panel):
         self.set(state.parameters)
 
     def _completed(self, parameters: Mapping[str, Any], changed: bool) -> dict[str, Any]:
-        """With the defaults of an object that was not shown before."""
+        """Adds the defaults of an object that was not shown before."""
         return {**self._defaults(str(parameters[OBJECT])), **parameters} if changed else dict(parameters)
 
     def _defaults(self, name: str) -> dict[str, Any]:

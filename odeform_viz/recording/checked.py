@@ -26,7 +26,7 @@ class CheckedColumn:
     skipped: str = ""
     """Why the column cannot be computed again."""
     note: str = ""
-    """What one has to know of it: that its shape was not trained."""
+    """Says what has to be known of it: that its shape was not trained."""
     problem: str = ""
     """Why it differs from the recording, regardless of its frames."""
 

@@ -1,4 +1,4 @@
-"""Where a column comes from, as plain values: enough to load it again elsewhere, and to notice if it has changed."""
+"""Tells where a column comes from, in plain values that suffice to load it again and to notice a change."""
 
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version

@@ -1,4 +1,4 @@
-"""What surrounds the columns: the floor, and the part of a captured scene that does not move."""
+"""Draws what surrounds the columns: the floor, and the part of a captured scene that does not move."""
 
 import numpy as np
 import viser

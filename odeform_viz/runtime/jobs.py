@@ -144,7 +144,7 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
 
 
 def simulate_own_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
-    """Like `simulate_motion`, for a soft object (`SoftObject`) that is none of the scene's."""
+    """Simulates a motion of a soft object (`SoftObject`) that is none of the scene's; see `simulate_motion`."""
     from odeform.simulation.scenes.contact_force import simulate_object
 
     return simulate_object(item, parameters, rate, report=report)

@@ -33,8 +33,8 @@ RESTS = "rest_speed_m_s"  # of the fixed values of scenes whose motions are simu
 SPEED = 0.05  # s at the end, over which the speed is measured
 COUNT = 16
 SUMMARY = ("highest_mm", "speed_at_the_end_mm_s", "energy_at_the_end_mJ_kg")
-"""What is left of a motion: how high it still gets, and at the end the speed along the floor and the energy of its
-centre, without those of spin and deformation."""
+"""Figures of what is left of a motion: how high it still gets, and at the end the speed along the floor and the
+energy of its centre, without those of spin and deformation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +78,8 @@ def _simulated(scene: str, until: float, keep: Path | None, entry: Entry) -> Fra
 
 
 def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
-    """By span: errors in mm, and which share of the frames the 90 % band covers, if the model has one. And the median
-    difference of each figure of `SUMMARY`, predicted and simulated."""
+    """Returns, by span, errors in mm, and which fraction of the frames the 90 % band covers, if the model has one. And
+    the median difference of each figure of `SUMMARY`, predicted and simulated."""
     window, errors, bands, ends = model.schema.window, [], [], []
     for entry, truth in zip(later.entries, later.vertices, strict=True):
         motion = model.solve(Mesh(truth[0], later.faces), entry.parameters)

@@ -61,7 +61,7 @@ ABLATED = {
 """Parts that ablations leave out, by model and scene. Of the latent ODE, the regression of what is left would hide what
 other parts give."""
 SEEDLESS = (OURS, DROP, ("network",))
-"""What is left there has nothing random: other seeds give the same model."""
+"""Ablations whose remainder has nothing random: other seeds give the same model."""
 MINUTES = {DROP: 4, "kick": 12}
 """About what the budget of each scene took on an idle core when it was set."""
 PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 8400}

@@ -23,7 +23,7 @@ class Measured:
 
     shape: UnseenShape
     distance: float
-    """From what was trained, see `UserBodyPredictor.distance`."""
+    """Distance from what was trained; see `UserBodyPredictor.distance`."""
     errors: Float[np.ndarray, "pushes times"]
     """mm, RMSE of the model."""
     predicted: Float[np.ndarray, "pushes times"]

@@ -71,7 +71,7 @@ def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:
 
 
 def shape_file(folder: Path, name: str, count: int, seed: int) -> Path:
-    """Where the motions of a shape under `count` pushes are kept."""
+    """Names where the motions of a shape under `count` pushes are kept."""
     return folder / f"{name}.{count}-pushes.seed-{seed}.npz"
 
 

@@ -44,7 +44,7 @@ class Soak:
     resident_mb: tuple[float, ...]
     """Resident memory of the process, the browsers' clients included."""
     allocated_mb: tuple[float, ...]
-    """Of that, what is allocated; empty where it is not known."""
+    """Allocated part of the resident memory; empty where it is not known."""
     wall_s: float
 
     @property

@@ -53,7 +53,7 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
 
 
 def _stored(root: Path) -> Stored:
-    """What a row may name: folders, and files of sequences with and without their ending."""
+    """Lists what a row may name: folders, and files of sequences with and without their ending."""
     stored: dict[str, list[Path]] = {}
     for path in visible(root):
         if path.is_dir() or path.suffix.lower() in SEQUENCE_FILES:

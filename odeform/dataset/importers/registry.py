@@ -23,7 +23,7 @@ class Importer:
     """How a folder of some layout becomes a data set."""
 
     description: str
-    """What the folder contains, for error messages."""
+    """Describes what the folder contains, for error messages."""
     recognises: Callable[[Path], bool]
     source: Callable[[Path, float | None], Source]
     """(folder, frame rate in Hz if the user gave one) -> its sequences. Raises `InputError`."""

@@ -31,7 +31,7 @@ NUMBER_BYTES = 12  # of memory while reading
 RADIUS, SEGMENTS = 0.1, 8  # of the ball that serves as body: metres, and edges per side of an octant
 
 SCENES = {1: AUTHORS_MASS_ELASTIC, 3: AUTHORS_CONTACT_FORCE}
-"""By the components of an offset: height alone, or all three axes."""
+"""Scenes by the components of an offset: height alone, or all three axes."""
 FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), AUTHORS_CONTACT_FORCE: (0, 10, 10)}
 """First frame, number of frames, and frames per second where `args` does not say."""
 NOTES = (

@@ -104,7 +104,7 @@ class ContactRegression:
     """Reduced motions (T, 6 + K) from contacts and forces, by blended experts."""
 
     def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
-        """From what `fit_contact_regression` returns. `KeyError` where something is missing."""
+        """Reads what `fit_contact_regression` returns. `KeyError` where something is missing."""
         self._known = ContactInputs(*(arrays[f"gp.{name}"].astype(float) for name in INPUTS))
         self._frames = len(arrays["times"])
         self._modes = arrays["gp.modes"].astype(np.float32)  # read whole for each push, and stored with less

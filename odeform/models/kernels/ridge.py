@@ -14,7 +14,7 @@ from odeform.types import Floats
 __all__ = ["ORDERS", "Ridge", "search_ridge"]
 
 ORDERS = (2, 6)
-"""Of the kernels to choose from: contacts make motions rough in the parameters, without them they are smooth."""
+"""Orders of the kernels to choose from: contacts make motions rough in the parameters, without them they are smooth."""
 
 STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
 RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0

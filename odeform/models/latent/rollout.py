@@ -14,7 +14,7 @@ from torch.autograd.function import once_differentiable
 __all__ = ["Branch", "roll_out"]
 
 STAGES = ((1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 / 3.0, 1.0), (1.0 / 6.0, 0.0))
-"""For each stage of RK4, its weight in the step and the share of the step to the next stage."""
+"""Weight of each stage of RK4 in the step, and the fraction of the step to the next stage."""
 
 
 class Branch(NamedTuple):

@@ -60,7 +60,7 @@ class FieldLayers:
 
 
 def field_layers(weights: Arrays, config: ModelConfig) -> FieldLayers:
-    """In double precision, with time in seconds."""
+    """Reads the weights in double precision, with time in seconds."""
     rate = 1.0 / float(weights["time_scale"])
     branches = [read_layers(weights, f"{branch}_field", np.float64) for branch in config.branches]
     # each branch depends on the state up to the end of its own part
@@ -84,7 +84,7 @@ class BranchDecoder:
 
 
 def branch_decoders(weights: Arrays, config: ModelConfig) -> list[BranchDecoder]:
-    """For each branch; of its networks the second, for random features, may be missing."""
+    """Networks of each branch; the second, for random features, may be missing."""
     out = []
     for branch, state in zip(config.branches, config.states, strict=True):
         networks = [read_layers(weights, f"{branch}_decoder.{part}", np.float64) for part in ("hidden", "random")]

@@ -51,7 +51,7 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, columns: Any) -> "Interval":
-        """From columns (..., 13), as `conditioning` joins them."""
+        """Splits columns (..., 13), as `conditioning` joins them."""
         begins = np.cumsum([0, *WIDTHS])
         return cls(*(columns[..., begin:end] for begin, end in itertools.pairwise(begins)))
 

@@ -1,4 +1,4 @@
-"""What all models that move each point by itself share: how they are stored and read, and how they solve."""
+"""Stores, reads and solves all models that move each point by itself."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

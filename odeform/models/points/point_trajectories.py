@@ -125,8 +125,8 @@ class FramedPoints:
         return out * np.float32(self._frame.scale)
 
     def _error_mm(self) -> float | None:
-        """By step doubling: the largest RMS change over the points with steps of twice the length, halved, as these
-        motions bend within a step at contacts."""
+        """Estimates by step doubling: the largest RMS change over the points with steps of twice the length, halved, as
+        these motions bend within a step at contacts."""
         if not self.doubled:
             return None
         grid = self._grid(LATER)

@@ -36,7 +36,7 @@ WIDTH = 0.05  # of the largest depth
 FREE = 0.01  # share of the largest acceleration besides gravity, below which there is no contact
 CANDIDATES = 12_000  # states among which centres are chosen
 HELD_OUT = 1.0 / 3.0
-"""Of the window, over which a continuation is validated."""
+"""Fraction of the window over which a continuation is validated."""
 FEWEST = 3  # frames that it can be fitted to
 TINY = 1e-9  # metres; against division by zero
 
@@ -77,7 +77,7 @@ def _spread(features: Floats, count: int) -> Floats:
 
 
 def _regression(features: Floats, near: Floats, outputs: Floats, rng: np.random.Generator) -> KernelRegression:
-    """What fits outputs (S, O) best as `near` (S, 1) times a sum of kernels of features (S, F)."""
+    """Fits outputs (S, O) as `near` (S, 1) times a sum of kernels of features (S, F)."""
     touching = rng.permutation(np.flatnonzero(near[:, 0]))[:CANDIDATES]
     centers = _spread(features[touching], CENTERS)
     values = near * gaussian(features, centers)

@@ -1,4 +1,4 @@
-"""What all gradient descents here share: the learning-rate schedule and the settings of the processor."""
+"""Defines what all gradient descents use: the learning-rate schedule and the settings of the processor."""
 
 import math
 from collections.abc import Iterator

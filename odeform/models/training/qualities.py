@@ -43,7 +43,7 @@ class Validation:
 
     @classmethod
     def of(cls, data: TrainingData) -> "Validation":
-        """That of the data of a reduced model."""
+        """Takes the validation motions from the data of a reduced model."""
         return cls(data.theta["val"], data.times, data.reduced["val"], data.observed["val"])
 
 

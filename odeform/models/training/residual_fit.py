@@ -63,7 +63,7 @@ def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int,
 
 
 def _left(fading: tuple[int, int]) -> Floats:
-    """What is left of a residual, in the frames up to the last of `fading`."""
+    """Fades a residual out: the weight that is left of it in the frames up to the last of `fading`."""
     begin, end = fading
     share = np.clip((np.arange(end + 1) - begin) / (end - begin), 0.0, 1.0)
     return 1.0 - share**2 * (3.0 - 2.0 * share)

@@ -37,9 +37,9 @@ class Run:
     """The file that keeps the state of the training; None: it cannot be continued."""
     report: Callable[[str], None]
     loss: "Loss | None" = None
-    """What a descent minimises, in place of the model's own."""
+    """Replaces the model's own loss in a descent."""
     device: str | None = None
-    """Where a descent runs, as PyTorch names it; None: on a GPU if there is one."""
+    """Device of a descent, as PyTorch names it; None: a GPU if there is one."""
 
     def __post_init__(self) -> None:
         model = model_class(self.request.model)

@@ -1,4 +1,4 @@
-"""Which of the seven objects a shape is most like, and how it is turned to lie as that one does."""
+"""Finds which of the seven objects a shape is most like, and how it is turned to lie as that one does."""
 
 import math
 from collections.abc import Sequence

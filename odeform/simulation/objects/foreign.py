@@ -43,7 +43,7 @@ class PlacedObject:
     item: SoftObject
     """Its nodes are in metres, at most 1,500 of them."""
     transform: Similarity
-    """From the mesh to the nodes of `item` without stress."""
+    """Maps the mesh to the nodes of `item` without stress."""
     like: str
     """The object whose orientation, material and forces it has."""
 
@@ -90,7 +90,7 @@ def placed_object(
 
 
 def _solid(fine: Mesh) -> tuple[Points, Ints, Faces]:
-    """As many surface vertices as a small solid can have."""
+    """Makes a solid with as many surface vertices as a small one can have."""
     for count in COUNTS[:-1]:
         with contextlib.suppress(SimulationError):
             return small_solid(even_surface(fine, count), FACTORS)

@@ -26,7 +26,7 @@ class SoftMaterial:
     friction: float
     """Coulomb coefficient against the floor and the projectile."""
     source: str
-    """Where the figures come from, in one line."""
+    """Source of the figures, in one line."""
     thickness: float = 0.0
     """Thickness of a shell in metres; 0 for a solid."""
 

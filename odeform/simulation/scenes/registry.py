@@ -45,9 +45,9 @@ def get_scene(name: str) -> Scene:
 
 
 def surroundings_of(schema: Schema) -> Surroundings | None:
-    """What is around the bodies of a schema; None where it is not known, as for imported data.
+    """Returns what is around the bodies of a schema; None where it is not known, as for imported data.
 
-    Files of before schemas had surroundings have those of the scene of their name.
+    Files from before schemas had surroundings get those of the scene that they name.
     """
     if schema.surroundings is not None:
         return schema.surroundings

@@ -1,4 +1,4 @@
-"""What is solved for, not descended in: the readout of a decoder, and random features that widen it.
+"""Solves for the readout of a decoder, which is not descended in, and draws random features that widen it.
 
 A readout is linear, so its best value for given features is a least-squares solve.
 """

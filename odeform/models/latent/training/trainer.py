@@ -172,7 +172,7 @@ class Trainer:
         self.times = self.times.double()
 
     def _fingerprint(self) -> dict[str, Any]:
-        """What must be the same for a training to be resumed."""
+        """Lists what must be the same for a training to be resumed."""
         config = {k: v for k, v in asdict(self.config).items() if k not in FREE}
         network = {k: v for k, v in asdict(self.net.config).items() if k not in FREE}
         return {"data": self.identity, "network": network, "config": config}

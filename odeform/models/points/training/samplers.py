@@ -1,4 +1,4 @@
-"""Which points, sequences and frames a point network is trained and validated on: one sampler for each kind."""
+"""Draws the points, sequences and frames that a point network is trained and validated on: a sampler for each kind."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -162,7 +162,7 @@ SAMPLERS: dict[str, type[Sampler]] = {
     "whole": WholeMotions,
     "between": BetweenFrames,
 }
-"""By `PointNet.sampling`."""
+"""Samplers by `PointNet.sampling`."""
 
 
 def _below(limit: int, generator: torch.Generator, *shape: int) -> torch.Tensor:
