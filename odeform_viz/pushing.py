@@ -61,8 +61,8 @@ class ShownPush:
     strongest: float
     """N: the strongest force in training."""
     carriers: Int[np.ndarray, " carriers"]
-    """The points of the shape that carry the contact, which is at the sum of their positions times `shares`."""
-    shares: Float[np.ndarray, " carriers"]
+    """The points of the shape that carry the contact, which is at the sum of their positions times `weights`."""
+    weights: Float[np.ndarray, " carriers"]
     offset: Vector
     """(3,) m, added to that sum."""
 
@@ -99,7 +99,7 @@ class ShownPush:
 
     def contact(self, points: Points) -> Vector:
         """(3,) m: the contact on the shape once its points are at (N, 3) m."""
-        return self.shares @ np.asarray(points[self.carriers], dtype=float) + self.offset
+        return self.weights @ np.asarray(points[self.carriers], dtype=float) + self.offset
 
     def shift(self, moved: Floats) -> Vector:
         """(3,) m: how far the sphere has moved once the contact is at `moved` (3,) m."""
@@ -120,13 +120,13 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
     points, contact = np.asarray(motion.geometry.points, dtype=float), push.contact
     name = str(parameters[OBJECT])
     if motion.geometry is surface:
-        carriers, shares = np.asarray(surface.faces[contact.face]), contact.shares
+        carriers, weights = np.asarray(surface.faces[contact.face]), contact.barycentric
     else:
         count = min(NEIGHBOURS, len(points))
         carriers = np.atleast_1d(KDTree(points).query(contact.point, count)[1])
-        shares = np.full(count, 1.0 / count)
+        weights = np.full(count, 1.0 / count)
     strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces_on(name)[1]
-    return ShownPush(push, contacts, surface, strongest, carriers, shares, contact.point - shares @ points[carriers])
+    return ShownPush(push, contacts, surface, strongest, carriers, weights, contact.point - weights @ points[carriers])
 
 
 def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats) -> tuple[Vector, float] | None:
@@ -138,8 +138,8 @@ def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats)
         hit = first_on_mesh(origin, direction, shown, geometry.faces)
         if hit is None:
             return None
-        face, shares, distance = hit
-        return shares @ np.asarray(geometry.points, dtype=float)[geometry.faces[face]], distance
+        face, weights, distance = hit
+        return weights @ np.asarray(geometry.points, dtype=float)[geometry.faces[face]], distance
     found = first_on_points(origin, direction, shown, PICK * float(np.ptp(shown, axis=0).max()))
     return None if found is None else (np.asarray(geometry.points[found[0]], dtype=float), found[1])
 

@@ -265,10 +265,10 @@ class Session:
             return None
         predicted = self._predicted_truth(column, column.predictor, truth, request).vertices(request.time)
         true = truth.vertices(request.time)
-        off = np.subtract(predicted, true, dtype=float)
-        distances = np.linalg.norm(off, axis=1)
+        difference = np.subtract(predicted, true, dtype=float)
+        distances = np.linalg.norm(difference, axis=1)
         worst = int(distances.argmax())
-        rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
+        rmse, mae = 1e3 * np.sqrt((difference**2).mean()), 1e3 * np.abs(difference).mean()
         return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
 
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, request: ViewRequest) -> Curves:
@@ -282,8 +282,8 @@ class Session:
             band = both[:, 1]
         if truth is not None and predictor is not None:
             predicted = self._predicted_truth(shown.column, predictor, truth, request)
-            off = predicted.vertices(times) - truth.vertices(times)
-            error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
+            difference = predicted.vertices(times) - truth.vertices(times)
+            error = 1e3 * np.sqrt((difference.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
         return Curves(times, height, rotation, 1e3 * motion.deformation_rms(times), error, band)
 

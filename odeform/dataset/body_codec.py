@@ -71,11 +71,11 @@ class BodyCodec:
             return LENGTH.pack(len(series)) + series
         rounded = values[:, :POSE] * self._steps[:POSE]
         local = _local(sequence.vertices, self.points, rotation_from_vector(rounded[:, 3:]), rounded[:, :3])
-        missed = (local - self._local(values)).reshape(len(local), -1, 3)
-        far = np.linalg.norm(missed, axis=2) > self.correction
+        residual = (local - self._local(values)).reshape(len(local), -1, 3)
+        far = np.linalg.norm(residual, axis=2) > self.correction
         if not far.any():
             return LENGTH.pack(len(series)) + series
-        corrections = np.rint(missed * far[..., None] / self.correction).astype(np.int64)
+        corrections = np.rint(residual * far[..., None] / self.correction).astype(np.int64)
         body = lzma.compress(planes_of(corrections.reshape(len(local), -1)), preset=9)
         return LENGTH.pack(len(series)) + series + body
 

@@ -44,7 +44,7 @@ def dataset_from_arrays(
         units: of the parameters, by name; default: none.
         ranges: low and high of the parameters, by name; default: the least and the largest value.
         log: names of parameters of which ratios matter, such as masses.
-        weights: (N,) share of the mass at each vertex; default: that of the surface.
+        weights: (N,) mass fraction at each vertex; default: that of the surface.
         splits: "train", "val" or "test" for each motion; default: 70, 10 and 20 % in random order.
         fixed: quantities that are the same in all motions, by name. With `pulse_s`, the seconds that a force drives the
             body, the `rolling` family knows when a push is over.

@@ -16,7 +16,7 @@ from odeform.types import MotionSequence
 __all__ = ["Dataset", "Entry", "Reader", "assign_splits", "assign_splits_in_blocks", "index_from_json", "index_to_json"]
 
 FORMAT = 1
-BLOCK = 10  # sequences in which splits have their shares
+BLOCK = 10  # sequences in which splits have their proportions
 
 
 @dataclass(frozen=True)

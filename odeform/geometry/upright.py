@@ -45,7 +45,7 @@ def guess_up(mesh: Mesh) -> str:
 
 
 def _stand(points: Floats, up: int) -> float:
-    """Share of the bounding rectangle from above that the hull of the lowest points covers."""
+    """Fraction of the bounding rectangle from above that the hull of the lowest points covers."""
     height, across = points[:, up], np.delete(points, up, axis=1)
     footprint = float(np.prod(np.ptp(across, axis=0)))
     low = across[height <= height.min() + NEAR * np.ptp(height)]

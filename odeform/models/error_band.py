@@ -14,7 +14,7 @@ WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
 """Candidates for the distance in normalised parameters over which errors are similar."""
 TINY = 1e-6  # mm
 FARTHEST = 10.0  # widths outside the trained range, from where on the band stops widening
-ABOUT = 0.05  # share of the frames, on either side, that the quantiles of a frame are taken over
+ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a frame are taken over
 
 
 def error_band(arrays: Arrays) -> "ErrorBand | None":
@@ -24,7 +24,7 @@ def error_band(arrays: Arrays) -> "ErrorBand | None":
 
 
 class ErrorBand:
-    """The RMSE over time that half, and a share `NOMINAL`, of unseen motions with given parameters stay within.
+    """The RMSE over time that half, and a fraction `NOMINAL`, of unseen motions with given parameters stay within.
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
     the product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles

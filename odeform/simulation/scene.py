@@ -30,7 +30,7 @@ class Scene:
     schema: Schema
     """Its name, parameters and time window."""
     simulate: Callable[..., MotionSequence]
-    """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the share done,
+    """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the fraction done,
     and `resolution`, if the scene has `resolutions`. It raises `SimulationError` where the result is not sound."""
     rest_mesh: Callable[[], Mesh]
     """A fine mesh of the undeformed body where the motion starts, for display; of the default object, if there are

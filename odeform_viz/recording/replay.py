@@ -71,8 +71,8 @@ def check_recording(recording: Recording) -> list[CheckedColumn]:
 def _check(recording: Recording) -> list[CheckedColumn]:
     columns, checked = _load_columns(recording)
     uses = _uses(recording)
-    if lost := {name for name, _ in uses} - checked.keys():
-        raise InputError(f"recording {recording.path}: no provenance of {', '.join(sorted(lost))}")
+    if missing := {name for name, _ in uses} - checked.keys():
+        raise InputError(f"recording {recording.path}: no provenance of {', '.join(sorted(missing))}")
     session = Session(next(iter(columns.values())).source.schema) if columns else None
     for name, logged, points in recording.points():
         for frame in uses.pop((name, logged), ()):

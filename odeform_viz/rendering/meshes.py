@@ -19,9 +19,9 @@ class MeshView:
     def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
         self._rest = np.asarray(mesh.points, dtype=np.float32)
         own = None if mesh.colors is None else _Own(mesh, mesh.colors)
-        self._own = own and (own, _Colored(server, f"{root}/own", len(own.vertices), own.faces, _reach(mesh)))
+        self._own = own and (own, _Colored(server, f"{root}/own", len(own.vertices), own.faces, _radius(mesh)))
         self._checkerboard = _Checkerboard(server, root, mesh, color) if own is None else None
-        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, _reach(mesh))
+        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, _radius(mesh))
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         """See `ShapeView`: (N, 3) m. A mesh has no covariances."""
@@ -55,7 +55,7 @@ class _Own:
         self.colors = colors.reshape(-1, 3)[first]
 
 
-def _reach(mesh: Mesh) -> float:
+def _radius(mesh: Mesh) -> float:
     """Metres from the origin that the deformed mesh stays within, with room to spare."""
     return 4.0 * float(np.abs(mesh.points).max())
 
@@ -87,8 +87,8 @@ class _Checkerboard:
 class _Colored:
     """Everything is sent with each change: viser colors vertices in glTF files only."""
 
-    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, reach: float) -> None:
-        self._server, self._node, self._mesh = server, node, (count, faces, reach)
+    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, radius: float) -> None:
+        self._server, self._node, self._mesh = server, node, (count, faces, radius)
         self._writer: tuple[object, GlbWriter] | None = None
         self._handle: viser.GlbHandle | None = None
         self._sent: tuple[Points, Colors, object] | None = None

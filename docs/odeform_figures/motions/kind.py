@@ -41,5 +41,5 @@ class Kind:
 
 def smoothstep(values: Floats, start: float, stop: float) -> Floats:
     """Rises from 0 at `start` to 1 at `stop`, with continuous slopes; values have any shape (...)."""
-    share = np.clip((values - start) / (stop - start), 0.0, 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    fraction = np.clip((values - start) / (stop - start), 0.0, 1.0)
+    return fraction**2 * (3.0 - 2.0 * fraction)

@@ -24,7 +24,7 @@ from odeform.types import Floats, MotionSequence
 __all__ = ["main", "study"]
 
 ASIDE = 1e-3  # m by which a contact is moved along the surface
-STRONGER = 0.02  # share by which a force is raised
+STRONGER = 0.02  # fraction by which a force is raised
 
 
 def study(count: int, seed: int, workers: int) -> dict[str, Any]:

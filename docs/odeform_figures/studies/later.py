@@ -101,8 +101,8 @@ def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
             "largest_mm": float(of_motions.max()),
             "coverage_90": float((rmse[:, inside] <= band_90[:, inside]).mean()) if known else None,
         }
-    off = np.abs(np.diff(np.array(ends), axis=1)[:, 0])
-    differences = {name: float(np.median(column)) for name, column in zip(SUMMARY, off.T, strict=True)}
+    difference = np.abs(np.diff(np.array(ends), axis=1)[:, 0])
+    differences = {name: float(np.median(column)) for name, column in zip(SUMMARY, difference.T, strict=True)}
     return {"motions": len(errors), "windows": spans, "median_difference": differences}
 
 

@@ -153,9 +153,11 @@ def _schema(scene: str, window: Window) -> Schema:
     return Schema(scene, parameters, window, notes=NOTES)
 
 
-def _vector(name: str, unit: str, reach: float, first: float, text: str) -> tuple[Parameter, ...]:
-    """Three parameters, NAME_x to NAME_z, each from -reach to reach; `Schema.complete` also accepts them as one."""
+def _vector(name: str, unit: str, largest: float, first: float, text: str) -> tuple[Parameter, ...]:
+    """Three parameters, NAME_x to NAME_z, each from -largest to largest; `Schema.complete` also accepts them as one."""
     return tuple(
-        Parameter(f"{name}_{axis}", unit, -reach, reach, first if axis == "x" else 0.0, description=f"{text}, {axis}")
+        Parameter(
+            f"{name}_{axis}", unit, -largest, largest, first if axis == "x" else 0.0, description=f"{text}, {axis}"
+        )
         for axis in "xyz"
     )

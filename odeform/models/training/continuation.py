@@ -30,10 +30,10 @@ __all__ = ["HELD_OUT", "fit_dynamics", "predicted_errors", "with_continuation"]
 # chosen on validation sequences: of `mass-elastic`, after 40 to 90 frames; of `kick`, up to twice its window
 CENTERS = 300
 RIDGE = 1e-7  # on the mean square over states
-PARAMETERS = 0.3  # gain of parameters, in halves of their range; depths and velocities have 1
-SIDE = 2.0  # gain of the side that is down, a unit vector
+PARAMETERS = 0.3  # inverse length scale of parameters, in halves of their range; depths and velocities have 1
+SIDE = 2.0  # inverse length scale of the side that is down, a unit vector
 WIDTH = 0.05  # of the largest depth
-FREE = 0.01  # share of the largest acceleration besides gravity, below which there is no contact
+FREE = 0.01  # fraction of the largest acceleration besides gravity, below which there is no contact
 CANDIDATES = 12_000  # states among which centres are chosen
 HELD_OUT = 1.0 / 3.0
 """Fraction of the window over which a continuation is validated."""
@@ -46,7 +46,7 @@ def _largest(vectors: Floats) -> float:
 
 
 def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, float]:
-    """Gravity in metres per frame squared, the height of first touch, and the largest depth below it, in metres.
+    """Gravity in metres per frame squared, the height of first contact, and the largest depth below it, in metres.
 
     Bodies in the upper half of their heights are assumed to fly.
     """
@@ -55,8 +55,8 @@ def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, 
     gravity = np.median(acceleration[height >= 0.5 * (height.min() + height.max())], axis=0)
     pushed = np.linalg.norm(acceleration - gravity, axis=1)
     lowest = np.minimum(height, 2.0 * height - before[:, 2] + gravity[2])
-    touch = float(np.quantile(lowest[pushed >= FREE * pushed.max()], 0.99))
-    return gravity, touch, max(touch - float(lowest.min()), TINY)
+    contact_height = float(np.quantile(lowest[pushed >= FREE * pushed.max()], 0.99))
+    return gravity, contact_height, max(contact_height - float(lowest.min()), TINY)
 
 
 def _spread(features: Floats, count: int) -> Floats:
@@ -91,18 +91,18 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     ground drives."""
     before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
     conditions = np.repeat(theta, reduced.shape[1] - 2, axis=0)
-    gravity, touch, depth = _ground(before, now, after)
+    gravity, contact_height, depth = _ground(before, now, after)
     speed = _largest((now - before)[:, :3])
     sizes = [(1.0 / depth, 2), (1.0 / speed, 3), (gyration_radius / speed, 3), (PARAMETERS, theta.shape[1]), (SIDE, 3)]
-    gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
+    inverse_lengths = np.concatenate([np.full(count, inverse) for inverse, count in sizes])
     empty = spread_regression(np.zeros((0, 0)), np.zeros((0, 0)))
-    dynamics = Dynamics(gravity, touch, WIDTH * depth, gains, empty, empty)
+    dynamics = Dynamics(gravity, contact_height, WIDTH * depth, inverse_lengths, empty, empty)
     features, near = dynamics.features(before, now, conditions)
-    missed, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
+    residual, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
     return replace(
         dynamics,
-        pose=_regression(without_side(features), near, missed[:, :POSE], rng),
-        deformation=_regression(features, near, missed[:, POSE:], rng),
+        pose=_regression(without_side(features), near, residual[:, :POSE], rng),
+        deformation=_regression(features, near, residual[:, POSE:], rng),
     )
 
 
@@ -129,8 +129,9 @@ def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
         moving.append(continued(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
     truth, gyration_radius = data.reduced["val"][:, kept:], data.space.gyration_radius
-    moved, held = (small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (moving, stopped))
-    return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
+    guesses = (np.stack(guess) - truth for guess in (moving, stopped))
+    moved, stayed = (small_motion(residual, gyration_radius) / np.sqrt(3.0) for residual in guesses)
+    return 1e3 * moved if np.square(moved).mean() < np.square(stayed).mean() else None
 
 
 def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:

@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 __all__ = ["cosine_decay", "small_batches"]
 
 
-def cosine_decay(share: float) -> float:
-    """Factor of the learning rate at this share of the training: from 1 to 0 (Loshchilov & Hutter 2017)."""
-    return 0.5 * (1.0 + math.cos(math.pi * share))
+def cosine_decay(fraction: float) -> float:
+    """Factor of the learning rate at this fraction of the training: from 1 to 0 (Loshchilov & Hutter 2017)."""
+    return 0.5 * (1.0 + math.cos(math.pi * fraction))
 
 
 @contextmanager

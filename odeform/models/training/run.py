@@ -86,7 +86,8 @@ def train_model(run: Run) -> Checkpoint:
 
 
 def _train_each(run: Run) -> Checkpoint:
-    """A model for each object, with an equal share of the budget. Its parameters are normalised by their own ranges."""
+    """A model for each object, with an equal fraction of the budget. Its parameters are normalised by their own
+    ranges."""
     objects, request = run.dataset.objects, run.request
     steps = None if request.steps is None else max(request.steps // len(objects), 1)
     request = replace(request, minutes=request.minutes / len(objects), steps=steps)

@@ -85,10 +85,9 @@ def simulate_object(
 ) -> MotionSequence:
     """One motion of the surface of any soft object over the scene's window, with frames at `rate` Hz.
 
-    `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the share done. Frame 0
-    is the settled body. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError` for a
-    contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and
-    `SimulationError`.
+    `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the fraction done. Frame
+    0 is the settled body. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError` for a
+    contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and `SimulationError`.
     """
     # here, so that looking at the scene and training on its data need no simulator
     from odeform.simulation.objects.body import SoftBody, contact_of
@@ -103,12 +102,12 @@ def simulate_object(
     body.positions = item.settled
     struck = StruckBody(body, force, PULSE)
 
-    def share(now: float) -> None:
+    def report_pulse(now: float) -> None:
         report(now / window.stop)
 
-    times, nodes = run(struck, COARSE_FROM, rate, report=share)
+    times, nodes = run(struck, COARSE_FROM, rate, report=report_pulse)
     body.set_timestep(2.0 * step)
-    later, more = run(struck, window.stop, rate, begin=COARSE_FROM, report=share)
+    later, more = run(struck, window.stop, rate, begin=COARSE_FROM, report=report_pulse)
     new = later > times[-1] + 0.5 / rate
     _check_orientation(item, more[-1])
     vertices = np.concatenate([nodes, more[new]])[:, : item.surface_count]

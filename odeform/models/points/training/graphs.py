@@ -86,20 +86,20 @@ def fit_graphs(data: PointData, rest: Mesh, budget: Budget, seed: int, report: C
     graph, splits = _prepared(data, rest, config.nodes)
     learner = _Learner(graph, splits["train"].features.shape[2], config, seed)
     generator = torch.Generator().manual_seed(seed + 1)
-    begin, done, share, validated = time.process_time(), 0, 0.0, 0
+    begin, done, fraction, validated = time.process_time(), 0, 0.0, 0
     best: tuple[float, dict[str, Any]] = (math.inf, {})
     with small_batches():
-        while share < 1.0:
-            learner.optimiser.param_groups[0]["lr"] = config.rate * cosine_decay(share)
+        while fraction < 1.0:
+            learner.optimiser.param_groups[0]["lr"] = config.rate * cosine_decay(fraction)
             chosen = torch.randint(0, len(splits["train"].moved), (config.batch,), generator=generator)
             loss = learner.step(splits["train"], chosen)
             done += 1
             spent = time.process_time() - begin
-            share = done / budget.steps if budget.steps is not None else spent / budget.seconds
-            if share >= 1.0 or share * VALIDATIONS >= validated + 1:
-                validated = int(share * VALIDATIONS)
+            fraction = done / budget.steps if budget.steps is not None else spent / budget.seconds
+            if fraction >= 1.0 or fraction * VALIDATIONS >= validated + 1:
+                validated = int(fraction * VALIDATIONS)
                 error = 1e3 * graph.frame.scale * learner.error(splits["val"], config.batch)
-                report(f"{100 * share:.0f} %, step {done}: loss {loss:.3g}, {error:.3f} mm (val)")
+                report(f"{100 * fraction:.0f} %, step {done}: loss {loss:.3g}, {error:.3f} mm (val)")
                 if error < best[0]:
                     best = error, {k: v.numpy().copy() for k, v in learner.network.state_dict().items()}
     settings = {"width": config.width, "layers": config.layers, "frame": frame_to_json(graph.frame)}

@@ -29,7 +29,7 @@ class PointData:
     x: Floats
     """(N, 3) rest points, float32, as inputs of networks."""
     weights: Floats
-    """(N,) share of the mass at each vertex."""
+    """(N,) fraction of the mass at each vertex."""
     theta: dict[str, Floats]
     """(S, P) parameters in [-1, 1] by split."""
     moved: dict[str, Floats]
