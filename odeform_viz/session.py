@@ -19,7 +19,7 @@ from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import GaussianSplats, Geometry, MotionSequence, Points, Times
 from odeform_viz.columns import Column
-from odeform_viz.own_shapes import own_of
+from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import INVISIBLE, REACH, ColumnFrame, Curves, Error, Frame, ViewRequest
 
 __all__ = ["Session", "settings_of", "visible_deformation"]
@@ -103,9 +103,9 @@ class Session:
         truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
         if truth is None or column.truth is not None or not truth.of(self.parameters(column, request)):
             return None
-        own = own_of(column.predictor)
-        if own is not None:
-            return truth if np.array_equal(truth.geometry.points, own.item.rest_mesh().points) else None
+        body = user_body_of(column.predictor)
+        if body is not None:
+            return truth if np.array_equal(truth.geometry.points, body.item.rest_mesh().points) else None
         return None if column.loaded else truth
 
     def frame(self, request: ViewRequest, include_slow: bool = True) -> Frame:

@@ -154,8 +154,8 @@ def _linear_part(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
     ridge = RIDGE * np.diag([0.0] + [1.0] * thetas.shape[1])
     solved = np.linalg.solve(terms.T @ terms + ridge, terms.T)
     means = np.einsum("ps,stc->tcp", solved, errors)
-    own = np.einsum("sp,ps->s", terms, solved)  # the weight that each has in its own mean
-    return means, (errors - np.einsum("tcp,sp->stc", means, terms)) / (1.0 - own)[:, None, None]
+    leverage = np.einsum("sp,ps->s", terms, solved)  # the weight that each has in its own mean
+    return means, (errors - np.einsum("tcp,sp->stc", means, terms)) / (1.0 - leverage)[:, None, None]
 
 
 def _spans(times: Times) -> Ints:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.frame_names import numbered_frames
 from odeform.dataset.importers.frame_reading import VTK, displacement_field, read_displaced, read_frames
 from odeform.dataset.importers.recording import Recording

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from unicodedata import normalize
 
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.frame_folder import visible
 from odeform.dataset.importers.parameter_table import Row, find_table, has_table, read_rows
 from odeform.dataset.importers.recording import Recording, common_rate, frames_at

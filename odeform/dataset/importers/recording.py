@@ -145,5 +145,5 @@ def _timed(recording: Recording, times: Times, rate: float, given: bool) -> tupl
         frames, faces = recording.read()
         return resampled(times, frames, np.arange(count) / rate, where), faces
 
-    own = f"{1 / even[1]:.4g} Hz" if is_even(times, even[1]) else f"uneven times, {1 / even[1]:.4g} Hz on average,"
-    return count, read, f"resampled from {own} to {rate:g} Hz"
+    measured = f"{1 / even[1]:.4g} Hz" if is_even(times, even[1]) else f"uneven times, {1 / even[1]:.4g} Hz on average,"
+    return count, read, f"resampled from {measured} to {rate:g} Hz"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from odeform.dataset.importers.authors import authors_source, is_authors_layout
 from odeform.dataset.importers.conversion import convert_source
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.mesh_frames import has_table, mesh_source
 from odeform.dataset.importers.source import Source
 from odeform.dataset.importers.units import METRES

@@ -92,9 +92,10 @@ def measure_frontier(
     for quality in _candidates(float(known.times[1] - known.times[0])) if candidates is None else candidates:
         reduced, evaluations = motions(quality)
         points.append(FrontierPoint(quality, evaluations, *errors_mm(reduced, truth)))
-    own = errors_mm(truth if alone == model.trajectory else motions(reference, model.trajectory)[0], known.reduced)
-    useful = [point for point in points if point.solver_error_mm <= USELESS * own[0]]
-    return non_dominated(useful or points), own
+    whole = truth if alone == model.trajectory else motions(reference, model.trajectory)[0]
+    model_errors = errors_mm(whole, known.reduced)
+    useful = [point for point in points if point.solver_error_mm <= USELESS * model_errors[0]]
+    return non_dominated(useful or points), model_errors
 
 
 def choose_qualities(

@@ -35,13 +35,13 @@ def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int,
     assert isinstance(model, ReducedModel)
     times = data.times if fading is None else data.times[: fading[1] + 1]
     evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(times[-1])
-    own = {
+    motions = {
         split: np.stack([model.trajectory(one, evaluated, FINE, stop).reduced(times) for one in data.theta[split]])
         for split in data.theta
     }
     for name, columns in PARTS.items():
         truth, motion = (
-            {split: _flat(of[split][:, : len(times)], columns) for split in of} for of in (data.reduced, own)
+            {split: _flat(of[split][:, : len(times)], columns) for split in of} for of in (data.reduced, motions)
         )
         if not truth["train"].any() and not motion["train"].any():
             continue
@@ -89,7 +89,7 @@ def _fitted(
     improvement may be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
-    mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
+    mean, motion_mean = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
     # inner products are all that the search needs: coordinates in place of entries
     both = (np.concatenate([truth["train"], truth["val"]]) - mean)[:, :searched]
     u, sizes, _ = np.linalg.svd(both, full_matrices=False)
@@ -98,7 +98,7 @@ def _fitted(
     ridge = search_ridge(known, outputs, orders=ORDERS)[0]
 
     alone = mean + ridge.fit(known, truth["train"] - mean)(asked) - truth["val"]
-    added = motion["val"] - own - ridge.fit(known, motion["train"] - own)(asked)
+    added = motion["val"] - motion_mean - ridge.fit(known, motion["train"] - motion_mean)(asked)
     left = motion["val"] - truth["val"]
     weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
     ode_weight = given

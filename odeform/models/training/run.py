@@ -93,7 +93,7 @@ def _train_each(run: Run) -> Checkpoint:
     request = replace(request, minutes=request.minutes / len(objects), steps=steps)
     parts = {}
     for name in objects:
-        dataset = _with_own_ranges(run.dataset.of(name))
+        dataset = _with_ranges_of_data(run.dataset.of(name))
 
         def report(line: str, name: str = name) -> None:
             run.report(f"{name}: {line}")
@@ -103,7 +103,7 @@ def _train_each(run: Run) -> Checkpoint:
     return joined(run.dataset.schema, parts)
 
 
-def _with_own_ranges(dataset: Dataset) -> Dataset:
+def _with_ranges_of_data(dataset: Dataset) -> Dataset:
     """Data whose schema has the ranges of its training sequences: contacts differ with the body, and so do forces."""
     rows = [entry.parameters for entry in dataset.select("train")]
     if not rows:
@@ -113,6 +113,6 @@ def _with_own_ranges(dataset: Dataset) -> Dataset:
         values = [float(row[p.name]) for row in rows]
         slack = NARROW * (p.high - p.low) if p.scale == "linear" else 0.0
         low, high = min(values) - slack, max(values) + slack
-        own = replace(p, low=low, high=high, default=min(max(p.default, low), high)) if low < high else p
-        ranges.append(p if p.role == "azimuth" else own)
+        narrowed = replace(p, low=low, high=high, default=min(max(p.default, low), high)) if low < high else p
+        ranges.append(p if p.role == "azimuth" else narrowed)
     return replace(dataset, schema=replace(dataset.schema, parameters=tuple(ranges)))

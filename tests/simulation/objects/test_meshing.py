@@ -11,7 +11,7 @@ from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.canonical import most_like, plausible_scale
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.files import read_object, write_object
-from odeform.simulation.objects.foreign import make_object
+from odeform.simulation.objects.from_mesh import make_object
 from odeform.simulation.objects.level_set import surface_of
 from odeform.simulation.objects.remesh import remesh
 from odeform.simulation.objects.repair import even_surface, repaired
