@@ -28,7 +28,13 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The surroundings of all motions of a scene."""
+    """The surroundings of all motions of a scene.
+
+    Examples:
+        >>> import odeform
+        >>> odeform.Surroundings(floor=-0.2).gravity  # m/s^2
+        9.81
+    """
 
     floor: float | None = 0.0
     """Height in metres of the floor, which no motion may pass; None without one."""
