@@ -17,7 +17,6 @@ __all__ = [
     "SNAP",
     "SurfacePoint",
     "checked_contact",
-    "in_cone",
     "nearest_on",
     "projectile_centre",
     "surface_point",
@@ -124,12 +123,6 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
         if abs(gap) < 1e-7:
             break
     return contact.point + height * contact.normal
-
-
-def in_cone(normal: Floats, force: Floats) -> bool:
-    """Whether a force (3,) pushes within 45 degrees of the inward normal; true of no force."""
-    size = float(np.linalg.norm(force))
-    return size == 0.0 or float(-np.dot(normal, force)) >= size * math.cos(CONE) - 1e-9
 
 
 def checked_contact(mesh: Mesh, point: Floats, force: Floats) -> tuple[SurfacePoint, Vector]:

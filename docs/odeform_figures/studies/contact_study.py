@@ -13,13 +13,13 @@ import numpy as np
 
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.rigid import best_rigid
-from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.scenes.contact_force import SCENE, contact_and_force, simulate
 from odeform.types import Floats, MotionSequence
+from odeform_figures.output import write_or_print
 
 __all__ = ["main", "study"]
 

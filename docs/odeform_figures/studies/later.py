@@ -16,13 +16,14 @@ from jaxtyping import Float
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.io import atomic_write, write_or_print
+from odeform.io import atomic_write
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.parallel import parallel_map
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Faces, Floats, Frames, Mesh
+from odeform_figures.output import write_or_print
 
 __all__ = ["RESTS", "Later", "compare_later", "simulate_later"]
 

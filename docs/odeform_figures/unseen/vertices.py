@@ -14,10 +14,10 @@ import numpy as np
 
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.store import open_dataset
-from odeform.io import write_or_print
 from odeform.models.base import Predictor
 from odeform.training.train import train
 from odeform.types import Bools, MotionSequence
+from odeform_figures.output import write_or_print
 
 __all__ = ["errors_at", "held_out", "main", "without_vertices"]
 

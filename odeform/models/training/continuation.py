@@ -6,9 +6,7 @@ from typing import TypeGuard
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.dataset.index import Dataset
-from odeform.dataset.training_data import TrainingData, prepare
-from odeform.errors import InputError
+from odeform.dataset.training_data import TrainingData
 from odeform.models.base import Predictor
 from odeform.models.continuation import (
     LATER_ERRORS,
@@ -20,7 +18,6 @@ from odeform.models.continuation import (
 from odeform.models.kernels.functions import gaussian
 from odeform.models.kernels.regression import KernelRegression
 from odeform.models.reduced_model import ReducedModel
-from odeform.models.registry import load_model
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
@@ -151,16 +148,3 @@ def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
 def is_continued(model: Predictor) -> TypeGuard[ReducedModel]:
     """Whether motions of this model go on beyond its window by these dynamics, where they predict well enough."""
     return isinstance(model, ReducedModel) and not model.schema.objects and not model.continues_itself
-
-
-def refitted(checkpoint: Checkpoint, dataset: Dataset) -> Checkpoint:
-    """The checkpoint of a model that was trained on all frames of `dataset`, with a continuation of today's version.
-
-    Within the trained window, its motions stay bit-identical. `InputError` for a model that is never continued.
-    """
-    model = load_model(checkpoint)
-    if not is_continued(model):
-        raise InputError(f"{checkpoint.model}: expected a model of reduced coordinates of one body, which is continued")
-    data, space = prepare(dataset, model.space.basis), model.space
-    reduced = {split: np.stack([space.with_patterns(y) for y in motions]) for split, motions in data.reduced.items()}
-    return with_continuation(model, replace(data, space=space, reduced=reduced))

@@ -18,22 +18,10 @@ from odeform.simulation.objects.tetrahedra import small_solid
 from odeform.simulation.objects.thickness import median_thickness
 from odeform.types import Faces, Ints, Mesh, Points
 
-__all__ = ["PlacedObject", "make_object", "placed_object"]
+__all__ = ["PlacedObject", "placed_object"]
 
 COUNTS = (1100, 800, 550)  # surface vertices to try: shapes with thin walls need more nodes than smooth ones
 FACTORS = (2.0, 3.0)  # see `small_solid`
-
-
-def make_object(
-    mesh: Mesh,
-    name: str = "object",
-    like: str | None = None,
-    material: SoftMaterial | None = None,
-    up: str | None = None,
-    unit: float | None = None,
-) -> SoftObject:
-    """The solid of `placed_object`, without its place."""
-    return placed_object(mesh, name, like, material, up, unit).item
 
 
 @dataclass(frozen=True, eq=False)

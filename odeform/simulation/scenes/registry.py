@@ -7,7 +7,7 @@ from odeform.schema import Schema
 from odeform.simulation.scene import Scene
 from odeform.surroundings import Surroundings
 
-__all__ = ["SCENES", "find_scene", "get_scene", "known_scenes", "surroundings_of"]
+__all__ = ["SCENES", "find_scene", "get_scene", "surroundings_of"]
 
 SCENES: dict[str, str] = {
     "mass-elastic": "odeform.simulation.scenes.mass_elastic:SCENE",
@@ -15,11 +15,6 @@ SCENES: dict[str, str] = {
     "contact-force": "odeform.simulation.scenes.contact_force:SCENE",
 }
 """Scene name to "module:attribute", imported when the scene is first asked for."""
-
-
-def known_scenes() -> tuple[str, ...]:
-    """Names of all scenes."""
-    return tuple(SCENES)
 
 
 def find_scene(name: str) -> Scene | None:
