@@ -37,8 +37,8 @@ def measure(dataset: Path, keep: Path, minutes: float) -> Scores:
             checkpoint = predictor.checkpoint
             scores = {name: checkpoint.scores[name] for name in SCORES}
             taken = {"seconds": checkpoint.provenance["training_seconds"], "command": checkpoint.provenance["command"]}
-            share = {"correction": checkpoint.config.get("correction")}
-            atomic_write(out, json.dumps({**scores, **taken, **share}, indent=1).encode())
+            weights = {"correction": checkpoint.config.get("correction")}
+            atomic_write(out, json.dumps({**scores, **taken, **weights}, indent=1).encode())
         found[model] = json.loads(out.read_text())
     return found
 
