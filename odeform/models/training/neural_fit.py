@@ -1,7 +1,6 @@
 """The training of a vector field that is a module of PyTorch: Adam on roll-outs, best on validation, resumable."""
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +11,7 @@ from torch import nn
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import FILLED_WEIGHT, TrainingData
 from odeform.models.neural_model import NeuralModel, network_arrays
-from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.loss import Loss, mean_square, torch_device
 from odeform.models.training.part import read_part, write_part
 from odeform.models.training.qualities import Validation, with_qualities
@@ -25,7 +24,6 @@ __all__ = ["train_neural"]
 
 LONGEST = 0.01  # s of a step of a roll-out; longer frames are integrated in several
 HORIZON = (0.25, 0.33)  # of a motion: what is rolled out at first; of the training: in which that grows
-VALIDATIONS = 25  # over the training
 FEW = 8  # validation motions on which solver settings are chosen
 SEEN = 64  # validation motions that choose the weights
 CANDIDATES = [
@@ -127,23 +125,10 @@ class _Learner:
         if request.resume and part is not None:
             self.restore()
             self.run.report(f"continues after {self.elapsed / 60.0:.1f} min, step {self.done}")
-        begin, validated, fraction = time.process_time() - self.elapsed, self.spent(), self.spent()
+        budget = Budget(60.0 * request.minutes, request.steps)
         with small_batches():
-            while fraction < 1.0:
-                loss = self.advance(fraction)
-                self.elapsed = time.process_time() - begin
-                fraction = self.spent()
-                if fraction >= 1.0 or fraction >= validated + 1.0 / VALIDATIONS:
-                    validated, error = fraction, self.validate()
-                    self.run.report(f"{100 * fraction:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
-                    if part is not None:
-                        self.save()
+            descend(self, budget, self.run.report, self.save if part is not None else lambda: None)
         return {"val_rmse_mm": self.best[0], "steps": self.done, "seconds": self.elapsed}
-
-    def spent(self) -> float:
-        """The fraction of the budget that is spent."""
-        request = self.run.request
-        return self.done / request.steps if request.steps else self.elapsed / (60.0 * request.minutes)
 
     def save(self) -> None:
         best = {name: torch.from_numpy(value) for name, value in self.best[1].items()}

@@ -7,8 +7,7 @@ each a fifth as long as the final training.
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -24,33 +23,20 @@ from odeform.models.points.point_network import PointNet, Trial, sum_of
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.samplers import SAMPLERS
 from odeform.models.points.training.torch_arithmetic import Torch
-from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.loss import Loss, torch_device
 from odeform.models.training.part import read_part, write_part
 from odeform.models.training.run import Run
 from odeform.types import Arrays
 
-__all__ = ["Budget", "fit_points", "initial_weights", "train_points"]
+__all__ = ["fit_points", "initial_weights", "train_points"]
 
 FRACTION = 0.2  # length of a trial, relative to the final training
 WARM = 0.03  # fraction of the length in which the learning rate rises
 CLIP = 1.0  # norm of the gradient
-VALIDATIONS = 25  # over the length
 BETWEEN = 20  # steps between two validations, at least
 AHEAD = 1.0  # windows beyond the trained one, each of which takes as long as that
 VALIDATED = 256  # validation motions of a point
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Training budget including trials: processor time in seconds, or a number of steps where one is given."""
-
-    seconds: float
-    steps: int | None = None
-
-    def part(self, fraction: float) -> "Budget":
-        """A fraction in (0, 1] of this budget, at least one step."""
-        return Budget(fraction * self.seconds, None if self.steps is None else max(round(fraction * self.steps), 1))
 
 
 def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dict[str, torch.Tensor]:
@@ -131,24 +117,6 @@ class _Learner:
             self.best = (error, self._snapshot())
         return error
 
-    def train(self, budget: Budget, report: Callable[[str], None], keep: Callable[[dict[str, Any]], None]) -> None:
-        """Take steps until the budget is spent; hand the state to `keep` after each validation."""
-        begin, validated = time.process_time() - self.elapsed, self.done
-        fraction = self._spent(budget)
-        validations = int(fraction * VALIDATIONS)
-        while fraction < 1.0:
-            loss = self.advance(fraction)
-            self.elapsed = time.process_time() - begin
-            fraction = self._spent(budget)
-            if fraction >= 1.0 or (fraction * VALIDATIONS >= validations + 1 and self.done >= validated + BETWEEN):
-                validations, validated = int(fraction * VALIDATIONS), self.done
-                error = self.validate()
-                report(f"{100 * fraction:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
-                keep(self.state())
-
-    def _spent(self, budget: Budget) -> float:
-        return self.done / budget.steps if budget.steps is not None else self.elapsed / budget.seconds
-
     def state(self) -> dict[str, Any]:
         """All that `restore` needs to go on bit-exactly."""
         best = {name: torch.from_numpy(value) for name, value in self.best[1].items()}
@@ -192,7 +160,7 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
         if known["learner"]:
             learner.restore(known["learner"])
             known["learner"] = {}
-        learner.train(budget, lambda line: run.report(f"{title}: {line}"), keep)
+        descend(learner, budget, lambda line: run.report(f"{title}: {line}"), lambda: keep(learner.state()), BETWEEN)
         return learner
 
     with small_batches():
