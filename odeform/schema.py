@@ -54,7 +54,8 @@ class Parameter:
         default: Value used where none is given.
         scale: "log" where ratios matter rather than differences (mass, stiffness), otherwise "linear".
         role: "azimuth" for an angle about the vertical axis under which the scene is symmetric. Models rotate
-            coordinates by it and do not learn it. Otherwise "physical".
+            coordinates by it and do not learn it. "body" for a property of the body itself, which mechanics takes as it
+            is: no model learns it. Otherwise "physical".
         description: One line for people.
         shape: Of its value; () for a number.
 
@@ -79,7 +80,7 @@ class Parameter:
     """"log" where ratios matter rather than differences (mass, stiffness), else "linear"."""
     role: str = "physical"
     """"azimuth" for an angle about the vertical axis under which the scene is symmetric: models rotate coordinates by
-    it and do not learn it."""
+    it and do not learn it. "body" for a property of the body itself, which mechanics takes as it is."""
     description: str = ""
     shape: tuple[int, ...] = ()
     """Always () for a number; vectors are three parameters NAME_x, NAME_y and NAME_z."""
@@ -222,8 +223,9 @@ class Schema:
 
     @property
     def learned(self) -> tuple[Parameter, ...]:
-        """The P parameters that a model learns: all except the azimuth of a symmetric scene."""
-        return tuple(p for p in self.parameters if p.role != "azimuth")
+        """The P parameters that a model learns: all except the azimuth of a symmetric scene, and properties of the body
+        itself."""
+        return tuple(p for p in self.parameters if p.role == "physical")
 
     @property
     def names(self) -> list[str]:
@@ -288,7 +290,7 @@ class Schema:
 
     def outside(self, parameters: Parameters) -> tuple[str, ...]:
         """Names of the parameters outside their trained range."""
-        return tuple(p.name for p in self.learned if not p.inside(parameters[p.name]))
+        return tuple(p.name for p in self.parameters if p.role != "azimuth" and not p.inside(parameters[p.name]))
 
     def vector(self, parameters: Parameters) -> NDArray[np.float64]:
         """(P,) learned parameters, each normalised so that its trained range is [-1, 1]."""

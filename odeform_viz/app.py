@@ -25,7 +25,7 @@ from odeform_viz.runtime.notices import Notices
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.runtime.worker import Worker
 from odeform_viz.session import Session
-from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest, played_until
 from odeform_viz.workspace import Workspace
 
 __all__ = ["App"]
@@ -62,7 +62,7 @@ class App:
         self._threads = threadpool_limits(1, "blas")
         self._tidy = Tidier()
         window = self.session.schema.window
-        self.clock = Clock(window.start, window.stop)
+        self.clock = Clock(window.start, played_until(window))
         self._access = Access.of(host, origins)
         self.server = open_server(self._access, port, f"ODeform · {self.session.schema.scene}")
         try:

@@ -156,7 +156,7 @@ def _followed(column: Column, parameters: Parameters) -> Column:
     predictor = column.predictor
     if predictor is None or column.loaded or not predictor.schema.objects:
         return column
-    body = predictor.rest_of(parameters if column.pinned is None else column.pinned)
+    body = predictor.settled(parameters if column.pinned is None else column.pinned)
     return column if column.geometry is body else replace(column, geometry=body)
 
 

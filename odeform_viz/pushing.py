@@ -119,14 +119,17 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
     push = push_from(parameters, surface)
     points, contact = np.asarray(motion.geometry.points, dtype=float), push.contact
     name = str(parameters[OBJECT])
-    if motion.geometry is surface:
+    if isinstance(motion.geometry, Mesh) and np.array_equal(motion.geometry.faces, surface.faces):
         carriers, weights = np.asarray(surface.faces[contact.face]), contact.barycentric
     else:
         count = min(NEIGHBOURS, len(points))
         carriers = np.atleast_1d(KDTree(points).query(contact.point, count)[1])
         weights = np.full(count, 1.0 / count)
     strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces_on(name)[1]
-    return ShownPush(push, contacts, surface, strongest, carriers, weights, contact.point - weights @ points[carriers])
+    # a place on the body moves with it when it sags; a loaded shape is only about where the body is
+    offset = np.zeros(3) if len(carriers) == len(contact.barycentric) and weights is contact.barycentric else None
+    offset = contact.point - weights @ points[carriers] if offset is None else offset
+    return ShownPush(push, contacts, surface, strongest, carriers, weights, offset)
 
 
 def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats) -> tuple[Vector, float] | None:

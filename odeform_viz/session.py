@@ -20,7 +20,7 @@ from odeform.solver.integrate import SolverSettings
 from odeform.types import GaussianSplats, Geometry, MotionSequence, Points, Times
 from odeform_viz.columns import Column
 from odeform_viz.user_bodies import user_body_of
-from odeform_viz.view import INVISIBLE, REACH, ColumnFrame, Curves, Error, Frame, ViewRequest
+from odeform_viz.view import INVISIBLE, ColumnFrame, Curves, Error, Frame, ViewRequest, shown_until
 
 __all__ = ["Session", "settings_of", "visible_deformation"]
 
@@ -137,7 +137,7 @@ class Session:
     def curve_times(self) -> Times:
         """(T,) seconds: the frames of the trained window, continued to the end of the time slider."""
         window = self.schema.window
-        return window.start + np.arange(round(REACH * (window.stop - window.start) * window.rate) + 1) / window.rate
+        return window.start + np.arange(round((shown_until(window) - window.start) * window.rate) + 1) / window.rate
 
     def curves(self, shown: ColumnFrame, request: ViewRequest) -> Curves:
         """The curves of a column's motion; computed once for each motion."""

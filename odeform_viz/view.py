@@ -9,6 +9,7 @@ from odeform.motion.base import Motion, SolveStats
 from odeform.motion.limits import DEPTH
 from odeform.motion.recorded import RecordedMotion
 from odeform.motion.watch import Stop
+from odeform.schema import Window
 from odeform.types import Floats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
 
@@ -25,11 +26,25 @@ __all__ = [
     "Error",
     "Frame",
     "ViewRequest",
+    "played_until",
     "same_motions",
+    "shown_until",
 ]
 
 INVISIBLE = 1e-4  # m; a third of a pixel for a body of 0.1 m that is 720 pixels high
-REACH = 2.0  # length of the time slider in trained windows
+REACH = 2.0  # length of the time slider in trained windows, at least
+WHOLE = 1.0  # s; what goes on after a shorter window is shown, and played, up to here
+
+
+def played_until(window: Window) -> float:
+    """Seconds up to which a motion is played: to the end of the trained window, or on until a pushed body rests."""
+    span = window.stop - window.start
+    return max(window.stop, window.start + min((1.0 + window.reach) * span, WHOLE))
+
+
+def shown_until(window: Window) -> float:
+    """Seconds to which the time slider and the curves go."""
+    return max(window.start + REACH * (window.stop - window.start), played_until(window))
 
 
 @dataclass(frozen=True)

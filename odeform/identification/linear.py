@@ -54,9 +54,9 @@ class Linear:
 
 
 def parameters_of(schema: Schema, theta: Floats, azimuth: float) -> Parameters:
-    """Parameters in their units from (P,) in [-1, 1] and the azimuth, if the scene has one."""
-    learned = iter(theta)
-    return {p.name: azimuth if p.role == "azimuth" else p.denormalise(float(next(learned))) for p in schema.parameters}
+    """Parameters in their units from (P,) in [-1, 1] and the azimuth, if the scene has one; a body has its own."""
+    found = {p.name: p.denormalise(float(unit)) for p, unit in zip(schema.learned, theta, strict=True)}
+    return found | {p.name: azimuth for p in schema.parameters if p.role == "azimuth"}
 
 
 def _solved(

@@ -1,6 +1,7 @@
 """A body as reduced mechanics knows it: inertia, modes, and the points of its surface that may touch something."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +12,9 @@ from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
 __all__ = ["ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
 
-SUPPORT = 96  # points spread over the surface, besides those near the floor, that may touch the floor
-NEAR_FLOOR, NEAREST = 0.004, 40  # metres, and how many of the vertices below are kept
+SUPPORT = 96  # points spread over the surface that may touch the floor
+NEAR_FLOOR, NEAREST = 0.004, 40  # metres, and how many of the vertices below that may, too
+ALL = 256  # with those that are added where these leave most room: what falls over lies on them
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +75,31 @@ class ReducedBody:
     surface: Samples
     """Where something may touch it."""
 
+    def changed(self, mass: float, stiffness: float) -> "ReducedBody":
+        """The same body with so many times the mass and the stiffness. Its modes keep their shapes."""
+        solid = self.solid
+        parts = {
+            name: replace(samples, rows=samples.rows / np.sqrt(mass), masses=mass * samples.masses)
+            for name, samples in (("support", self.support), ("surface", self.surface))
+        }
+        heavier = replace(solid, mass=mass * solid.mass, inertia=mass * solid.inertia)
+        return replace(self, solid=heavier, squares=stiffness / mass * self.squares, **parts)
+
+    @cached_property
+    def reach(self) -> float:
+        """Metres from the mass centre to the farthest sample of the support."""
+        return float(np.sqrt((self.support.points**2).sum(axis=1).max()))
+
     def near(self, points: Float[np.ndarray, "batch 3"], count: int) -> Ints:
         """(B, count) indices of the samples of the surface nearest to each point, m relative to the mass centre."""
         return self.surface.tree.query(points, min(count, len(self.surface.points)))[1].reshape(len(points), -1)
 
 
-def spread(points: Points, count: int, first: int) -> Ints:
-    """Indices of `count` points (or all), each as far as possible from those before it."""
-    chosen, distance = [first], np.full(len(points), np.inf)
+def spread(points: Points, count: int, first: Sequence[int]) -> Ints:
+    """Indices of `count` points (or all), those of `first` to begin with, each as far as possible from those before."""
+    chosen, distance = list(first), np.full(len(points), np.inf)
+    for index in chosen[:-1]:
+        distance = np.minimum(distance, ((points - points[index]) ** 2).sum(axis=1))
     while len(chosen) < min(count, len(points)):
         distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
         chosen.append(int(distance.argmax()))
@@ -115,8 +134,9 @@ def reduce_body(
 def _support(points: Points, rows: Floats, mass: float) -> Samples:
     low = int(points[:, 2].argmin())
     bottom = np.flatnonzero(points[:, 2] < points[low, 2] + NEAR_FLOOR)
-    kept = bottom[spread(points[bottom], NEAREST, int(np.flatnonzero(bottom == low)[0]))]
-    chosen = np.unique(np.concatenate([spread(points, SUPPORT, low), kept]))
+    kept = bottom[spread(points[bottom], NEAREST, [int(np.flatnonzero(bottom == low)[0])])]
+    chosen = np.unique(np.concatenate([spread(points, SUPPORT, [low]), kept]))
+    chosen = np.unique(spread(points, ALL, chosen.tolist()))
     owner = KDTree(points[chosen]).query(points)[1]
     masses = mass * np.bincount(owner, minlength=len(chosen)) / len(points)
     return Samples(points[chosen], rows[:, chosen], masses)

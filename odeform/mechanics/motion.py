@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from odeform.mechanics.flat import unpacked
 from odeform.mechanics.push import Push
+from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.state import State
-from odeform.mechanics.step import Mechanics, Steps
+from odeform.mechanics.step import Mechanics
 from odeform.types import Floats
 
 __all__ = ["Nodes", "push_body"]
@@ -39,14 +41,12 @@ class Nodes:
 def push_body(mechanics: Mechanics, push: Push, pulse: float, until: float, step: float) -> Nodes:
     """Bodies at rest that are pushed for `pulse` seconds; at least to `until` seconds. The pulse is divided into whole
     steps of about `step` seconds."""
-    batch, size = push.squares.shape
     count = max(round(pulse / step), 1)
     step = pulse / count
-    turns = np.broadcast_to(np.eye(3), (batch, 3, 3))
-    rest = (np.zeros((batch, n)) for n in (size, 1, 7 + size))
-    states, steps = [State(np.zeros((batch, 3)), turns, *rest)], Steps(mechanics, push)
+    bodies = pushed_bodies(mechanics, push, pulse)
+    flat, rows = bodies.start, np.arange(len(push.squares))
+    states, steps = [unpacked(flat, True)], np.full(len(rows), step)
     for index in range(max(int(np.ceil(until / step - 1e-9)), 1)):
-        if index == count:
-            states[-1] = states[-1].without_projectile()
-        states.append(steps.advance(states[-1], step)[0])
+        flat = bodies.advance(rows, index * steps, flat, steps)[0]
+        states.append(unpacked(flat, index + 1 < count))
     return Nodes(step * np.arange(len(states)), states)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from odeform.mechanics.body import ReducedBody
 from odeform.types import Floats, Ints, Vectors
 
-__all__ = ["WIDTHS", "Push", "make_push"]
+__all__ = ["WIDTHS", "Push", "make_push", "no_push"]
 
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
@@ -81,6 +81,22 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
             _fill(row[:count], stand, modes[index], soft)
             _fill(row[count:], touched.take(near[index], axis=0), modes[index], soft)
     return Push(modes, squares, count, points, rows, masses, centres, guides, strength)
+
+
+def no_push(body: ReducedBody, soft: int) -> Push:
+    """A body that nothing but the floor touches, in its `soft` softest modes."""
+    support, soft = body.support, min(soft, len(body.squares))
+    return Push(
+        np.eye(len(body.squares))[None, :, :soft],
+        body.squares[None, :soft],
+        len(support.points),
+        np.ascontiguousarray(support.points.T)[None],
+        np.ascontiguousarray(support.rows[..., :soft])[None],
+        support.masses[None],
+        np.zeros((1, 3)),
+        np.eye(3)[:1],
+        np.zeros((1, 1)),
+    )
 
 
 def _fill(out: Floats, values: Floats, modes: Floats, soft: int) -> None:

@@ -1,13 +1,23 @@
 """Many pushed bodies as initial value problems with flat states, each with steps of its own."""
 
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from odeform.compiling import compiles
+from odeform.mechanics.flat import flat_slopes, packed, unpacked
+from odeform.mechanics.floor import GRAVITY
 from odeform.mechanics.push import Push
-from odeform.mechanics.pushed import SHORTEST, flat_slopes, packed, start_of, unpacked
 from odeform.mechanics.step import Mechanics, Steps
 
-__all__ = ["PushedBodies"]
+if TYPE_CHECKING:
+    from odeform.mechanics.compiled_push import Constants
+
+__all__ = ["CompiledBodies", "PushedBodies", "pushed_bodies"]
+
+SHORTEST = 1e-9  # s; what is left of a pulse or of a step counts from here on
 
 Rows = Int[np.ndarray, " rows"]
 Each = Float[np.ndarray, " rows"]
@@ -15,17 +25,18 @@ States = Float[np.ndarray, "rows state"]
 
 
 class PushedBodies:
-    """B pushes of a body at rest, as `PushedBody` is one of them. It is a `StiffBatchField`."""
+    """B pushes of a body at rest, as `PushedBody` is one of them, in NumPy. It is a `StiffBatchField`."""
 
     def __init__(self, mechanics: Mechanics, push: Push, pulse: float) -> None:
         """Projectiles push for `pulse` seconds from time 0 on."""
         self._mechanics, self._push, self._pulse = mechanics, push, pulse
+        self._preload = mechanics.preload(push)
         self._known: dict[bool, tuple[bytes, Steps]] = {}
 
     @property
     def start(self) -> Float[np.ndarray, "batch state"]:
         """(B, 20 + 2 K): at rest."""
-        return np.tile(start_of(self._push.squares.shape[1]), (len(self._push.squares), 1))
+        return self._mechanics.start(self._push)
 
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
         """The slopes of states (R, 20 + 2 K) at `times` (R,) in s of the pushes `rows`."""
@@ -72,6 +83,80 @@ class PushedBodies:
         key, (last, steps) = rows.tobytes(), self._known.get(pushing, (b"", None))
         if steps is None or last != key:
             whole = self._push if pushing else self._push.over
-            steps = Steps(self._mechanics, whole if len(rows) == len(whole.squares) else whole.some(rows))
+            some = whole if len(rows) == len(whole.squares) else whole.some(rows)
+            steps = Steps(self._mechanics, some, self._preload[rows])
             self._known[pushing] = key, steps
         return steps
+
+
+class CompiledBodies:
+    """As `PushedBodies`, in machine code; every motion is as it would be alone, to the bit."""
+
+    def __init__(self, mechanics: Mechanics, push: Push, pulse: float) -> None:
+        """Projectiles push for `pulse` seconds from time 0 on."""
+        self._mechanics, self._push, self._pulse = mechanics, push, pulse
+
+    @cached_property
+    def _constants(self) -> "Constants":
+        from odeform.mechanics.compiled_push import Constants  # importing Numba takes half a second
+
+        mechanics, push, law = self._mechanics, self._push, self._mechanics.law
+        solid, floor, stands = mechanics.body.solid, mechanics.floor, push.support
+        spread = np.full(6 + push.squares.shape[1], 1.0 / solid.mass)
+        spread[:3], spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
+        stiffness, grip = law.push_stiffness * push.masses, law.push_grip * push.masses
+        stiffness[:, :stands], grip[:, :stands] = floor.stiffness, law.floor_grip * push.masses[:, :stands]
+        return Constants(
+            points=push.points,
+            rows=push.rows,
+            stiffness=stiffness,
+            grip=grip,
+            level=floor.level,
+            squares=law.stiffness * push.squares,
+            preload=mechanics.preload(push),
+            inertia=np.ascontiguousarray(solid.inertia, dtype=float),
+            spread=spread,
+            centres=np.ascontiguousarray(push.centres, dtype=float),
+            guides=np.ascontiguousarray(push.guides, dtype=float),
+            forces=push.forces[:, 0].astype(float),
+            mass=float(solid.mass),
+            gravity=GRAVITY,
+            relaxation=float(mechanics.relaxation),
+            floor_damping=law.floor_damping,
+            floor_friction=law.floor_friction,
+            push_damping=law.push_damping,
+            push_friction=law.push_friction,
+            radius=mechanics.projectile.radius,
+            projectile=mechanics.projectile.mass,
+            reach=mechanics.body.reach,
+            pulse=self._pulse,
+        )
+
+    @property
+    def start(self) -> Float[np.ndarray, "batch state"]:
+        """(B, 20 + 2 K): at rest."""
+        return self._mechanics.start(self._push)
+
+    def __call__(self, rows: Rows, times: Each, states: States) -> States:
+        """The slopes of states (R, 20 + 2 K) at `times` (R,) in s of the pushes `rows`."""
+        from odeform.mechanics.compiled_push import slope_of
+
+        out = np.empty_like(states)
+        slope_of(self._constants, rows, times, states, out)
+        return out
+
+    def advance(self, rows: Rows, times: Each, states: States, steps: Each) -> tuple[States, States, Each]:
+        """States (R, 20 + 2 K) after `steps` (R,) s, to second order, slopes there, and errors (R,) in m.
+
+        The end of the pulse ends a step.
+        """
+        from odeform.mechanics.compiled_push import advance_all
+
+        out, slopes, errors = np.empty_like(states), np.empty_like(states), np.empty(len(rows))
+        advance_all(self._constants, rows, times, states, steps, out, slopes, errors)
+        return out, slopes, errors
+
+
+def pushed_bodies(mechanics: Mechanics, push: Push, pulse: float) -> PushedBodies | CompiledBodies:
+    """B pushes of a body at rest, compiled where that is possible."""
+    return (CompiledBodies if compiles() else PushedBodies)(mechanics, push, pulse)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 from scipy.linalg import get_lapack_funcs
 
 from odeform.mechanics.body import ReducedBody
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.flat import parts_of, start_of, unpacked
 from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State, apart, extrapolated
@@ -18,7 +20,7 @@ from odeform.mechanics.touching import Near, Touching
 from odeform.mechanics.turns import skew
 from odeform.types import Floats
 
-__all__ = ["Mechanics", "Projectile", "Steps"]
+__all__ = ["Mechanics", "Projectile", "Rest", "Steps"]
 
 AHEAD = 0.02  # s: errors of velocities count by how far they carry in that time
 (SOLVE,) = get_lapack_funcs(("posv",), dtype=np.float64)
@@ -36,12 +38,27 @@ class Projectile:
 
 
 @dataclass(frozen=True, eq=False)
+class Rest:
+    """Where a body rests that is not at zero of its coordinates, as in `State`."""
+
+    shift: Float[np.ndarray, "3"]
+    rotation: Float[np.ndarray, "3 3"]
+    modes: Float[np.ndarray, " soft"]
+    """Of the first directions of every push, which are the body's softest modes."""
+
+
+@dataclass(frozen=True, eq=False)
 class Mechanics:
     """A body under a law of contact and material, and what it is pushed by."""
 
     body: ReducedBody
     law: ContactParameters
     projectile: Projectile
+    stress: float = 1.0
+    """Share of the floor's force on the body in zero of its coordinates that its own stress there balances: one where
+    it rests there."""
+    rest: Rest | None = None
+    """None where it rests in zero."""
 
     @cached_property
     def floor(self) -> Floor:
@@ -53,16 +70,34 @@ class Mechanics:
         """Ratio of damping to stiffness, s."""
         return self.law.damping * self.body.solid.damping
 
+    def start(self, push: Push) -> Float[np.ndarray, "batch state"]:
+        """(B, 20 + 2 K): flat states at rest."""
+        size = push.squares.shape[1]
+        state = start_of(size)
+        if self.rest is not None:
+            shift, turn, modes, *_ = parts_of(state[None])
+            state[shift], state[turn] = self.rest.shift, self.rest.rotation.ravel()
+            state[modes][: len(self.rest.modes)] = self.rest.modes
+        return np.tile(state, (len(push.squares), 1))
+
+    def preload(self, push: Push) -> Float[np.ndarray, "batch directions"]:
+        """(B, K): what the body's own stress does to its directions of deformation in zero. Where it rests elsewhere,
+        it is what keeps each of them there: stiff directions, in which the rest is not known, do not begin to ring."""
+        if self.rest is None:
+            return self.stress * self.floor.preload @ push.modes
+        steps = Steps(self, push, np.zeros_like(push.squares))
+        return steps.slope(unpacked(self.start(push), False))[:, 6:]
+
 
 class Steps:
     """The right-hand side for B pushes, and steps in time."""
 
-    def __init__(self, mechanics: Mechanics, push: Push) -> None:
-        """What all steps share is computed here."""
+    def __init__(self, mechanics: Mechanics, push: Push, preload: Floats) -> None:
+        """What all steps share is computed here; `preload` (B, K) as of `Mechanics`."""
         law, solid = mechanics.law, mechanics.body.solid
         batch, size = push.squares.shape
         self._solid, self._relaxation, self._forces = solid, mechanics.relaxation, push.forces
-        self._squares, self._preload = law.stiffness * push.squares, mechanics.floor.preload @ push.modes
+        self._squares, self._preload = law.stiffness * push.squares, preload
         self._masses = np.concatenate([np.full(3, solid.mass), np.zeros(3), np.ones(size), [mechanics.projectile.mass]])
         self._stiffness = np.zeros((batch, len(self._masses)))
         self._stiffness[:, 6:-1] = self._squares
@@ -70,7 +105,9 @@ class Steps:
         self._spread = np.full(6 + size, 1.0 / solid.mass)
         self._spread[:3], self._spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
         self._touching = {
-            pushed: Touching(push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius)
+            pushed: Touching(
+                push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius, mechanics.body.reach
+            )
             for pushed in (True, False)
         }
 

@@ -18,6 +18,9 @@ __all__ = ["Near", "Touching"]
 
 MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
 FLOOR, PUSH = 64, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
+SOFT = (
+    5e-3  # m of depth in the floor from which on its springs stiffen: what lands on an edge sinks no deeper than that
+)
 UP_FIRST = [2, 0, 1]  # the scene's axes, as those of contacts with the floor
 
 
@@ -58,15 +61,18 @@ class Near:
             out[:, :floor, :, -1] = 0.0
             guides = self.push.guides[:, None] @ state.rotation
             np.matmul(axes[:, floor:], -guides[..., None], out=out[:, floor:, :, state.body :])
-        return Contacts(out, gap, *self.springs)
+        springs = self.springs.copy()
+        springs[0, :, :floor] *= np.maximum(-gap[:, :floor] / SOFT, 1.0)
+        return Contacts(out, gap, *springs)
 
 
 class Touching:
     """Finds where B pushed bodies may touch something."""
 
-    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float) -> None:
-        """Spheres of `radius` m push for as long as states hold them."""
-        self._push, self._law, self._radius, self._level = push, law, radius, floor.level
+    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float, reach: float) -> None:
+        """Spheres of `radius` m push for as long as states hold them; no sample of the support is farther than `reach`
+        m from the mass centre."""
+        self._push, self._law, self._radius, self._level, self._reach = push, law, radius, floor.level, reach
         batch, _, samples = push.points.shape
         self._springs = np.empty((4, batch, samples))
         stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
@@ -84,7 +90,8 @@ class Touching:
         push = self._push
         _, place = _bent(push.points, push.rows, state)
         height = _heights(place[..., : push.support], self._level, state)
-        down = np.minimum(state.velocity[:, 2], 0.0)
+        spin = np.sqrt((state.velocity[:, 3:6] ** 2).sum(axis=1))
+        down = np.minimum(state.velocity[:, 2] - self._reach * spin, 0.0)
         stand, real = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
         chosen = stand
         if state.pushed:

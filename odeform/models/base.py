@@ -177,7 +177,7 @@ class Predictor(ABC):
         self._check_observed(observed)
         end = self._end(until)
         complete = self.complete(parameters)
-        shape = self.rest_of(complete) if geometry is None else stand_up(geometry)
+        shape = self.settled(complete) if geometry is None else stand_up(geometry)
         return solved(self, shape, complete, self._settings(quality, complete), end, observed)
 
     def solve_batch(
@@ -208,7 +208,7 @@ class Predictor(ABC):
         """
         self._check_observed(None)
         sets = parameter_sets(self.schema, parameters, self.complete)
-        shape = self.rest_of(sets[0]) if geometry is None else stand_up(geometry)
+        shape = self.settled(sets[0]) if geometry is None else stand_up(geometry)
         return solved_batch(self, shape, sets, self._settings(quality, sets[0]), self._end(until))
 
     def _solve_batch(
@@ -262,7 +262,13 @@ class Predictor(ABC):
             name = self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))
             body = {OBJECT: name}
             given = complete_push({**body, **given}, self.rest_of(body), self.force_range(body))
+            given = {**self.model_of(body).own_values, **given}
         return self.schema.complete(given)
+
+    @property
+    def own_values(self) -> dict[str, float]:
+        """What a body has of the scene's parameters where they are not given, in a scene with several bodies."""
+        return {}
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
         """Weakest and strongest force in newton on the body that `parameters` select, in training.
@@ -276,6 +282,11 @@ class Predictor(ABC):
     def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
         """The trained body at rest that `parameters` select in a scene with objects; `rest` in all other scenes."""
         return self._rests.get(parameters.get(OBJECT, ""), self.rest)
+
+    def settled(self, parameters: Mapping[str, Any]) -> Mesh:
+        """The body where it rests under these parameters: where motions start. Contacts are places on `rest_of`, and
+        move with its surface."""
+        return self.rest_of(parameters)
 
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay

@@ -118,6 +118,9 @@ def _prepared(
             raise InputError(f"{name}: expected a tensor of one number, got shape {tuple(value.shape)}")
     known = predictor.complete({**given, **{name: float(value.detach()) for name, value in tensors.items()}})
     model = predictor.model_of(known)
+    for p in model.schema.parameters:
+        if p.role == "body" and p.name in tensors:
+            raise InputError(f"{p.name}: has no gradients; expected a number")
     if model.schema.needs_observations or not model.extrapolates:
         raise InputError(f"{predictor.model}: has no gradients; expected a model of parameters alone")
     return model, {name: value.reshape(()).cpu().double() for name, value in tensors.items()}, known

@@ -17,7 +17,7 @@ from odeform.motion.base import Motion
 from odeform.motion.motion_batch import MotionBatch
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Geometry, MotionSequence
+from odeform.types import Floats, Geometry, Mesh, MotionSequence
 
 __all__ = ["PerObject", "is_per_object", "joined"]
 
@@ -99,6 +99,9 @@ class PerObject(Predictor):
 
     def model_of(self, parameters: Parameters) -> Predictor:
         return self.parts[parameters[OBJECT]]
+
+    def settled(self, parameters: Mapping[str, Any]) -> Mesh:
+        return self.parts[parameters[OBJECT]].settled(parameters)
 
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         return self.parts[parameters[OBJECT]].frontier

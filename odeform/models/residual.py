@@ -21,6 +21,7 @@ from odeform.types import Arrays, Floats, Times
 __all__ = ["PARTS", "FrameRegression", "ParameterRegression", "Residual", "parameter_residual", "weight_of"]
 
 PREFIX = "correction."
+FADES = 0.1  # s
 PARTS = {"shift": slice(0, 3), "rotation": slice(3, POSE), "deformation": slice(POSE, None)}
 """Columns of y that are regressed together."""
 
@@ -64,6 +65,19 @@ class Residual:
             if taken.any():
                 added -= taken * (y if (times <= stop).all() else own.reduced(np.minimum(times, stop)))
             return y + added * (times > 0.0)[:, None]
+
+        return adjust
+
+    def deformation_adjustment(self, inputs: Any) -> Adjustment:
+        """Adds it to the deformation alone. After the last frame it fades away, linearly over `FADES` seconds: where a
+        body comes to rest, it is as its ODE says."""
+        added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
+
+        def adjust(times: Times, y: Floats) -> Floats:
+            share = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
+            out = y.copy()
+            out[..., POSE:] += share * (added_at(times) - taken * y)[..., POSE:]
+            return out
 
         return adjust
 

@@ -11,7 +11,7 @@ from odeform.types import Floats, Times
 
 __all__ = ["FloorProjection"]
 
-MOST = 0.01  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
+MOST = 0.03  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
 
 
 class FloorProjection:
@@ -31,21 +31,25 @@ class FloorProjection:
         """`lowest` maps coordinates (R, 6 + K) of `own` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
-        With `grid`, in s, the change is linear between these times, and stays as it is after them.
+        With `grid`, in s, the change is linear between these times; after them, each moment has its own.
         """
         self._own, self._lowest, self._limit, self._grid = own, lowest, limit, grid
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
-        by = self._by(y) if self._grid is None else self._between(times, self._grid).reshape(y.shape[:-1])
+        by = self._by(y) if self._grid is None or times.min() > self._grid[-1] else self._between(times, y, self._grid)
         if by.any():
             y = y.copy()
             y[..., 2] += by
         return y
 
-    def _between(self, times: Times, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "batch times"]:
+    def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
         """Of each motion, from the changes on the grid."""
-        return np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
+        by = np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
+        by = by.reshape(y.shape[:-1])
+        if len(later := np.flatnonzero(times > grid[-1])):
+            by[..., later] = self._by(y[..., later, :])
+        return by
 
     @cached_property
     def _on_grid(self) -> Floats:

@@ -45,6 +45,9 @@ class Scene:
     """m/s^2, along -z."""
     floor: float | None = 0.0
     """Height in metres of the floor, which no motion may pass; None for a scene without one."""
+    until: float | None = None
+    """Seconds to which a motion on demand is simulated, unless the body rests before; None: over the window. `simulate`
+    then takes it as `until`."""
     resolutions: tuple[int, ...] = ()
     """Resolutions of the simulated mesh, finest first. The first counts as the truth; none: it cannot be changed."""
     glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs

@@ -7,7 +7,7 @@ import viser
 from odeform.errors import InputError
 from odeform_viz.page import Page, Panel
 from odeform_viz.state import PageState
-from odeform_viz.view import REACH, Description
+from odeform_viz.view import Description, shown_until
 
 __all__ = ["PlaybackPanel"]
 
@@ -31,7 +31,7 @@ class PlaybackPanel(Panel):
             self._time = gui.add_slider(
                 "time (s)",
                 min=start,
-                max=round(start + REACH * (stop - start), 4),
+                max=round(shown_until(self._window), 4),
                 step=0.0005,
                 initial_value=start,
                 marks=((start, f"{start:g}"), (stop, f"trained until {stop:g} s")),
@@ -43,7 +43,7 @@ class PlaybackPanel(Panel):
             self._play.on_click(lambda _: self.toggle())
             go = gui.add_button_group("go to", ("start", PREVIOUS, NEXT, "peak"))
             go.on_click(self._clicked)
-            self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value=_usual_speed(stop - start))
+            self._speed = gui.add_dropdown("speed", tuple(SPEEDS), initial_value=_usual_speed(page.clock.stop - start))
             self._speed.on_update(lambda _: self._changed())
             self._loop = gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())

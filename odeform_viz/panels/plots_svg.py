@@ -8,7 +8,7 @@ import numpy as np
 from odeform.schema import Window
 from odeform.types import Floats
 from odeform_viz.colors import Color
-from odeform_viz.view import REACH, Curves
+from odeform_viz.view import Curves, shown_until
 
 __all__ = ["WIDTH", "Line", "Quantity", "cursor_css", "plots_html", "quantities_of"]
 
@@ -64,7 +64,7 @@ def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str
 
     A click on a plot goes to that time, by the number box of the slider with the id `slider`.
     """
-    end = window.start + REACH * (window.stop - window.start)
+    end = shown_until(window)
     data = f'data-time-slider="{slider}" data-start="{window.start:g}" data-stop="{end:g}"'
     data += f' data-left="{LEFT}" data-right="{LEFT + WIDE}"'
     plots = "".join(
@@ -76,15 +76,15 @@ def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str
 
 def cursor_css(window: Window, time: float) -> str:
     """A style that moves the cursors of all plots to `time` in seconds; sent instead of the plots."""
-    fraction = (time - window.start) / (REACH * (window.stop - window.start))
+    fraction = (time - window.start) / (shown_until(window) - window.start)
     return f"<style>.odeform-plots .cursor{{transform:translateX({fraction * WIDE:.1f}px)}}</style>"
 
 
 def _plot(quantity: Quantity, lines: Sequence[Line], window: Window) -> str:
-    end = window.start + REACH * (window.stop - window.start)
+    end = shown_until(window)
     curves = _curves(quantity.name, lines)
     low, high = _axis([v[: _trained(c.times, window)] for c, _, v, _ in curves])
-    trained = WIDE / REACH
+    trained = WIDE * (window.stop - window.start) / (end - window.start)
     largest = max((float(np.nanmax(v, initial=high)) for _, _, v, _ in curves), default=high)
     cut = f'<text x="{WIDE}" y="-6" text-anchor="end" class="quiet">to {largest:.3g} ↑</text>' if largest > high else ""
     return (

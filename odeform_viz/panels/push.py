@@ -10,7 +10,7 @@ import viser
 from odeform.errors import InputError
 from odeform.geometry.contact import CONE, nearest_on, touching_centre
 from odeform.geometry.push import Push, push_of
-from odeform.schema import OBJECT
+from odeform.schema import OBJECT, Parameter
 from odeform.simulation.contacts import contact_parameters, push_from
 from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column
@@ -49,9 +49,10 @@ class PushPanel(Panel):
             self._strength = gui.add_slider("force (N)", 0.0, 1.0, 0.01, 0.0, hint="")
             self._up = self._add_tilt(gui, "tilt up (°)", "off the inward normal, along the surface and upwards")
             self._side = self._add_tilt(gui, "tilt sideways (°)", "off the inward normal, along the surface")
+            self._body = {p.name: gui.add_slider(p.label, 0.0, 1.0, 0.001, 0.0) for p in self._of_body()}
             buttons = gui.add_button_group("set", ("straight in", "default"), hint="the direction, or the whole push")
             buttons.on_click(self._clicked)
-        for control in (self._object, self._strength, self._up, self._side):
+        for control in (self._object, self._strength, self._up, self._side, *self._body.values()):
             control.on_update(lambda _: page.wake())
         self._write()
         controls = page.controls
@@ -77,11 +78,13 @@ class PushPanel(Panel):
             if values == self._written:
                 return dict(self._parameters)
             self._check(values)
-            name, strength, up, side = values
-            if values[1:] != self._written[1:]:
+            name, strength, up, side, *body = values
+            changed = zip(self._body, body, self._written[4:], strict=True)
+            self._parameters = {**self._parameters, **{key: new for key, new, old in changed if new != old}}
+            if (strength, up, side) != self._written[1:4]:
                 contact = push_from(self._parameters, self._surface).contact
                 self._adopt(Push(contact, float(strength), math.radians(up), math.radians(side)))
-                self._written = (self._written[0], strength, up, side)
+            self._written = (self._written[0], strength, up, side, *body)
             if name != self._written[0]:
                 self._change_object(name)
             return dict(self._parameters)
@@ -153,12 +156,20 @@ class PushPanel(Panel):
         assert predictor is not None
         return predictor.force_range(self._parameters)
 
-    def _values(self) -> tuple[str, float, float, float]:
-        return self._object.value, self._strength.value, self._up.value, self._side.value
+    def _of_body(self) -> list[Parameter]:
+        """The properties of the body that is pushed."""
+        predictor = self._page.model.predictor
+        assert predictor is not None
+        return [p for p in predictor.model_of(self._parameters).schema.parameters if p.role == "body"]
 
-    def _check(self, values: tuple[str, float, float, float]) -> None:
+    def _values(self) -> tuple[Any, ...]:
+        controls = (self._object, self._strength, self._up, self._side, *self._body.values())
+        return tuple(control.value for control in controls)
+
+    def _check(self, values: tuple[Any, ...]) -> None:
         self._schema.check_object(values[0])
-        for slider, value in zip((self._strength, self._up, self._side), values[1:], strict=True):
+        sliders = (self._strength, self._up, self._side, *self._body.values())
+        for slider, value in zip(sliders, values[1:], strict=True):
             if not slider.min <= value <= slider.max:
                 raise InputError(f"{slider.label}: expected {slider.min:g} to {slider.max:g}, got {value:g}")
 
@@ -209,6 +220,11 @@ class PushPanel(Panel):
             self._object.value = name
             for slider, value in zip((self._strength, self._up, self._side), shown, strict=True):
                 slider.value = min(max(value, slider.min), slider.max)
+            for p in self._of_body():
+                slider, value = self._body[p.name], float(self._parameters[p.name])
+                slider.min, slider.max, slider.step = _rounded(p.low), _rounded(p.high), _rounded(p.low / 50.0)
+                slider.hint = f"{p.description}; its own is {p.default:.3g} {p.unit}"
+                slider.value = min(max(_rounded(value), slider.min), slider.max)
             self._written = self._values()
 
     def _show(self) -> None:
@@ -230,3 +246,7 @@ class PushPanel(Panel):
                 self._adopt(Push(push.contact, push.strength))
             self._write()
         self._page.wake()
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")

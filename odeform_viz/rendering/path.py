@@ -8,7 +8,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform.types import Vector
 from odeform_viz.colors import Color
 from odeform_viz.rendering.glb import LINEAR
-from odeform_viz.view import REACH
+from odeform_viz.view import shown_until
 
 __all__ = ["show_path"]
 
@@ -21,7 +21,7 @@ def show_path(
 ) -> viser.LineSegmentsHandle:
     """Draw where `centre` (3,) m of the body at rest moves, to the end of the time slider; paler once extrapolated."""
     window = motion.schema.window
-    times = np.linspace(window.start, window.start + REACH * (window.stop - window.start), SEGMENTS + 1)
+    times = np.linspace(window.start, shown_until(window), SEGMENTS + 1)
     poses = motion.pose(times)
     points = poses[:, :3, :3] @ centre + poses[:, :3, 3]
     strength = np.where(times[:-1] < window.stop, 1.0, CONTINUED)[:, None, None]

@@ -140,14 +140,16 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
     """Simulate one motion of a scene under `parameters` (SI units), sampled at `rate` in Hz."""
     from odeform.simulation.scenes.registry import get_scene
 
-    return get_scene(scene).simulate(parameters, rate=rate, report=report)
+    known = get_scene(scene)
+    longer = {} if known.until is None else {"until": known.until}
+    return known.simulate(parameters, rate=rate, report=report, **longer)
 
 
 def simulate_user_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
     """Simulates a motion of a soft object (`SoftObject`) that is none of the scene's; see `simulate_motion`."""
-    from odeform.simulation.scenes.contact_force import simulate_object
+    from odeform.simulation.scenes.contact_force import UNTIL, simulate_object
 
-    return simulate_object(item, parameters, rate, report=report)
+    return simulate_object(item, parameters, rate, report=report, until=UNTIL)
 
 
 def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:

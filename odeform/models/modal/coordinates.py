@@ -47,6 +47,14 @@ class Coordinates:
         coefficients = modes @ self.coefficients.T + arcs[:, POSE:]
         return np.concatenate([moved, vector_from_rotation(turned), coefficients], axis=1)
 
+    def placed(self, pose: Float[np.ndarray, "times 6"], modes: Floats) -> tuple[Vectors, Rotations]:
+        """Shifts (T, 3) m and rotations (T, 3, 3) of the mass centre for which `reduced` gives a pose."""
+        one, other = self.pairs
+        arcs = (modes[:, one] * modes[:, other]) @ self.arcs[:, :POSE]
+        own = rotation_from_vector(modes @ self.turns.T + arcs[:, 3:])
+        rotation = rotation_from_vector(pose[:, 3:]) @ own.swapaxes(1, 2)
+        return pose[:, :3] - np.einsum("tij,tj->ti", rotation, modes @ self.shifts.T + arcs[:, :3]), rotation
+
 
 def coordinates_of(body: ElasticBody) -> tuple[Coordinates, Basis]:
     """The maps, and the basis (S, 3, K) at the surface of the body: its modes, made orthonormal, softest first."""

@@ -1,9 +1,11 @@
 """ODeform for bodies of known shape and material: the ODE is reduced mechanics, with few learned numbers."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -11,26 +13,34 @@ from jaxtyping import Float
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.flat import body_motion
 from odeform.mechanics.push import Push, make_push
-from odeform.mechanics.pushed import PushedBody, body_motion
-from odeform.mechanics.pushed_batch import PushedBodies
+from odeform.mechanics.pushed import PushedBody
+from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.step import Mechanics, Projectile
+from odeform.models.base import Predictor
 from odeform.models.contact.inputs import ContactInputs
+from odeform.models.modal.body_parameters import MASS, YOUNG
 from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.modal.elastic_body import ElasticBody
+from odeform.models.modal.release import before, released
+from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.model import Model
 from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
-from odeform.motion.recent import Recent
-from odeform.motion.reduced_space import ReducedSpace
-from odeform.motion.trajectory import Adjusted, Moving, Trajectory
+from odeform.motion.motion_batch import MotionBatch
+from odeform.motion.recent import Recent, geometry_key
+from odeform.motion.reduced_motion import ReducedMotion
+from odeform.motion.reduced_space import POSE, ReducedSpace
+from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
+from odeform.motion.trust import Trust
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Basis, Floats, Geometry, Times, Vectors
+from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, Times, Vectors
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
@@ -38,6 +48,9 @@ if TYPE_CHECKING:
 __all__ = ["EXACT", "QUALITIES", "ModalModel"]
 
 HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
+SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
+SOFTEST = 2.0  # times the deformation of training motions, that of the softest body that the sliders reach
+SETTLED = 4  # bodies of another mass and stiffness that are kept
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
 QUALITIES = {
@@ -48,6 +61,27 @@ QUALITIES = {
 """Of bodies whose solver errors were not measured."""
 EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
 """The reference for solver errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Readout:
+    """From states of the mechanics to coordinates of a motion."""
+
+    coordinates: Coordinates
+    settled: SettledBody | None
+    scale: float
+    """Of amplitudes: modes of a heavier body move less by each unit."""
+
+    def __call__(self, times: Times, states: Floats) -> Floats:
+        """(T,) s and states (T, 20 + 2 K) -> (T, 6 + K)."""
+        shift, rotation, modes = body_motion(states)
+        y = self.coordinates.reduced(shift, rotation, self.scale * modes)
+        return y if self.settled is None else self.settled.relative(y)
+
+    def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
+        """As `odeform.models.modal.release.released`."""
+        pose = y[:, :POSE] if self.settled is None else self.settled.absolute(y[:, :POSE])
+        return released(self.coordinates, states, pose, self.scale)
 
 
 class ModalModel(Model):
@@ -61,6 +95,7 @@ class ModalModel(Model):
     together = 32
     accurate = QUALITIES["reference"]
     rescales_input = False
+    continues_itself = True
     fallback = SolverSettings("limex", step=2.5e-3, dtype="float64")
     finer = MappingProxyType({EXACT: 0.0})
     knows_objects = True
@@ -84,13 +119,28 @@ class ModalModel(Model):
         self.qualities = self.qualities or QUALITIES
         if "correction" in config:
             self.residual = contact_residual(checkpoint.arrays, config["correction"])
+        # files of before bodies had a mass and a stiffness, and went on until they rest, have none of them
+        self._young, self.free_from = float(config.get("young_kpa", 1.0)), config.get("free_from_s")
+        self.settled_body: SettledBody | None = None
+        self._ratios = 1.0, 1.0
+        self._changed: Recent[ModalModel] = Recent(SETTLED)
         self._recent: Recent[tuple[ContactInputs, Vectors]] = Recent(1)
 
     # these take a moment, and not every object of a checkpoint is looked at
 
     @cached_property
+    def trust(self) -> Trust:
+        # mechanics loses energy by itself; that of the centre alone may grow, as when a body falls over
+        trust = super().trust
+        return replace(trust, limits=replace(trust.limits, energy=float("inf")))
+
+    @property
     def mechanics(self) -> Mechanics:
         """The right-hand side of its ODE."""
+        return self._mechanics if self.settled_body is None else self.settled_body.mechanics
+
+    @cached_property
+    def _mechanics(self) -> Mechanics:
         return Mechanics(self.body.reduced(), self.law, self.projectile)
 
     @cached_property
@@ -105,18 +155,78 @@ class ModalModel(Model):
     @cached_property
     def space(self) -> ReducedSpace:
         """That of its coordinates."""
-        return space_of(self.body, self._coordinates[1], self._largest)
+        # mechanics knows how far a body moves; only its deformation may get lost
+        return space_of(self.body, self._coordinates[1], (float("inf"), SOFTEST * self._largest[1]))
+
+    @property
+    def own_values(self) -> dict[str, float]:
+        """Mass in kg and Young's modulus in kPa of the body as it was measured, of those that are parameters."""
+        known = {MASS: self.body.solid.mass, YOUNG: self._young}
+        return {p.name: known[p.name] for p in self.schema.parameters if p.name in known}
+
+    def _at(self, parameters: Mapping[str, Any]) -> "ModalModel":
+        """The model of this body with the mass and the stiffness that parameters give it."""
+        own = self.own_values
+        ratios = tuple(float(parameters.get(name, own[name])) / own[name] for name in own)
+        mass, stiffness = (1.0 if abs(ratio - 1.0) < SAME else ratio for ratio in ratios or (1.0, 1.0))
+        if (mass, stiffness) == self._ratios:
+            return self
+        return self._changed.get((mass, stiffness), lambda: self._with(mass, stiffness))
+
+    def _with(self, mass: float, stiffness: float) -> "ModalModel":
+        """With so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
+        out = copy(self)
+        out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
+        out.settled_body = None
+        if (mass, stiffness) != (1.0, 1.0):
+            coordinates, basis = self._coordinates
+            out.settled_body = settled_body(self.body, self.law, self.projectile, out._ratios, coordinates, basis)
+        return out
+
+    def settled(self, parameters: Mapping[str, Any]) -> Mesh:
+        found = self._at(parameters).settled_body
+        return self.rest if found is None else found.rest
+
+    def _solve(
+        self,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
+    ) -> ReducedMotion:
+        return super(ModalModel, self._at(parameters))._solve(geometry, parameters, settings, until, observed)
+
+    def _solve_batch(
+        self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
+    ) -> MotionBatch:
+        first = self._at(sets[0])
+        if any(self._at(each) is not first for each in sets):
+            return Predictor._solve_batch(self, geometry, sets, settings, until)
+        return super(ModalModel, first)._solve_batch(geometry, sets, settings, until)
+
+    def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
+        settled = self.settled_body
+        if settled is None or not np.array_equal(geometry.points, settled.rest.points):
+            return super().evaluate_basis(geometry, azimuth)
+        measured = super().evaluate_basis(self.rest, 0.0)
+        return self._evaluated.get((geometry_key(geometry), azimuth), lambda: settled.basis(measured, geometry))
 
     def _pushed(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[ContactInputs, Vectors]:
-        """What pushes at theta (B, P), relative to the mass centre, and the centres (B, 3) of the spheres."""
+        """What pushes at theta (B, P), relative to the mass centre of the body as it was measured, and the centres
+        (B, 3) of the spheres at rest."""
 
         def found() -> tuple[ContactInputs, Vectors]:
             values = [[p.denormalise(float(x)) for p, x in zip(self.schema.learned, row, strict=True)] for row in theta]
             contacts, forces = np.split(np.array(values), [3], axis=1)
             known = [checked_contact(self.rest, *one) for one in zip(contacts, forces, strict=True)]
             points, normals = (np.stack([getattr(point, name) for point, _ in known]) for name in ("point", "normal"))
-            anchor, centres = self.body.anchor, np.stack([centre for _, centre in known])
-            return ContactInputs(points - anchor, normals, forces), centres - anchor
+            centres = [centre for _, centre in known]
+            if (settled := self.settled_body) is not None:
+                places = [point.moved(settled.rest.points, self.rest.faces) for point, _ in known]
+                centres = [checked_contact(settled.rest, *one)[1] for one in zip(places, forces, strict=True)]
+            anchor = self.body.anchor
+            return ContactInputs(points - anchor, normals, forces), np.stack(centres) - anchor
 
         return self._recent.get(theta.tobytes(), found)
 
@@ -124,10 +234,9 @@ class ModalModel(Model):
         inputs, centres = self._pushed(theta)
         return make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centres, inputs.force)
 
-    def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> Callable[[Times, Floats], Floats]:
+    def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
         """That of states in the directions of deformation of one push."""
-        coordinates = self.coordinates.along(modes)
-        return lambda times, states: coordinates.reduced(*body_motion(states))
+        return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
 
     def residual_inputs(self, theta: Floats) -> ContactInputs:
         return self._pushed(np.atleast_2d(theta))[0]
@@ -143,7 +252,7 @@ class ModalModel(Model):
     ) -> Callable[[], BatchProblem]:
         def make() -> BatchProblem:
             push = self._push(theta)
-            bodies = PushedBodies(self.mechanics, push, self.pulse)
+            bodies = pushed_bodies(self.mechanics, push, self.pulse)
             readouts = [self._readout(modes) for modes in push.modes]
 
             def readout(times: Times, states: Floats) -> Floats:
@@ -156,8 +265,29 @@ class ModalModel(Model):
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        motion = super().trajectory(theta, evaluated, settings, until)
+        motion = self._motion(theta, evaluated, settings, until)
         return Adjusted(motion, self._projection(motion))
+
+    def _motion(
+        self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
+    ) -> Trajectory:
+        residual, free = self.residual, self.free_from
+        if residual is None or free is None:
+            return super().trajectory(theta, evaluated, settings, until)
+        assert settings is not None
+        problem = self.problem(theta, evaluated)
+        inputs = self.residual_inputs(theta)
+        first = self._solved(problem, lambda: problem, settings, free)
+        corrected = Adjusted(first, residual.adjustment(first, inputs))
+
+        def later() -> Trajectory:
+            times, readout = before(free), problem.readout
+            assert isinstance(readout, _Readout)
+            onward = problem._replace(start=readout.released(first.states(times), corrected.reduced(times)), begin=free)
+            solved = self._solved(onward, lambda: onward, settings, until)
+            return Adjusted(solved, residual.deformation_adjustment(inputs))
+
+        return Piecewise(corrected, free, later)
 
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float

@@ -14,6 +14,7 @@ from odeform.geometry.rigid import best_rigid
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
+from odeform.models.modal.body_parameters import schema_of
 from odeform.models.modal.elastic_body import ElasticBody, elastic_body
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
@@ -117,7 +118,7 @@ def _largest(part: ModalModel, own: UserBody) -> list[float]:
     At least those of the trained body. A lighter one may fly as far as the strongest pulse throws it, a larger one may
     deform more.
     """
-    shift, deformation = part.space.largest
+    shift, deformation = part.checkpoint.config["largest"]
     solid, window = own.body.solid, part.schema.window
     thrown = own.item.forces[1] * part.pulse / solid.mass * window.stop
     sizes = [float(np.ptp(body.points, axis=0).max()) for body in (own.body, part.body)]
@@ -148,8 +149,13 @@ class UserBodyPredictor(ModalModel):
         super().__init__(
             replace(
                 checkpoint,
-                schema=trained.schema,
-                config={**kept, "body": body.to_json(), "largest": _largest(part, own)},
+                schema=schema_of(own.item, trained.schema),
+                config={
+                    **kept,
+                    "body": body.to_json(),
+                    "largest": _largest(part, own),
+                    "young_kpa": 1e-3 * own.item.material.young,
+                },
                 arrays={**body.shown(), **body.arrays()},
             )
         )

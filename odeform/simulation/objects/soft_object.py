@@ -1,7 +1,7 @@
 """A soft body that a scene simulates: its nodes, elements and material."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -74,9 +74,26 @@ class SoftObject:
             nearest[count:] = KDTree(self.points[:count]).query(self.points[count:])[1]
         return np.bincount(nearest, self.masses, count) / self.mass
 
+    def changed(self, mass: float, young: float) -> "SoftObject":
+        """The same body of another mass in kg and Young's modulus in Pa, where it then comes to rest.
+
+        It takes some seconds, unless it was asked for before. Raises `SimulationError` where it collapses.
+        """
+        if np.isclose(mass, self.mass, rtol=1e-6) and np.isclose(young, self.material.young, rtol=1e-6):
+            return self
+        return _changed(self, float(mass), float(young))
+
     def rest_mesh(self) -> Mesh:
         """The surface of the settled body: S vertices in metres."""
         return Mesh(self.settled[: self.surface_count].astype(np.float32), self.faces)
+
+
+@lru_cache(maxsize=16)
+def _changed(item: SoftObject, mass: float, young: float) -> SoftObject:
+    from odeform.simulation.objects.settling import settle  # it needs the simulator
+
+    material = replace(item.material, young=young, density=item.material.density * mass / item.mass)
+    return replace(item, material=material, settled=settle(item.points, item.elements, material))
 
 
 def nodal_masses(points: Points, elements: Ints, material: SoftMaterial) -> Floats:

@@ -17,7 +17,7 @@ from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.objects.tetrahedra import inside_out
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
-from odeform.simulation.stepping import run
+from odeform.simulation.stepping import Rest, run
 from odeform.surroundings import Contacts
 from odeform.types import Mesh, MotionSequence, Points, Vector
 
@@ -26,6 +26,9 @@ __all__ = ["PULSE", "SCENE", "contact_and_force", "glyphs", "simulate", "simulat
 PULSE = 0.040  # s
 STEP = 5e-4  # s, until the projectile has been gone for a while; twice that afterwards
 COARSE_FROM = 0.050  # s
+UNTIL = 1.0  # s, of a motion on demand
+REST = Rest(speed=1e-3, time=0.05)
+MASS, YOUNG = "mass", "young"
 
 
 def _contact(axis: str, low: float, high: float, default: float) -> Parameter:
@@ -38,6 +41,11 @@ def _force(axis: str, default: float) -> Parameter:
     return Parameter(f"force_{axis}", "N", -25.0, 25.0, default, description=f"{axis} of the force on the sphere")
 
 
+def of_body(name: str, unit: str, low: float, high: float, default: float, description: str) -> Parameter:
+    """A property of the body itself: each object has its own, from half to twice of which it may be changed."""
+    return Parameter(name, unit, low, high, default, "log", "body", description)
+
+
 SCHEMA = Schema(
     scene="contact-force",
     parameters=(
@@ -47,6 +55,8 @@ SCHEMA = Schema(
         _force("x", -8.0),
         _force("y", 0.0),
         _force("z", 0.0),
+        of_body(MASS, "kg", 0.002, 2.7, 0.745, "mass of the body"),
+        of_body(YOUNG, "kPa", 7.0, 2700.0, 83.0, "Young's modulus of the body"),
     ),
     window=Window(0.0, 0.19, 100.0),
     objects=OBJECTS,
@@ -68,12 +78,13 @@ def simulate(
     rate: float | None = None,
     step: float = STEP,
     report: Callable[[float], None] = lambda _: None,
+    until: float | None = None,
 ) -> MotionSequence:
     """One motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
 
     See `simulate_object`.
     """
-    return simulate_object(get_object(parameters[OBJECT]), parameters, rate, step, report)
+    return simulate_object(get_object(parameters[OBJECT]), parameters, rate, step, report, until)
 
 
 def simulate_object(
@@ -82,38 +93,53 @@ def simulate_object(
     rate: float | None = None,
     step: float = STEP,
     report: Callable[[float], None] = lambda _: None,
+    until: float | None = None,
 ) -> MotionSequence:
-    """One motion of the surface of any soft object over the scene's window, with frames at `rate` Hz.
+    """One motion of the surface of any soft object to `until` seconds (default: over the scene's window), with frames
+    at `rate` Hz. Beyond the window it ends where the body rests.
 
     `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the fraction done. Frame
-    0 is the settled body. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError` for a
-    contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and `SimulationError`.
+    0 is the body settled under the parameters `mass` and `young`, if there are any; the contact is a place on `item`
+    and moves with its surface. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError`
+    for a contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and
+    `SimulationError`.
     """
     # here, so that looking at the scene and training on its data need no simulator
     from odeform.simulation.objects.body import SoftBody, contact_of
     from odeform.simulation.projectile import StruckBody, projectile_xml
 
-    window, rest = SCHEMA.window, item.rest_mesh()
+    window, until = SCHEMA.window, until or SCHEMA.window.stop
     rate = rate or window.rate
     contact, force = contact_and_force(parameters)
-    at, centre = checked_contact(rest, contact, force)
+    at, centre = checked_contact(item.rest_mesh(), contact, force)
+    if (changed := changed_object(item, parameters)) is not item:
+        item = changed
+        contact = at.moved(item.settled, item.faces)
+        at, centre = checked_contact(item.rest_mesh(), contact, force)
     others = projectile_xml(centre, force if force.any() else -at.normal, contact_of(item.material))
     body = SoftBody(item.points, item.elements, item.material, step, others=others)
     body.positions = item.settled
     struck = StruckBody(body, force, PULSE)
 
     def report_pulse(now: float) -> None:
-        report(now / window.stop)
+        report(now / until)
 
     times, nodes = run(struck, COARSE_FROM, rate, report=report_pulse)
     body.set_timestep(2.0 * step)
-    later, more = run(struck, window.stop, rate, begin=COARSE_FROM, report=report_pulse)
+    rest = REST if until > window.stop else None
+    later, more = run(struck, until, rate, begin=COARSE_FROM, rest=rest, report=report_pulse)
     new = later > times[-1] + 0.5 / rate
     _check_orientation(item, more[-1])
     vertices = np.concatenate([nodes, more[new]])[:, : item.surface_count]
     return MotionSequence(
         np.concatenate([times, later[new]]), vertices.astype(np.float32), item.faces, item.weights, dict(parameters)
     )
+
+
+def changed_object(item: SoftObject, parameters: Parameters) -> SoftObject:
+    """The object with the mass in kg and Young's modulus in kPa that parameters have, if they have any."""
+    mass, young = parameters.get(MASS, item.mass), parameters.get(YOUNG, 1e-3 * item.material.young)
+    return item.changed(float(mass), 1e3 * float(young))
 
 
 def _check_orientation(item: SoftObject, nodes: Points) -> None:
@@ -126,8 +152,10 @@ def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
     """`count` parameter sets of the object `name`; see `contact_draws`."""
     item = get_object(name)
     drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed, zlib.crc32(name.encode())])
+    own = {MASS: item.mass, YOUNG: 1e-3 * item.material.young}
     return [
-        {
+        own
+        | {
             f"{key}_{axis}": float(x)
             for key, row in (("contact", c), ("force", f))
             for axis, x in zip("xyz", row, strict=True)
@@ -138,7 +166,7 @@ def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
 
 def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
     """The force on the sphere, as an arrow that ends at its far side; its length is in proportion to the force."""
-    if not {p.name for p in SCHEMA.parameters} <= set(parameters):
+    if not {p.name for p in SCHEMA.learned} <= set(parameters):
         return ()
     contact, force = contact_and_force(parameters)
     strength, size = float(np.linalg.norm(force)), float(np.ptp(rest_points, axis=0).max())
@@ -163,6 +191,7 @@ SCENE = Scene(
     count=300,
     fixed={"pulse_s": PULSE, "projectile_radius_m": RADIUS, "projectile_mass_kg": 0.020, "gravity_m_s2": GRAVITY},
     gravity=GRAVITY,
+    until=UNTIL,
     glyphs=glyphs,
     contacts=Contacts({name: get_object(name).forces for name in OBJECTS}, PULSE, RADIUS),
     sampler=sample,

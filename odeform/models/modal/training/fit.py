@@ -13,6 +13,7 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.base import Predictor
+from odeform.models.modal.body_parameters import schema_of
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.model import EXACT, QUALITIES, ModalModel
 from odeform.models.modal.training import contact_fit
@@ -89,13 +90,14 @@ def fit_mechanical(
         laws.add(SHARED, shared)
     bodies = [
         _Body(
-            dataset.of(name).schema,
+            schema_of(get_object(name), dataset.of(name).schema),
             {split: _inputs(dataset.of(name), split) for split in ("train", "val")},
             pushes,
             read_pushes(dataset.of(name), "val", pushes.body),
             shared,
             laws.get(name),
             pulse,
+            get_object(name).material.young,
             seed,
             contact_fit.EVALUATIONS,
             correct,
@@ -134,6 +136,8 @@ class _Body:
     own: ContactParameters | None
     """Its law, if an interrupted training has finished it."""
     pulse: float
+    young: float
+    """Pa."""
     seed: int
     evaluations: int
     correct: bool
@@ -144,7 +148,7 @@ def _fitted(body: _Body) -> tuple[ContactParameters, Checkpoint, float]:
     begin = time.process_time()
     law = _law(body) if body.own is None else body.own
     correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
-    checkpoint = _checkpoint(body.schema, body.theta["train"], body.train, law, body.pulse, correction)
+    checkpoint = _checkpoint(body.schema, body.theta["train"], body.train, law, body.pulse, body.young, correction)
     checkpoint = _with_qualities(checkpoint, body.theta["val"], body.val)
     return law, checkpoint, time.process_time() - begin
 
@@ -221,9 +225,10 @@ def _checkpoint(
     pushes: Pushes,
     law: ContactParameters,
     pulse: float,
+    young: float,
     correction: Checkpointed | None = None,
 ) -> Checkpoint:
-    """That of one body, trained on `pushes` with inputs `theta` (S, P)."""
+    """That of one body of Young's modulus `young` Pa, trained on `pushes` with inputs `theta` (S, P)."""
     body = pushes.body
     largest = [np.linalg.norm(pushes.reduced[..., part], axis=-1).max() for part in (slice(0, 3), slice(POSE, None))]
     return Checkpoint(
@@ -234,6 +239,8 @@ def _checkpoint(
             "body": body.to_json(),
             "law": asdict(law),
             "pulse_s": pulse,
+            "young_kpa": 1e-3 * young,
+            "free_from_s": schema.window.stop,
             **({"correction": correction[1]} if correction else {}),
             "projectile": asdict(pushes.projectile),
         },

@@ -1,0 +1,531 @@
+"""The step in time of `odeform.mechanics.step.Steps` as machine code, one motion after the other.
+
+The formulas are those of the NumPy code, which is the reference and says what they mean; the tests compare both to
+rounding. Loops in place of arrays save what leads there: the overhead of some hundred small array operations a step.
+"""
+
+from typing import NamedTuple, no_type_check
+
+import numba
+import numpy as np
+from numpy import ndarray
+
+__all__ = ["Constants", "advance_all", "slope_of"]
+
+MARGIN = 1e-3
+SLIP = 1e-4
+AHEAD = 0.02
+MOST = 64
+SOFT = 5e-3
+SHORTEST = 1e-9
+SMALL = 1e-18
+
+# sums may be reordered, so that they use all lanes of a vector; what is not finite stays so
+compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
+
+
+class Constants(NamedTuple):
+    """What stays the same over the motions of B pushes of one body, in K directions with S samples."""
+
+    points: ndarray  # (B, 3, S) m
+    rows: ndarray  # (B, 6, S, K)
+    stiffness: ndarray  # (B, S) N/m of each sample
+    grip: ndarray  # (B, S) N s/m
+    level: ndarray  # (F,) m of the first F samples, which may touch the floor
+    squares: ndarray  # (B, K) 1/s^2
+    preload: ndarray  # (B, K)
+    inertia: ndarray  # (3, 3) kg m^2
+    spread: ndarray  # (6 + K,) m^2
+    centres: ndarray  # (B, 3) m
+    guides: ndarray  # (B, 3)
+    forces: ndarray  # (B,) N
+    mass: float  # kg
+    gravity: float  # m/s^2
+    relaxation: float  # s
+    floor_damping: float  # s
+    floor_friction: float
+    push_damping: float  # s
+    push_friction: float
+    radius: float  # m
+    projectile: float  # kg
+    reach: float  # m, of the farthest sample from the mass centre
+    pulse: float  # s
+
+
+@compiled
+@no_type_check
+def _copy(source, out):
+    """In a loop: assignments to slices take seconds to compile."""
+    for k in range(len(out)):
+        out[k] = source[k]
+
+
+@compiled
+@no_type_check
+def _turn(rows, i, z, size, out):
+    """Displacement (3) and rotation (3) of sample i by the amplitudes of a state."""
+    for axis in range(6):
+        total = 0.0
+        for k in range(size):
+            total += rows[axis, i, k] * z[12 + k]
+        out[axis] = total
+
+
+@compiled
+@no_type_check
+def _bent(points, i, motion, place):
+    """Where the sample is, and three factors of its rotation: see `odeform.mechanics.warping`."""
+    t0, t1, t2 = motion[3], motion[4], motion[5]
+    square = t0 * t0 + t1 * t1 + t2 * t2 + SMALL
+    angle = np.sqrt(square)
+    half = np.sin(0.5 * angle) / angle
+    once, twice = np.sin(angle) / angle, 2.0 * half * half
+    d0, d1, d2 = motion[0], motion[1], motion[2]
+    along = (t0 * d0 + t1 * d1 + t2 * d2) * ((1.0 - once) / square)
+    place[0] = points[0, i] + once * d0 + twice * (t1 * d2 - t2 * d1) + along * t0
+    place[1] = points[1, i] + once * d1 + twice * (t2 * d0 - t0 * d2) + along * t1
+    place[2] = points[2, i] + once * d2 + twice * (t0 * d1 - t1 * d0) + along * t2
+    return square, once, twice
+
+
+@compiled
+@no_type_check
+def _centre(c, b, z, size, out):
+    """The middle of the sphere from the mass centre, in axes of the body."""
+    way = z[12 + size]
+    d0 = c.centres[b, 0] + way * c.guides[b, 0] - z[0]
+    d1 = c.centres[b, 1] + way * c.guides[b, 1] - z[1]
+    d2 = c.centres[b, 2] + way * c.guides[b, 2] - z[2]
+    for axis in range(3):
+        out[axis] = z[3 + axis] * d0 + z[6 + axis] * d1 + z[9 + axis] * d2
+
+
+@compiled
+@no_type_check
+def _keep(chosen, first, count, gaps, i):
+    """Add sample i to those chosen from `first` on, or in place of the one with the largest gap."""
+    if count - first < MOST:
+        chosen[count] = i
+        return count + 1
+    worst = first
+    for j in range(first + 1, count):
+        if gaps[chosen[j]] > gaps[chosen[worst]]:
+            worst = j
+    if gaps[i] < gaps[chosen[worst]]:
+        chosen[worst] = i
+    return count
+
+
+@compiled
+@no_type_check
+def _near(c, b, z, size, pushed, step, chosen, gaps):
+    """Choose the samples that may touch something in a step: how many on the floor, and how many in all."""
+    points, rows, v = c.points[b], c.rows[b], 13 + size
+    motion, place, centre = np.empty(6), np.empty(3), np.empty(3)
+    spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
+    down = min(z[v + 2] - spin * c.reach, 0.0)
+    margin = MARGIN - (2.0 * step + c.floor_damping) * down
+    floor = 0
+    for i in range(len(c.level)):
+        _turn(rows, i, z, size, motion)
+        _bent(points, i, motion, place)
+        gaps[i] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
+        if gaps[i] < margin:
+            floor = _keep(chosen, 0, floor, gaps, i)
+    if not pushed:
+        return floor, floor
+    _centre(c, b, z, size, centre)
+    speed = 0.0
+    for axis in range(3):
+        own = z[v + 6 + size] * c.guides[b, axis] - z[v + axis]
+        speed += own * own
+    margin = c.radius + MARGIN + (2.0 * step + c.push_damping) * np.sqrt(speed)
+    count = floor
+    for i in range(len(c.level), points.shape[1]):
+        _turn(rows, i, z, size, motion)
+        _bent(points, i, motion, place)
+        gaps[i] = np.sqrt((place[0] - centre[0]) ** 2 + (place[1] - centre[1]) ** 2 + (place[2] - centre[2]) ** 2)
+        if gaps[i] < margin:
+            count = _keep(chosen, floor, count, gaps, i)
+    return floor, count
+
+
+@compiled
+@no_type_check
+def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps, springs):
+    """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
+    points, rows = c.points[b], c.rows[b]
+    motion, place, centre, axes, turned = np.empty(6), np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    guide = np.zeros(3)
+    if pushed:
+        _centre(c, b, z, size, centre)
+        for axis in range(3):
+            guide[axis] = z[3 + axis] * c.guides[b, 0] + z[6 + axis] * c.guides[b, 1] + z[9 + axis] * c.guides[b, 2]
+    for j in range(count):
+        i = chosen[j]
+        _turn(rows, i, z, size, motion)
+        square, once, twice = _bent(points, i, motion, place)
+        springs[j] = c.stiffness[b, i]
+        if j < floor:
+            gaps[j] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
+            springs[j] *= max(-gaps[j] / SOFT, 1.0)
+            for axis in range(3):
+                axes[0, axis], axes[1, axis], axes[2, axis] = z[9 + axis], z[3 + axis], z[6 + axis]
+        else:
+            n0, n1, n2 = place[0] - centre[0], place[1] - centre[1], place[2] - centre[2]
+            distance = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+            gaps[j] = distance - c.radius
+            distance = max(distance, 1e-9)
+            n0, n1, n2 = n0 / distance, n1 / distance, n2 / distance
+            sign = np.copysign(1.0, n0)
+            scale = sign / abs(n0 + sign)
+            half = (n0 + sign, n1, n2)
+            for row in range(3):
+                for axis in range(3):
+                    axes[row, axis] = scale * half[row] * half[axis] - (sign if row == axis else 0.0)
+        t0, t1, t2 = motion[3], motion[4], motion[5]
+        rest = 1.0 - twice * square
+        turned[0, 0], turned[0, 1] = rest + twice * t0 * t0, twice * t0 * t1 - once * t2
+        turned[0, 2] = twice * t0 * t2 + once * t1
+        turned[1, 0], turned[1, 1] = twice * t0 * t1 + once * t2, rest + twice * t1 * t1
+        turned[1, 2] = twice * t1 * t2 - once * t0
+        turned[2, 0], turned[2, 1] = twice * t0 * t2 - once * t1, twice * t1 * t2 + once * t0
+        turned[2, 2] = rest + twice * t2 * t2
+        for row in range(3):
+            a0, a1, a2 = axes[row, 0], axes[row, 1], axes[row, 2]
+            out = jacobian[j, row]
+            out[0], out[1], out[2] = a0, a1, a2
+            out[3] = place[1] * a2 - place[2] * a1
+            out[4] = place[2] * a0 - place[0] * a2
+            out[5] = place[0] * a1 - place[1] * a0
+            b0 = a0 * turned[0, 0] + a1 * turned[1, 0] + a2 * turned[2, 0]
+            b1 = a0 * turned[0, 1] + a1 * turned[1, 1] + a2 * turned[2, 1]
+            b2 = a0 * turned[0, 2] + a1 * turned[1, 2] + a2 * turned[2, 2]
+            r0, r1, r2 = rows[0, i], rows[1, i], rows[2, i]
+            for k in range(size):
+                out[6 + k] = b0 * r0[k] + b1 * r1[k] + b2 * r2[k]
+            if pushed:
+                out[6 + size] = 0.0 if j < floor else -(a0 * guide[0] + a1 * guide[1] + a2 * guide[2])
+
+
+@compiled
+@no_type_check
+def _solve(matrix, right):
+    """Overwrite `right` with the solution for the lower half of a positive matrix, which becomes its Cholesky factor;
+    false where it is not positive."""
+    count = len(right)
+    for j in range(count):
+        row = matrix[j]
+        for i in range(j + 1):
+            other = matrix[i]
+            total = row[i]
+            for k in range(i):
+                total -= row[k] * other[k]
+            if i < j:
+                row[i] = total / other[i]
+            elif total > 0.0:
+                row[j] = np.sqrt(total)
+            else:
+                return False
+        total = right[j]
+        for k in range(j):
+            total -= row[k] * right[k]
+        right[j] = total / row[j]
+    for j in range(count - 1, -1, -1):
+        right[j] /= matrix[j, j]
+        value, row = right[j], matrix[j]
+        for k in range(j):
+            right[k] -= value * row[k]
+    return True
+
+
+@compiled
+@no_type_check
+def _rotate(z, vector, at):
+    """Turn the rotation of a state further by the vector that begins `at`, in axes of the scene."""
+    w0, w1, w2 = vector[at], vector[at + 1], vector[at + 2]
+    angle = np.sqrt(w0 * w0 + w1 * w1 + w2 * w2) + 1e-150
+    half = np.sin(0.5 * angle) / angle
+    once, twice = np.sin(angle) / angle, 2.0 * half * half
+    for column in range(3):
+        r0, r1, r2 = z[3 + column], z[6 + column], z[9 + column]
+        c0, c1, c2 = w1 * r2 - w2 * r1, w2 * r0 - w0 * r2, w0 * r1 - w1 * r0
+        z[3 + column] = r0 + once * c0 + twice * (w1 * c2 - w2 * c1)
+        z[6 + column] = r1 + once * c1 + twice * (w2 * c0 - w0 * c2)
+        z[9 + column] = r2 + once * c2 + twice * (w0 * c1 - w1 * c0)
+
+
+@compiled
+@no_type_check
+def _local(z, size, v):
+    """The velocities of a state, shift and spin in axes of the body."""
+    start = 13 + size
+    for part in range(0, 6, 3):
+        s0, s1, s2 = z[start + part], z[start + part + 1], z[start + part + 2]
+        for axis in range(3):
+            v[part + axis] = z[3 + axis] * s0 + z[6 + axis] * s1 + z[9 + axis] * s2
+    for k in range(6, len(v)):
+        v[k] = z[start + k]
+
+
+@compiled
+@no_type_check
+def _free(c, b, z, size, pushed, v, momentum, rate):
+    """Momentum and its rate without contacts and damping, in axes of the body."""
+    inertia = c.inertia
+    for axis in range(3):
+        momentum[axis] = c.mass * v[axis]
+        momentum[3 + axis] = inertia[axis, 0] * v[3] + inertia[axis, 1] * v[4] + inertia[axis, 2] * v[5]
+        rate[axis] = -c.mass * c.gravity * z[9 + axis]
+    l0, l1, l2 = momentum[3], momentum[4], momentum[5]
+    rate[3], rate[4], rate[5] = l1 * v[5] - l2 * v[4], l2 * v[3] - l0 * v[5], l0 * v[4] - l1 * v[3]
+    for k in range(size):
+        momentum[6 + k] = v[6 + k]
+        rate[6 + k] = -c.squares[b, k] * z[12 + k] - c.preload[b, k]
+    if pushed:
+        momentum[6 + size] = c.projectile * v[6 + size]
+        rate[6 + size] = c.forces[b]
+
+
+@compiled
+@no_type_check
+def _drag(c, b, j, i, floor, force, r1, r2):
+    """Friction by the speed of sliding under a normal force, N s/m."""
+    limit = (c.floor_friction if j < floor else c.push_friction) * force
+    return limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / c.grip[b, i]) ** 2 + SLIP * SLIP)
+
+
+@compiled
+@no_type_check
+def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps, springs, matrix, out):
+    """The state after one step of first order; false where it cannot be solved for."""
+    width = 6 + size + (1 if pushed else 0)
+    v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
+    _local(z, size, v)
+    _free(c, b, z, size, pushed, v, momentum, rate)
+    for k in range(width):
+        momentum[k] += step * rate[k]
+    for _ in range(2):
+        for i in range(width):
+            for k in range(i + 1):
+                matrix[i, k] = 0.0
+            right[i] = momentum[i]
+        for axis in range(3):
+            matrix[axis, axis] = c.mass
+            for other in range(axis + 1):
+                matrix[3 + axis, 3 + other] = c.inertia[axis, other]
+        for k in range(size):
+            matrix[6 + k, 6 + k] = 1.0 + step * (step + c.relaxation) * c.squares[b, k]
+        if pushed:
+            matrix[6 + size, 6 + size] = c.projectile
+        for j in range(count):
+            n, s, t = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2]
+            r0, r1, r2 = 0.0, 0.0, 0.0
+            for k in range(width):
+                r0 += n[k] * v[k]
+                r1 += s[k] * v[k]
+                r2 += t[k] * v[k]
+            i = chosen[j]
+            time = step + (c.floor_damping if j < floor else c.push_damping)
+            force = springs[j] * (-gaps[j] - time * r0)
+            if force <= 0.0:
+                continue
+            active = step * springs[j]
+            drag = step * _drag(c, b, j, i, floor, force, r1, r2)
+            normal, impulse = time * active, -active * gaps[j]
+            for i in range(width):
+                a0, a1, a2 = normal * n[i], drag * s[i], drag * t[i]
+                right[i] += impulse * n[i]
+                row = matrix[i]
+                for k in range(i + 1):
+                    row[k] += a0 * n[k] + a1 * s[k] + a2 * t[k]
+        if not _solve(matrix, right):
+            return False
+        for k in range(width):
+            v[k] = right[k]
+    _copy(z, out)
+    start, vector = 13 + size, np.empty(3)
+    for axis in range(3):
+        r0, r1, r2 = z[3 + 3 * axis], z[4 + 3 * axis], z[5 + 3 * axis]
+        speed = r0 * v[0] + r1 * v[1] + r2 * v[2]
+        spin = r0 * v[3] + r1 * v[4] + r2 * v[5]
+        out[start + axis], out[start + 3 + axis] = speed, spin
+        out[axis] += step * speed
+        vector[axis] = step * spin
+    _rotate(out, vector, 0)
+    for k in range(size):
+        out[start + 6 + k] = v[6 + k]
+        out[12 + k] += step * v[6 + k]
+    if pushed:
+        out[start + 6 + size] = v[6 + size]
+        out[12 + size] += step * v[6 + size]
+    return True
+
+
+@compiled
+@no_type_check
+def _step(c, b, z, pushed, step, out, work):
+    """The state after a step of second order; returns its error in m."""
+    size = c.squares.shape[1]
+    chosen, gaps, springs, jacobian, whole, half, matrix = work
+    floor, count = _near(c, b, z, size, pushed, step, chosen, gaps)
+    good, begin = True, z
+    # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
+    for part in range(3):
+        if part != 1:
+            _contacts(c, b, begin, size, pushed, chosen, floor, count, jacobian, gaps, springs)
+        length, end = (0.5 * step, half) if part else (step, whole)
+        if part == 2:
+            end = out
+        good &= _implicit(c, b, begin, size, pushed, length, chosen, floor, count, jacobian, gaps, springs, matrix, end)
+        if part == 1:
+            begin = half
+    if not good:
+        for k in range(len(out)):
+            out[k] = np.nan
+        return np.nan
+    # twice two half steps less a whole one
+    turn, start = np.empty((3, 3)), 13 + size
+    for row in range(3):
+        for column in range(3):
+            total = 0.0
+            for k in range(3):
+                total += out[3 + 3 * row + k] * whole[3 + 3 * column + k]
+            turn[row, column] = total
+    between = np.empty(6 + size)
+    for axis in range(3):
+        between[axis] = out[axis] - whole[axis]
+    s0, s1, s2 = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+    sine = 0.5 * np.sqrt(s0 * s0 + s1 * s1 + s2 * s2) + 1e-150
+    angle = 0.5 * np.arcsin(min(sine, 1.0)) / sine
+    between[3], between[4], between[5] = angle * s0, angle * s1, angle * s2
+    for k in range(size):
+        between[6 + k] = out[12 + k] - whole[12 + k]
+    total = 0.0
+    for k in range(6 + size):
+        ahead = AHEAD * (out[start + k] - whole[start + k])
+        total += c.spread[k] * (between[k] * between[k] + ahead * ahead)
+    for axis in range(3):
+        out[axis] += between[axis]
+    _rotate(out, between, 3)
+    for k in range(size):
+        out[12 + k] += between[6 + k]
+    if pushed:
+        out[12 + size] += out[12 + size] - whole[12 + size]
+    for k in range(start, start + 6 + size + (1 if pushed else 0)):
+        out[k] += out[k] - whole[k]
+    return np.sqrt(total)
+
+
+@compiled
+@no_type_check
+def _slope(z, after, size, pushed, step, out):
+    """The slope of the state after a step: its velocities, and their mean rate over the step."""
+    start = 13 + size
+    for axis in range(3):
+        out[axis] = after[start + axis]
+    w0, w1, w2 = after[start + 3], after[start + 4], after[start + 5]
+    for column in range(3):
+        r0, r1, r2 = after[3 + column], after[6 + column], after[9 + column]
+        out[3 + column], out[6 + column], out[9 + column] = w1 * r2 - w2 * r1, w2 * r0 - w0 * r2, w0 * r1 - w1 * r0
+    for k in range(size):
+        out[12 + k] = after[start + 6 + k]
+    out[12 + size] = after[start + 6 + size] if pushed else 0.0
+    for k in range(start, start + 6 + size + (1 if pushed else 0)):
+        out[k] = (after[k] - z[k]) / step
+    if not pushed:
+        out[start + 6 + size] = 0.0
+
+
+@compiled
+@no_type_check
+def _work(c):
+    """Room for a step."""
+    size = c.squares.shape[1]
+    state, width = 20 + 2 * size, 7 + size
+    return (
+        np.empty(2 * MOST, np.int64),
+        np.empty(max(c.points.shape[2], 2 * MOST)),
+        np.empty(2 * MOST),
+        np.empty((2 * MOST, 3, width)),
+        np.empty(state),
+        np.empty(state),
+        np.empty((width, width)),
+    )
+
+
+@compiled
+@no_type_check
+def advance_all(c, rows, times, states, steps, out, slopes, errors):
+    """States (R, 20 + 2 K) of the pushes `rows` (R,) after `steps` (R,) s, slopes there, and errors (R,) in m.
+
+    The end of the pulse ends a step.
+    """
+    size = c.squares.shape[1]
+    work, middle = _work(c), np.empty(states.shape[1])
+    for row in range(len(rows)):
+        step, error, after = steps[row], 0.0, out[row]
+        left = min(max(c.pulse - times[row], 0.0), step)
+        _copy(states[row], after)
+        for pushed in (True, False):
+            length = left if pushed else step - left
+            if length > SHORTEST or not (pushed or left > SHORTEST):
+                _copy(after, middle)
+                error += _step(c, rows[row], middle, pushed, length, after, work)
+                _slope(middle, after, size, pushed, length, slopes[row])
+        errors[row] = error
+
+
+@compiled
+@no_type_check
+def slope_of(c, rows, times, states, out):
+    """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
+    size = c.squares.shape[1]
+    chosen, gaps, springs, jacobian, _, _, matrix = _work(c)
+    start = 13 + size
+    for row in range(len(rows)):
+        b, z, pushed = rows[row], states[row], times[row] < c.pulse
+        width = 6 + size + (1 if pushed else 0)
+        floor, count = _near(c, b, z, size, pushed, 0.0, chosen, gaps)
+        _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps, springs)
+        v, momentum, rate = np.empty(width), np.empty(width), np.empty(width)
+        _local(z, size, v)
+        _free(c, b, z, size, pushed, v, momentum, rate)
+        for k in range(size):
+            rate[6 + k] -= c.relaxation * c.squares[b, k] * v[6 + k]
+        for j in range(count):
+            n, s, t = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2]
+            r0, r1, r2 = 0.0, 0.0, 0.0
+            for k in range(width):
+                r0 += n[k] * v[k]
+                r1 += s[k] * v[k]
+                r2 += t[k] * v[k]
+            i = chosen[j]
+            force = springs[j] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
+            if force <= 0.0:
+                continue
+            drag = _drag(c, b, j, i, floor, force, r1, r2)
+            for k in range(width):
+                rate[k] += force * n[k] - drag * (r1 * s[k] + r2 * t[k])
+        for k in range(width):
+            for other in range(k + 1):
+                matrix[k, other] = 0.0
+        for axis in range(3):
+            matrix[axis, axis] = c.mass
+            for other in range(axis + 1):
+                matrix[3 + axis, 3 + other] = c.inertia[axis, other]
+        for k in range(size):
+            matrix[6 + k, 6 + k] = 1.0
+        if pushed:
+            matrix[6 + size, 6 + size] = c.projectile
+        if not _solve(matrix, rate):
+            for k in range(width):
+                rate[k] = np.nan
+        _slope(z, z, size, pushed, 1.0, out[row])
+        for part in range(0, 6, 3):
+            for axis in range(3):
+                out[row, start + part + axis] = (
+                    z[3 + 3 * axis] * rate[part] + z[4 + 3 * axis] * rate[part + 1] + z[5 + 3 * axis] * rate[part + 2]
+                )
+        for k in range(6, width):
+            out[row, start + k] = rate[k]
