@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from odeform.schema import Parameter, Schema
     from odeform.simulation.runner import simulate
     from odeform.solver.integrate import SolverSettings
+    from odeform.surroundings import Surroundings
     from odeform.training.train import fit, train
     from odeform.types import GaussianSplats, Mesh, MotionSequence, PointCloud
 
@@ -53,6 +54,7 @@ __all__ = [
     "Predictor",
     "Schema",
     "SolverSettings",
+    "Surroundings",
     "__version__",
     "calibrate",
     "dataset_from_arrays",
@@ -83,6 +85,7 @@ _MODULES = {
     "Predictor": "models.base",
     "Schema": "schema",
     "SolverSettings": "solver.integrate",
+    "Surroundings": "surroundings",
     "calibrate": "identification.discrepancy",
     "dataset_from_arrays": "dataset.in_memory",
     "evaluate": "evaluation.metrics",

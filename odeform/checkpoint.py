@@ -32,7 +32,8 @@ LIMIT = 1 << 29  # bytes; no checkpoint is larger
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """What a model is read from. `model` is its name in `odeform.models.names`; `provenance` says how it was trained.
+    """Holds what a model is read from. `model` is its name in `odeform.models.names`; `provenance` says how it was
+    trained.
 
     `scores` are those on the test split, as `odeform evaluate` prints them.
     """

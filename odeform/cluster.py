@@ -112,7 +112,7 @@ def _check(client: Any, address: str, shared: Path | None) -> None:
 
 
 def _asked(client: Any, function: Any, *args: str) -> dict[str, Any]:
-    """What `function` returns on each worker, by address."""
+    """Calls `function` on each worker; returns the answers by address."""
     try:
         return client.run(function, *args)
     except Exception as error:

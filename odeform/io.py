@@ -18,7 +18,6 @@ __all__ = [
     "parse_json",
     "require_writable",
     "safetensors_metadata",
-    "write_or_print",
 ]
 
 LONGEST = 100  # characters of a name in that of its temporary file
@@ -63,15 +62,6 @@ def atomic_write(path: Path, data: bytes) -> None:
     """Write `data` with `atomic_open`."""
     with atomic_open(path) as file:
         file.write(data)
-
-
-def write_or_print(result: Any, path: str | Path | None) -> None:
-    """A result of a study as JSON: in the file `path`, or on the terminal without one."""
-    text = json.dumps(result, indent=1)
-    if path:
-        atomic_write(Path(path), text.encode())
-    else:
-        print(text)
 
 
 def parse_json(data: str | bytes, where: str) -> Any:

@@ -20,7 +20,7 @@ from odeform.progress import Progress
 
 __all__ = ["Engine", "as_completed", "parallel_map", "use_engine", "workers_lost"]
 
-WATCH = 1.0  # s
+POLL = 1.0  # s
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -110,9 +110,9 @@ def _numbered(function: Callable[[Item], Result], index: int, item: Item, parent
 def _end_with_parent(parent: int) -> None:
     """End this worker soon after the process that started it is gone, killed for instance, perhaps already."""
 
-    def watch() -> None:
+    def poll() -> None:
         while os.getppid() == parent:
-            time.sleep(WATCH)
+            time.sleep(POLL)
         os._exit(1)
 
-    threading.Thread(target=watch, name="odeform-parent", daemon=True).start()
+    threading.Thread(target=poll, name="odeform-parent", daemon=True).start()

@@ -1,4 +1,4 @@
-"""What a scene varies: its parameters, with units and ranges, and its window of time."""
+"""Describes what a scene varies: its parameters, with units and ranges, and its window of time."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""What is around a body and acts on it: a floor, gravity, a sphere that pushes. Data sets and checkpoints keep it."""
+"""Describes what acts on a body: a floor, gravity, a sphere that pushes. Data sets and checkpoints keep it."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ class Contacts:
     pulse: float
     """Seconds from 0 on during which the sphere pushes."""
     radius: float
-    """Of the sphere in metres."""
+    """Radius of the sphere in metres."""
 
     def forces_on(self, name: str) -> tuple[float, float]:
         """Weakest and strongest force on an object in newton; those of the first for an unknown one."""
@@ -28,14 +28,20 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The surroundings of all motions of a scene."""
+    """The surroundings of all motions of a scene.
+
+    Examples:
+        >>> import odeform
+        >>> odeform.Surroundings(floor=-0.2).gravity  # m/s^2
+        9.81
+    """
 
     floor: float | None = 0.0
     """Height in metres of the floor, which no motion may pass; None without one."""
     gravity: float = GRAVITY
     """m/s^2, along -z."""
     contacts: Contacts | None = None
-    """In scenes in which a sphere pushes a body."""
+    """The sphere, in scenes in which one pushes a body."""
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Surroundings":

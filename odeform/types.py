@@ -161,7 +161,7 @@ class MotionSequence:
         times: (T,) seconds, evenly spaced from 0.
         vertices: (T, N, 3) positions in metres; frame 0 is the body at rest.
         faces: (F, 3) indices of vertices.
-        weights: (N,) share of the mass at each vertex; they sum to 1.
+        weights: (N,) mass fraction at each vertex; they sum to 1.
         parameters: By name, in the units of the data set's schema; "object" is a string.
         name: That of the sequence in its data set.
 

@@ -15,9 +15,9 @@ from odeform.geometry.similarity import Similarity
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import describe_fit, shape_from
-from odeform_viz.own_shapes import describe_own_body, read_own_body, takes_user_bodies, with_own_body
 from odeform_viz.recording.replay import TOLERANCE, replay
 from odeform_viz.runtime.access import is_loopback
+from odeform_viz.user_bodies import describe_user_body, read_user_body, takes_user_bodies, with_user_body
 
 __all__ = ["main", "make_columns"]
 
@@ -33,10 +33,10 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
     if geometry is not None and takes_user_bodies(models[checkpoint]):
         print(f"{geometry}: making a soft body of it...", flush=True)
-        own = read_own_body(geometry)
-        print(describe_own_body(own))
+        body = read_user_body(geometry)
+        print(describe_user_body(body))
         columns = [Column(_label(m, None), m, m.rest, origin=name) for name, m in models.items()]
-        return with_own_body(columns, own)
+        return with_user_body(columns, body)
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
         fit = shape_from(geometry, body, None if models[checkpoint].rescales_input else Similarity())

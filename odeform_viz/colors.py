@@ -27,7 +27,7 @@ CONTACT: Color = (20, 20, 24)
 SPHERE: Color = (150, 156, 166)
 """The sphere that pushes a body."""
 HANDLE: Color = (214, 96, 48)
-"""What the user drags, and the brand color of the page."""
+"""Colors what the user drags, and is the brand color of the page."""
 
 
 def color_of(column: Column) -> Color:

@@ -103,8 +103,8 @@ class Columns:
             raise InputError(
                 f"cannot compare {column.label}: its scene is {schema.scene}, expected {self._schema.scene}"
             )
-        own = {p.name for p in schema.parameters}
-        return [p.name for p in self._schema.parameters if p.name not in own]
+        names = {p.name for p in schema.parameters}
+        return [p.name for p in self._schema.parameters if p.name not in names]
 
     def remove(self, key: int) -> None:
         """Remove a column, if it still exists."""

@@ -51,7 +51,7 @@ def export(session: Session, request: ViewRequest, path: Path, whole: bool) -> P
 
 
 def export_notes(session: Session, request: ViewRequest, whole: bool) -> tuple[str, ...]:
-    """What has to be known of the motion that `export` writes with `whole` or without; the file says it too."""
+    """Says what has to be known of the motion that `export` writes with `whole` or without; the file says it too."""
     column = next((c for c in request.columns if c.visible and c.predictor), None)
     motion = None if column is None else session.motion(column, request)
     times = session.schema.window.times if whole else np.array([request.time])

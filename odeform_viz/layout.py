@@ -1,4 +1,4 @@
-"""Where panels stand: in the side panel, in one of its tabs, or in a tab of the panel at the bottom."""
+"""Places panels: in the side panel, in one of its tabs, or in a tab of the panel at the bottom."""
 
 from contextlib import AbstractContextManager, nullcontext
 

@@ -1,4 +1,4 @@
-"""What a panel is and what it is built from."""
+"""Defines what a panel is and what it is built from."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,13 +11,13 @@ from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column, Columns
 from odeform_viz.fitting import fit_from_json
 from odeform_viz.layout import Layout
-from odeform_viz.own_shapes import read_own_body, takes_user_bodies, with_own_body
 from odeform_viz.pushing import ShownPush
 from odeform_viz.recording.control import RecordingControl
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.notices import Notices
 from odeform_viz.session import Session
 from odeform_viz.state import PageState, capture, columns_of, state_from_json, state_to_json
+from odeform_viz.user_bodies import read_user_body, takes_user_bodies, with_user_body
 from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
 from odeform_viz.workspace import Workspace
 
@@ -97,7 +97,7 @@ class Page:
     controls: Controls = field(default_factory=Controls)
     panels: list[Panel] = field(default_factory=list)
     hotkeys: dict[str, str] = field(default_factory=dict)
-    """What each hot key does, in words; see `add_hotkey`."""
+    """Says in words what each hot key does; see `add_hotkey`."""
     _on_columns_changed: list[Callable[[], None]] = field(default_factory=list)
 
     @property
@@ -146,7 +146,7 @@ class Page:
         self._on_columns_changed.append(action)
 
     def columns_changed(self) -> None:
-        """To be called after a change of the columns or their shape."""
+        """Tells the panels of a change of the columns or their shape."""
         for action in self._on_columns_changed:
             action()
         self.wake()
@@ -176,7 +176,7 @@ class Page:
         state = self.workspace.confined(state_from_json(data, self.schema.scene))
         columns = columns_of(state, self.schema)
         if state.shape and any(takes_user_bodies(c.predictor) for c in columns if c.predictor):
-            columns = with_own_body(columns, read_own_body(state.shape["origin"]))
+            columns = with_user_body(columns, read_user_body(state.shape["origin"]))
         elif state.shape:
             fit = fit_from_json(state.shape, self.body)
             columns = [replace(c, geometry=fit.geometry, fit=fit) if c.predictor else c for c in columns]

@@ -29,7 +29,7 @@ RARELY = 10.0  # times as long as an update took, until the next: those of many 
 
 
 class Output(Protocol):
-    """Where frames go."""
+    """Receives the frames to show."""
 
     def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
         """Draw a frame, in the bodies' own colours without a `coloring`."""
@@ -82,7 +82,7 @@ class Presenter:
         self.frame: Frame | None = None
         """The frame on screen; None before the first, and after a request that could not be met."""
         self.scale: ColorScale | None = None
-        """That of the colours on screen; None for the bodies' own."""
+        """The scale of the colours on screen; None for the bodies' own colours."""
         self._colorist = Colorist()
         self._options = DisplayOptions()
         self._settled = False

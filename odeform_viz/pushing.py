@@ -61,8 +61,8 @@ class ShownPush:
     strongest: float
     """N: the strongest force in training."""
     carriers: Int[np.ndarray, " carriers"]
-    """The points of the shape that carry the contact, which is at the sum of their positions times `shares`."""
-    shares: Float[np.ndarray, " carriers"]
+    """The points of the shape that carry the contact, which is at the sum of their positions times `weights`."""
+    weights: Float[np.ndarray, " carriers"]
     offset: Vector
     """(3,) m, added to that sum."""
 
@@ -99,7 +99,7 @@ class ShownPush:
 
     def contact(self, points: Points) -> Vector:
         """(3,) m: the contact on the shape once its points are at (N, 3) m."""
-        return self.shares @ np.asarray(points[self.carriers], dtype=float) + self.offset
+        return self.weights @ np.asarray(points[self.carriers], dtype=float) + self.offset
 
     def shift(self, moved: Floats) -> Vector:
         """(3,) m: how far the sphere has moved once the contact is at `moved` (3,) m."""
@@ -120,16 +120,16 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
     points, contact = np.asarray(motion.geometry.points, dtype=float), push.contact
     name = str(parameters[OBJECT])
     if isinstance(motion.geometry, Mesh) and np.array_equal(motion.geometry.faces, surface.faces):
-        carriers, shares = np.asarray(surface.faces[contact.face]), contact.shares
+        carriers, weights = np.asarray(surface.faces[contact.face]), contact.barycentric
     else:
         count = min(NEIGHBOURS, len(points))
         carriers = np.atleast_1d(KDTree(points).query(contact.point, count)[1])
-        shares = np.full(count, 1.0 / count)
+        weights = np.full(count, 1.0 / count)
     strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces_on(name)[1]
     # a place on the body moves with it when it sags; a loaded shape is only about where the body is
-    offset = np.zeros(3) if len(carriers) == len(contact.shares) and shares is contact.shares else None
-    offset = contact.point - shares @ points[carriers] if offset is None else offset
-    return ShownPush(push, contacts, surface, strongest, carriers, shares, offset)
+    offset = np.zeros(3) if len(carriers) == len(contact.barycentric) and weights is contact.barycentric else None
+    offset = contact.point - weights @ points[carriers] if offset is None else offset
+    return ShownPush(push, contacts, surface, strongest, carriers, weights, offset)
 
 
 def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats) -> tuple[Vector, float] | None:
@@ -141,14 +141,14 @@ def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats)
         hit = first_on_mesh(origin, direction, shown, geometry.faces)
         if hit is None:
             return None
-        face, shares, distance = hit
-        return shares @ np.asarray(geometry.points, dtype=float)[geometry.faces[face]], distance
+        face, weights, distance = hit
+        return weights @ np.asarray(geometry.points, dtype=float)[geometry.faces[face]], distance
     found = first_on_points(origin, direction, shown, PICK * float(np.ptp(shown, axis=0).max()))
     return None if found is None else (np.asarray(geometry.points[found[0]], dtype=float), found[1])
 
 
 def push_excess(push: Push, forces: tuple[float, float]) -> dict[str, str]:
-    """In what a push is beyond those of the training data, and how far these go, in words."""
+    """Says in words in what a push is beyond those of the training data, and how far these go."""
     excess = {}
     if push.strength > forces[1] * (1.0 + 1e-6):
         excess["force"] = f"trained up to {forces[1]:g} N"
@@ -180,7 +180,7 @@ def first_push(frame: Frame) -> tuple[Push, str] | None:
 
 
 def outside_of_push(frame: Frame) -> list[str]:
-    """What of the push of the first visible model is outside of its training; empty in scenes without one."""
+    """Says what of the first visible model's push is outside of its training; empty in scenes without one."""
     shown, found = _first_model(frame), first_push(frame)
     if shown is None or shown.column.predictor is None or found is None:
         return []

@@ -19,7 +19,7 @@ from odeform.schema import Schema
 from odeform.solver.integrate import SolverSettings
 from odeform.types import GaussianSplats, Geometry, MotionSequence, Points, Times
 from odeform_viz.columns import Column
-from odeform_viz.own_shapes import own_of
+from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import INVISIBLE, ColumnFrame, Curves, Error, Frame, ViewRequest, shown_until
 
 __all__ = ["Session", "settings_of", "visible_deformation"]
@@ -28,7 +28,7 @@ MUCH = 0.2  # of the largest deformation, above which a body counts as deformed 
 SLOW = 0.1  # s from a new motion to its first frame; slower columns are computed after the others
 
 SolveInputs = tuple[Mapping[str, float], str | SolverSettings, RecordedMotion | None]
-"""What a motion depends on besides the shape: parameters, quality, and the record that observed frames come from."""
+"""Lists what a motion depends on besides the shape: parameters, quality, and the record of observed frames."""
 
 
 def settings_of(predictor: Predictor, quality: str) -> str | SolverSettings:
@@ -90,7 +90,7 @@ class Session:
             return source.solve(column.geometry, parameters, quality, observed=_observed_frames(source, record))
 
     def new_compared_motion(self, column: Column, truth: RecordedMotion, request: ViewRequest) -> Motion:
-        """As `new_motion`, but of the mesh of `truth` (`truth_of`), vertex by vertex."""
+        """Solves the motion of `new_motion` for the mesh of `truth` (`truth_of`), vertex by vertex."""
         source = column.predictor
         assert source is not None
         parameters, quality, record = self._inputs(column, source, request)
@@ -103,9 +103,9 @@ class Session:
         truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
         if truth is None or column.truth is not None or not truth.of(self.parameters(column, request)):
             return None
-        own = own_of(column.predictor)
-        if own is not None:
-            return truth if np.array_equal(truth.geometry.points, own.item.rest_mesh().points) else None
+        body = user_body_of(column.predictor)
+        if body is not None:
+            return truth if np.array_equal(truth.geometry.points, body.item.rest_mesh().points) else None
         return None if column.loaded else truth
 
     def frame(self, request: ViewRequest, include_slow: bool = True) -> Frame:
@@ -160,7 +160,8 @@ class Session:
             return float(times[np.argmax(self.motion(column, request).deformation_rms(times))])
 
     def first_impact(self, request: ViewRequest) -> tuple[float, float]:
-        """From when to when, in s, the first visible column is deformed much for the first time; equal if never."""
+        """Finds from when to when, in s, the first visible column is deformed much for the first time; equal if
+        never."""
         column = next((column for column in request.columns if column.visible), None)
         if column is None:
             return (request.time, request.time)
@@ -264,10 +265,10 @@ class Session:
             return None
         predicted = self._predicted_truth(column, column.predictor, truth, request).vertices(request.time)
         true = truth.vertices(request.time)
-        off = np.subtract(predicted, true, dtype=float)
-        distances = np.linalg.norm(off, axis=1)
+        difference = np.subtract(predicted, true, dtype=float)
+        distances = np.linalg.norm(difference, axis=1)
         worst = int(distances.argmax())
-        rmse, mae = 1e3 * np.sqrt((off**2).mean()), 1e3 * np.abs(off).mean()
+        rmse, mae = 1e3 * np.sqrt((difference**2).mean()), 1e3 * np.abs(difference).mean()
         return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
 
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, request: ViewRequest) -> Curves:
@@ -281,8 +282,8 @@ class Session:
             band = both[:, 1]
         if truth is not None and predictor is not None:
             predicted = self._predicted_truth(shown.column, predictor, truth, request)
-            off = predicted.vertices(times) - truth.vertices(times)
-            error = 1e3 * np.sqrt((off.astype(float) ** 2).mean(axis=(1, 2)))
+            difference = predicted.vertices(times) - truth.vertices(times)
+            error = 1e3 * np.sqrt((difference.astype(float) ** 2).mean(axis=(1, 2)))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
         return Curves(times, height, rotation, 1e3 * motion.deformation_rms(times), error, band)
 

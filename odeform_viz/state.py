@@ -39,7 +39,7 @@ class PageState:
     shape: Mapping[str, Any] | None = None
     display: DisplayOptions = field(default_factory=DisplayOptions)
     notes: tuple[str, ...] = ()
-    """What could not be saved, in words."""
+    """Says in words what could not be saved."""
 
 
 def capture(scene: str, request: ViewRequest, display: DisplayOptions) -> PageState:

@@ -1,4 +1,4 @@
-"""What a user requests and what is then displayed: plain values, passed between session, presenter and panels."""
+"""Defines requests of the user and what is displayed: plain values between session, presenter and panels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -59,7 +59,7 @@ class ViewRequest:
 
 
 COLOR_BY: tuple[str, ...] = ("own colours", "displacement", "strain", "error")
-"""What the colors of bodies can show."""
+"""Lists what the colors of bodies can show."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class DisplayOptions:
     """How columns are drawn."""
 
     overlay: bool = False
-    """In one place instead of side by side."""
+    """Columns stand in one place instead of side by side."""
     color_by: str = "error"
     """One of `COLOR_BY`; errors need a truth, and own colors are shown without it."""
     follow: bool = True
@@ -91,7 +91,7 @@ class ColorScale:
 
 @dataclass(frozen=True, eq=False)
 class Coloring:
-    """What the colors of a frame show: `values` (N,) at the points of the columns of these keys."""
+    """Holds what the colors of a frame show: `values` (N,) at the points of the columns of these keys."""
 
     scale: ColorScale
     values: Mapping[int, Perpoint]
@@ -134,7 +134,7 @@ class ColumnFrame:
 
     @property
     def stats(self) -> SolveStats:
-        """Those of the motion."""
+        """Statistics of the motion's solution."""
         return self.motion.stats
 
     @property
@@ -158,7 +158,7 @@ class ColumnFrame:
         return predictor.error_band(self.motion.parameters, times)
 
     def stop_at(self, time: float) -> Stop | None:
-        """What is shown in place of `time` in seconds, and why, where the motion is not physically possible."""
+        """Says what is shown in place of `time` in seconds, and why, where the motion is not physically possible."""
         return self.motion.stop_at(time) if isinstance(self.motion, Motion) else None
 
     @property

@@ -17,7 +17,7 @@ __all__ = ["Workspace"]
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where the page may read and write. Bundled files, and those named on the command line, may be read too."""
+    """Confines where the page may read and write. Bundled files and those of the command line may be read too."""
 
     root: Path = Path()
     opened: frozenset[Path] = frozenset()

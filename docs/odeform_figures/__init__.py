@@ -1,1 +1,1 @@
-"""What reproduces the figures, tables and pictures of the documentation. Nothing imports it; wheels leave it out."""
+"""Reproduces the figures, tables and pictures of the documentation. Nothing imports it; wheels leave it out."""

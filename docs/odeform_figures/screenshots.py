@@ -243,7 +243,7 @@ PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] =
     "dark": (_rivals, _compare),
     "large-plots": (_rivals, _large_plots),
     "phone": (_kick, _phone),
-    "foreign": (_donut, _explore),
+    "untrained": (_donut, _explore),
     "stopped": (_regressed, _stopped),
     "push": (_push, _pushed),
 }

@@ -30,12 +30,12 @@ SIZES = (500, 1_000, 10_000, 100_000, 1_000_000)
 
 
 def _latency(predictor: ReducedModel) -> dict[str, Any]:
-    """Milliseconds of each stage: cold after a change of parameters or heading, warm for a time of a solved motion."""
+    """Milliseconds of each stage: cold after a change of parameters or azimuth, warm for a time of a solved motion."""
     shape, window = round_mesh(POINTS, predictor), predictor.schema.window
     parameters = random_parameters(predictor, 60)
     motions = [as_reduced(predictor.solve(shape, p)) for p in parameters]
     moments = np.random.default_rng(1).uniform(window.start, window.stop, 300).tolist()
-    headings = np.random.default_rng(2).uniform(-np.pi, np.pi, 20)
+    azimuths = np.random.default_rng(2).uniform(-np.pi, np.pi, 20)
     splats = predictor.solve(round_splats(SPLATS, predictor))
 
     def show_splats(index: int) -> None:
@@ -46,7 +46,7 @@ def _latency(predictor: ReducedModel) -> dict[str, Any]:
         "parameter_change_ms": milliseconds(lambda i: predictor.solve(shape, parameters[i % 60]), 120),
         "scrub_ms": milliseconds(lambda i: motions[0].vertices(moments[i]), 300 - 3),
         f"splats_{SPLATS // 1000}k_ms": milliseconds(show_splats, 40),
-        "basis_ms": milliseconds(lambda i: evaluate_basis(shape, motions[0].space, float(headings[i % 20])), 20),
+        "basis_ms": milliseconds(lambda i: evaluate_basis(shape, motions[0].space, float(azimuths[i % 20])), 20),
         "solve_ms": np.array([motion.stats.wall_ms for motion in motions[3:]]),
         "coordinates_ms": milliseconds(lambda i: motions[1].trajectory.reduced(np.array([moments[i]])), 300 - 3),
     }

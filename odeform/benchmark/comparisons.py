@@ -193,7 +193,7 @@ def torchdiffeq_comparison(model: Model, point: OperatingPoint) -> dict[str, Any
     taken = evaluations
     exact_field, exact_start, *_ = model.problem(theta, evaluated, np.float64)
     exact = integrate(exact_field, exact_start, EXACT, float(times[-1])).sample(times)
-    off = motion_rmse(decode(times, states)[1:], decode(times, exact)[1:], model.space.gyration_radius)
+    difference = motion_rmse(decode(times, states)[1:], decode(times, exact)[1:], model.space.gyration_radius)
     theirs = typical(lambda _: solve(), 10, warm=1)
     ours = typical(lambda _: integrate(field, start, quality, float(times[-1])).sample(times), 10)
     return {
@@ -203,6 +203,6 @@ def torchdiffeq_comparison(model: Model, point: OperatingPoint) -> dict[str, Any
         "ours_ms": ours,
         "speedup": theirs / ours,
         "evaluations": taken,
-        "error_mm": 1e3 * off,
+        "error_mm": 1e3 * difference,
         "note": f"{quality.method}, error is the solver's",
     }

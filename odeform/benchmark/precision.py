@@ -77,7 +77,7 @@ def ladder(frame: float) -> list[SolverSettings]:
     """Settings of each method from coarse to fine; `frame` is the time between frames in seconds."""
     steps = {"euler": (1.0, 1 / 4, 1 / 16), "midpoint": (1.0, 1 / 2, 1 / 8), "rk4": (4.0, 2.0, 1.0, 1 / 2, 1 / 4)}
     tolerances = {"bosh3": (1e-2, 1e-3, 1e-4, 1e-5), "dopri5": (1e-2, 1e-3, 1e-4, 1e-5, 1e-7)}
-    fixed = [SolverSettings(method, step=frame * share) for method, shares in steps.items() for share in shares]
+    fixed = [SolverSettings(method, step=frame * part) for method, parts in steps.items() for part in parts]
     return fixed + [SolverSettings(method, tolerance=t) for method, values in tolerances.items() for t in values]
 
 

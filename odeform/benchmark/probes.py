@@ -45,7 +45,7 @@ def round_splats(points: int, predictor: Predictor) -> GaussianSplats:
 
 
 def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[Parameters]:
-    """Random parameter sets of the trained box, with one heading: the basis depends on it and is timed separately.
+    """Random parameter sets of the trained box, with one azimuth: the basis depends on it and is timed separately.
 
     In a scene with objects they are drawn as its data are, all of the default object.
     """

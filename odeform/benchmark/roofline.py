@@ -1,4 +1,4 @@
-"""Roofline: the peak arithmetic and memory rates of this machine, and the share of them that decoding reaches."""
+"""Roofline: the peak arithmetic and memory rates of this machine, and the fraction of them that decoding reaches."""
 
 import os
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -
 
 
 def roofline(predictor: ReducedModel) -> dict[str, Any]:
-    """Rates of this machine, and the share of them that decoding reaches, for one frame or `FRAMES` at once.
+    """Rates of this machine, and the fraction of them that decoding reaches, for one frame or `FRAMES` at once.
 
     Decoding is timed from reduced coordinates to points: a motion caches the coordinates of the last times.
     """

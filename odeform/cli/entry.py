@@ -27,7 +27,7 @@ __all__ = ["COMMANDS", "Command", "commands", "main", "run_guarded"]
 
 @runtime_checkable
 class Command(Protocol):
-    """What the module of a command provides."""
+    """Describes what the module of a command provides."""
 
     @property
     def HELP(self) -> str:

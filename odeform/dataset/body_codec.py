@@ -71,11 +71,11 @@ class BodyCodec:
             return LENGTH.pack(len(series)) + series
         rounded = values[:, :POSE] * self._steps[:POSE]
         local = _local(sequence.vertices, self.points, rotation_from_vector(rounded[:, 3:]), rounded[:, :3])
-        missed = (local - self._local(values)).reshape(len(local), -1, 3)
-        far = np.linalg.norm(missed, axis=2) > self.correction
+        residual = (local - self._local(values)).reshape(len(local), -1, 3)
+        far = np.linalg.norm(residual, axis=2) > self.correction
         if not far.any():
             return LENGTH.pack(len(series)) + series
-        corrections = np.rint(missed * far[..., None] / self.correction).astype(np.int64)
+        corrections = np.rint(residual * far[..., None] / self.correction).astype(np.int64)
         body = lzma.compress(planes_of(corrections.reshape(len(local), -1)), preset=9)
         return LENGTH.pack(len(series)) + series + body
 
@@ -85,7 +85,7 @@ class BodyCodec:
         return self.decode_series(data[LENGTH.size : LENGTH.size + length], data[LENGTH.size + length :])
 
     def decode_series(self, series: bytes, corrections: bytes = b"") -> tuple[Floats, Floats]:
-        """As `decode`, from the two parts of the bytes: (T,) s and (T, N, 3) m."""
+        """Decodes the two parts of the bytes as `decode` does: returns (T,) s and (T, N, 3) m."""
         values, rate = expanded(series)
         if values.shape[1] != len(self._steps):
             raise ValueError(f"expected {len(self._steps)} series, got {values.shape[1]}")
@@ -122,7 +122,7 @@ class BodyCodec:
 
     @classmethod
     def checked(cls, arrays: Arrays, settings: dict[str, Any]) -> "BodyCodec":
-        """From arrays and settings of a file. Raises `ValueError` where they do not belong together."""
+        """Reads arrays and settings of a file. Raises `ValueError` where they do not belong together."""
         quantum, correction = float(settings["quantum_m"]), float(settings.get("correction_m", 0.0))
         count = len(arrays["weights"])
         shapes = {name: arrays[name].shape for name in ("points", "modes", "faces", "weights")}
@@ -171,7 +171,8 @@ def _local(vertices: Frames, reference: Floats, rotation: Rotations, shift: Floa
 
 
 def _pod(sequences: Iterator[MotionSequence], reference: Floats) -> tuple[Floats, Floats]:
-    """At most `MOST_MODES` POD modes (3 N, K), orthonormal in the mean over vertices, and all mean squares (3 N,)."""
+    """Computes POD modes (3 N, K), K <= `MOST_MODES`, orthonormal in the mean over vertices, and all mean squares
+    (3 N,)."""
     total, frames = np.zeros((reference.size, reference.size)), 0
     for sequence in sequences:
         if sequence.vertices.shape[1:] != reference.shape:

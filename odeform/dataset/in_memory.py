@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from odeform.dataset.index import Dataset, Entry, assign_splits
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
 from odeform.schema import Parameter, Schema, Window
+from odeform.surroundings import Surroundings
 from odeform.types import Mesh, MotionSequence
 
 __all__ = ["dataset_from_arrays"]
@@ -32,6 +34,7 @@ def dataset_from_arrays(
     splits: Sequence[str] | None = None,
     fixed: Mapping[str, float] | None = None,
     scene: str = "arrays",
+    surroundings: Surroundings | None = None,
     seed: int = 0,
 ) -> Dataset:
     """Make a data set of S motions of one mesh, which `fit`, `train` and `evaluate` take.
@@ -44,15 +47,18 @@ def dataset_from_arrays(
         units: of the parameters, by name; default: none.
         ranges: low and high of the parameters, by name; default: the least and the largest value.
         log: names of parameters of which ratios matter, such as masses.
-        weights: (N,) share of the mass at each vertex; default: that of the surface.
+        weights: (N,) mass fraction at each vertex; default: that of the surface.
         splits: "train", "val" or "test" for each motion; default: 70, 10 and 20 % in random order.
         fixed: quantities that are the same in all motions, by name. With `pulse_s`, the seconds that a force drives the
             body, the `rolling` family knows when a push is over.
-        scene: name of the scene; that of a bundled one brings its floor and what else is known of it.
+        scene: name of the scene; that of a bundled one brings its surroundings.
+        surroundings: floor, gravity, and the sphere that pushes, if there is one; default: those of the bundled scene
+            of that name, else none are known, and no motion is checked against a floor.
         seed: of the random order.
 
     Raises:
-        InputError: Arrays that do not fit together or are not finite, a parameter that does not vary, an unknown split.
+        InputError: Arrays that do not fit together or are not finite, a parameter that does not vary, an unknown split,
+            surroundings that are not finite.
 
     Examples:
         >>> import numpy as np
@@ -65,21 +71,45 @@ def dataset_from_arrays(
         >>> len(dataset.select("train")), dataset.schema.parameters[0].high
         (7, 2.0)
     """
-    times, moved, faces = np.asarray(times, float), np.asarray(vertices, np.float32), np.asarray(faces, np.int32)
-    if moved.ndim != 4 or moved.shape[3] != 3 or moved.shape[1] != len(times) or len(times) < 2:
-        raise InputError(f"vertices: expected shape (S, {times.size}, N, 3), got {moved.shape}")
-    values = {name: np.asarray(column, dtype=float) for name, column in parameters.items()}
-    for name, column in values.items():
-        if column.shape != (len(moved),):
-            raise InputError(f"parameters: expected {name} of shape ({len(moved)},), got {column.shape}")
-    labels = assign_splits(len(moved), seed) if splits is None else list(splits)
+    moved, faces = np.asarray(vertices, np.float32), np.asarray(faces, np.int32)
+    values = {name: _column(name, column, len(moved)) for name, column in parameters.items()}
+    schema = Schema(
+        scene,
+        _parameters(values, units or {}, ranges or {}, log),
+        _window(np.asarray(times, float), moved),
+        surroundings=_checked_surroundings(surroundings),
+    )
+    entries = _entries(schema, moved, values, assign_splits(len(moved), seed) if splits is None else list(splits))
+    mass = np.asarray(weights, float) if weights is not None else surface_weights(Mesh(moved[0, 0], faces))
+
+    def read(entry: Entry) -> MotionSequence:
+        frames = moved[int(entry.name.removeprefix("motion_"))]
+        return checked_sequence(
+            MotionSequence(np.asarray(times, float), frames, faces, mass, dict(entry.parameters), entry.name),
+            f"vertices, {entry.name}",
+        )
+
+    dataset = Dataset(Path("arrays"), schema, entries, read, dict(fixed or {}), {"scene": scene, "made": "of arrays"})
+    for entry in entries:
+        dataset.read(entry)
+    return dataset
+
+
+def _column(name: str, column: Any, count: int) -> np.ndarray:
+    values = np.asarray(column, dtype=float)
+    if values.shape != (count,):
+        raise InputError(f"parameters: expected {name} of shape ({count},), got {values.shape}")
+    return values
+
+
+def _entries(
+    schema: Schema, moved: np.ndarray, values: Mapping[str, np.ndarray], labels: Sequence[str]
+) -> tuple[Entry, ...]:
     if len(labels) != len(moved) or not set(labels) <= set(SPLITS):
         raise InputError(
             f"splits: expected {len(moved)} of {', '.join(SPLITS)}, got {len(labels)}: {sorted(set(labels))}"
         )
-    schema = Schema(scene, _parameters(values, units or {}, ranges or {}, log), _window(times))
-    mass = np.asarray(weights, float) if weights is not None else surface_weights(Mesh(moved[0, 0], faces))
-    entries = tuple(
+    return tuple(
         Entry(
             f"motion_{index:04d}",
             label,
@@ -89,16 +119,14 @@ def dataset_from_arrays(
         for index, label in enumerate(labels)
     )
 
-    def read(entry: Entry) -> MotionSequence:
-        frames = moved[int(entry.name.removeprefix("motion_"))]
-        return checked_sequence(
-            MotionSequence(times, frames, faces, mass, dict(entry.parameters), entry.name), f"vertices, {entry.name}"
-        )
 
-    dataset = Dataset(Path("arrays"), schema, entries, read, dict(fixed or {}), {"scene": scene, "made": "of arrays"})
-    for entry in entries:
-        dataset.read(entry)
-    return dataset
+def _checked_surroundings(given: Surroundings | None) -> Surroundings | None:
+    if given is None:
+        return None
+    try:
+        return Surroundings.from_json(asdict(given))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"surroundings: {error}") from None
 
 
 def _parameters(
@@ -118,7 +146,9 @@ def _parameters(
     return tuple(out)
 
 
-def _window(times: np.ndarray) -> Window:
+def _window(times: np.ndarray, moved: np.ndarray) -> Window:
+    if moved.ndim != 4 or moved.shape[3] != 3 or moved.shape[1] != len(times) or len(times) < 2:
+        raise InputError(f"vertices: expected shape (S, {times.size}, N, 3), got {moved.shape}")
     step = (times[-1] - times[0]) / (len(times) - 1)
     if times[0] != 0.0 or not np.allclose(np.diff(times), step, rtol=1e-4, atol=0.0):
         raise InputError("times: expected seconds that are evenly spaced from 0")

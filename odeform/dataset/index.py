@@ -16,7 +16,7 @@ from odeform.types import MotionSequence
 __all__ = ["Dataset", "Entry", "Reader", "assign_splits", "assign_splits_in_blocks", "index_from_json", "index_to_json"]
 
 FORMAT = 1
-BLOCK = 10  # sequences in which splits have their shares
+BLOCK = 10  # sequences in which splits have their proportions
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,8 @@ def assign_splits(count: int, seed: int) -> list[str]:
 
 
 def assign_splits_in_blocks(count: int, seed: int, standard: int) -> list[str]:
-    """As `assign_splits` in each block of ten, up to `standard` sequences; all further ones are for training.
+    """Assigns splits as `assign_splits` does in each block of ten, up to `standard` sequences; the rest is for
+    training.
 
     A longer list starts with the shorter one.
     """

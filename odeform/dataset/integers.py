@@ -23,7 +23,7 @@ Integers = NDArray[np.int64]
 
 
 def decompressed(data: bytes) -> bytes:
-    """What LZMA compressed, up to a limit of 256 MiB. Raises `LZMAError` for damaged bytes."""
+    """Decompresses LZMA, up to a limit of 256 MiB. Raises `LZMAError` for damaged bytes."""
     return lzma.LZMADecompressor(memlimit=LIMIT).decompress(data, max_length=LIMIT)
 
 

@@ -19,7 +19,7 @@ OTHERS = ("weights", "parameters")
 
 @dataclass(frozen=True, eq=False)
 class MotionArrays:
-    """What an archive holds.
+    """Holds what an archive of a motion contains.
 
     Attributes:
         vertices: (T, N, 3).

@@ -14,11 +14,11 @@ from odeform.types import Basis, Floats, Perpoint, Points, Rotations, Vector
 __all__ = ["fit_rolling"]
 
 TURNED = 1.0  # rad; bodies that turn by less are not rolling
-ASIDE = 1e-2  # share of the rotation that may be about other axes
+ASIDE = 1e-2  # fraction of the rotation that may be about other axes
 SAMPLED = 2000  # frames to which patterns are fitted
 MOST = 64  # patterns
 ANGLES = 128
-SERIES = 1e-3  # share of M that its Fourier series may leave out
+SERIES = 1e-3  # fraction of M that its Fourier series may leave out
 FEWER = 0.75  # of the modes: patterns are kept if they are at most as many
 
 
@@ -33,7 +33,7 @@ def fit_rolling(
     """Patterns of the training frames (F, 6 + K), as many as leave out `tolerance` of the RMS deformation of the
     validation frames. None where the body does not turn about one axis, or modes are hardly more.
 
-    `rest` (N, 3) are the canonical points of the body and `weights` their shares of its mass.
+    `rest` (N, 3) are the canonical points of the body and `weights` their mass fractions.
     """
     axis = _axis(train[:, 3:POSE])
     if axis is None or not train[:, POSE:].any():
@@ -89,7 +89,7 @@ def _turned(patterns: DisplacementBasis, rest: Points, turn: Rotations) -> Basis
 
 
 def _left_out(rolling: Rolling, frames: Floats) -> float:
-    """Share of the RMS deformation of frames (F, 6 + K) that the patterns leave out."""
+    """Fraction of the RMS deformation of frames (F, 6 + K) that the patterns leave out."""
     vectors, modes = frames[:, 3:POSE], frames[:, POSE:]
-    missed = rolling.coefficients(vectors, rolling.amplitudes(vectors, modes)) - modes
-    return float(np.linalg.norm(missed) / np.linalg.norm(modes))
+    residual = rolling.coefficients(vectors, rolling.amplitudes(vectors, modes)) - modes
+    return float(np.linalg.norm(residual) / np.linalg.norm(modes))

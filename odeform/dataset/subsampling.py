@@ -1,4 +1,4 @@
-"""Which frames of each sequence a model is trained on."""
+"""Chooses which frames of each sequence a model is trained on."""
 
 from dataclasses import dataclass
 

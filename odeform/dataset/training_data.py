@@ -1,4 +1,4 @@
-"""What reduced models are trained on: one reduced trajectory for each sequence of a data set."""
+"""Prepares what reduced models are trained on: one reduced trajectory for each sequence of a data set."""
 
 import hashlib
 import json
@@ -18,7 +18,7 @@ from odeform.types import Basis, Bools, Floats, Mesh, MotionSequence, Perpoint, 
 __all__ = ["FILLED_WEIGHT", "TrainingData", "inputs_identity", "prepare"]
 
 SPLITS = ("train", "val")
-TRUNCATION = 5e-3  # share of the RMS deformation that may be left out
+TRUNCATION = 5e-3  # fraction of the RMS deformation that may be left out
 MOST_MODES = 64
 PULSE = "pulse_s"  # of a scene's fixed values: how long a force drives the body
 FILLED_WEIGHT = 1e-3
@@ -30,14 +30,14 @@ class TrainingData:
     """Parameters and reduced motions of the splits train and val."""
 
     schema: Schema
-    """With the window and frame rate of the training."""
+    """The scene's schema, with the window and frame rate of the training."""
     space: ReducedSpace
     times: Floats
     """(T,) seconds of the frames."""
     rest: Floats
     """(N, 3) canonical rest points of the training mesh, metres."""
     weights: Floats
-    """(N,) share of the mass at each vertex."""
+    """(N,) mass fraction at each vertex."""
     theta: dict[str, Floats]
     """(S, P) parameters in [-1, 1] by split."""
     reduced: dict[str, Floats]
@@ -73,13 +73,13 @@ class _Motions:
 
     def coefficients(self, modes: Basis, weights: Perpoint) -> list[Floats]:
         """(T, K) of each sequence, by the modes (N, 3, K)."""
-        shares = weights[:, None]
-        return [np.einsum("tni,nik->tk", motion * shares, modes) for motion in self.deformations]
+        fractions = weights[:, None]
+        return [np.einsum("tni,nik->tk", motion * fractions, modes) for motion in self.deformations]
 
     def mean_square(self, weights: Perpoint) -> float:
         """Mean square deformation over the body, the frames and the sequences, m^2."""
-        shares = weights[:, None]
-        return float(np.mean([(shares * motion**2).sum(axis=(1, 2)).mean() for motion in self.deformations]))
+        fractions = weights[:, None]
+        return float(np.mean([(fractions * motion**2).sum(axis=(1, 2)).mean() for motion in self.deformations]))
 
 
 def prepare(
@@ -143,7 +143,7 @@ def _frames(dataset: Dataset, recorded: MotionSequence, count: int) -> MotionSeq
 
 
 def _body(dataset: Dataset, count: int) -> _Body:
-    """From the first training sequence."""
+    """Takes the body from the first training sequence."""
     first = next(dataset.sequences("train"), None)
     if first is None:
         raise InputError(f"{dataset.root}: no sequence in split train")

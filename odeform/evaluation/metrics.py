@@ -48,7 +48,7 @@ def evaluate(
         Scores by name: errors in mm (`rmse_mm`, `mae_mm`, `rmse_pooled_mm`, `vertex_mm`, ...) and ratios (`relative`,
         `deformation_relative`, `coverage_90`). Without a window, the impact of a scene is also scored as `impact`. In a
         scene with objects, `per_object` has the scores of each by name, and `mean_of_objects` their means.
-        `coverage_tenths` has, for each parameter, the share of frames within the error band in each tenth of the
+        `coverage_tenths` has, for each parameter, the fraction of frames within the error band in each tenth of the
         sequences, sorted by that parameter.
 
     Raises:
@@ -76,7 +76,7 @@ def evaluate(
         compared = _compared(predictor, dataset, recorded, quality, clock, spans)
         for name, comparison in compared.items():
             scores[name].add(*comparison)
-        covered.append((recorded.parameters, _share(*compared["whole"])))
+        covered.append((recorded.parameters, _fraction_covered(*compared["whole"])))
         if body := recorded.parameters.get(OBJECT):
             objects.setdefault(body, Scores()).add(*compared["whole"])
     result = scores["whole"].result()
@@ -89,21 +89,23 @@ def evaluate(
     return result
 
 
-def _share(_predicted: Frames, _truth: MotionSequence, counted: Mask, _between: Mask, covered: Floats) -> float:
-    """The share of one motion's counted frames within the error band; frame 0 is given, and NaN means no band."""
+def _fraction_covered(
+    _predicted: Frames, _truth: MotionSequence, counted: Mask, _between: Mask, covered: Floats
+) -> float:
+    """The fraction of one motion's counted frames within the error band; frame 0 is given, and NaN means no band."""
     return float(covered[1:][counted[1:]].mean())
 
 
 def _tenths(covered: Sequence[tuple[dict[str, Any], float]]) -> dict[str, list[float]]:
-    """For each parameter that is a number, the mean share in each tenth of the motions, sorted by it; empty with fewer
+    """Averages the fraction in each tenth of the motions, sorted by each parameter that is a number; empty with fewer
     than ten motions, or without a band."""
-    shares = np.array([share for _, share in covered])
-    if len(shares) < 10 or np.isnan(shares).any():
+    fractions = np.array([fraction for _, fraction in covered])
+    if len(fractions) < 10 or np.isnan(fractions).any():
         return {}
     columns = {name: [row[name] for row, _ in covered] for name, value in covered[0][0].items() if np.isscalar(value)}
     numbers = {name: np.asarray(column) for name, column in columns.items() if not isinstance(column[0], str)}
     return {
-        name: [float(part.mean()) for part in np.array_split(shares[np.argsort(column, kind="stable")], 10)]
+        name: [float(part.mean()) for part in np.array_split(fractions[np.argsort(column, kind="stable")], 10)]
         for name, column in numbers.items()
     }
 

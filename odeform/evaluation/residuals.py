@@ -1,4 +1,4 @@
-"""What a model does on data it was made from: errors, for its error band, and depths, for the watch over motions."""
+"""Measures a model on data it was made from: errors, for its error band, and depths, for the plausibility check."""
 
 import itertools
 
@@ -36,9 +36,9 @@ def _residuals(predictor: Predictor, dataset: Dataset, split: str) -> Arrays:
         at = np.searchsorted(truth.times, times - 1e-6)
         given = observations(predictor.schema, truth)
         predicted = predictor.solve(truth.rest, truth.parameters, observed=given).vertices(times)
-        off = predicted.astype(float) - truth.vertices[at]
+        difference = predicted.astype(float) - truth.vertices[at]
         theta.append(predictor.schema.vector(truth.parameters))
-        errors.append(1e3 * np.sqrt((off**2).mean(axis=(1, 2))))
+        errors.append(1e3 * np.sqrt((difference**2).mean(axis=(1, 2))))
     return {
         "val.theta": np.array(theta, dtype=np.float32),
         "val.times": times.astype(np.float32),

@@ -1,4 +1,4 @@
-"""Where a sphere touches a surface and a force pushes it inward: the contacts of the scene `contact-force`."""
+"""Finds where a sphere touches a surface and a force pushes it inward: the contacts of `contact-force`."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,6 @@ __all__ = [
     "SNAP",
     "SurfacePoint",
     "checked_contact",
-    "in_cone",
     "nearest_on",
     "projectile_centre",
     "surface_point",
@@ -40,18 +39,18 @@ class SurfacePoint:
     """(3,) outward unit normal, interpolated between those of the vertices: continuous over the whole surface."""
     face: int
     """Index of the face."""
-    shares: Vector
+    barycentric: Vector
     """(3,) barycentric coordinates in that face."""
     distance: float = 0.0
     """Metres to the point that it is nearest to."""
 
     def moved(self, vertices: Points, faces: Faces) -> Vector:
         """(3,) m: where the point is once the vertices of the mesh are at `vertices` (N, 3) m."""
-        return self.shares @ np.asarray(vertices, dtype=float)[faces[self.face]]
+        return self.barycentric @ np.asarray(vertices, dtype=float)[faces[self.face]]
 
 
 class _Surface:
-    """What all searches of nearest points on a mesh share."""
+    """Holds what all searches of nearest points on a mesh need."""
 
     def __init__(self, mesh: Mesh) -> None:
         points = np.asarray(mesh.points, dtype=float)
@@ -60,9 +59,9 @@ class _Surface:
         sides = self.corners - np.roll(self.corners, 1, axis=1)
         self.longest = float(np.linalg.norm(sides, axis=-1).max())
 
-    def around(self, distances: Perpoint, faces: Faces, reach: float) -> Ints:
-        """Faces that may be within `reach` m of a point, from the distances (N,) of the vertices in m."""
-        return np.flatnonzero((distances <= reach + self.longest)[faces].any(axis=1))
+    def around(self, distances: Perpoint, faces: Faces, radius: float) -> Ints:
+        """Faces that may be within `radius` m of a point, from the distances (N,) of the vertices in m."""
+        return np.flatnonzero((distances <= radius + self.longest)[faces].any(axis=1))
 
 
 _surfaces: WeakKeyDictionary[Mesh, _Surface] = WeakKeyDictionary()
@@ -75,17 +74,17 @@ def _surface_of(mesh: Mesh) -> _Surface:
     return found
 
 
-def surface_point(mesh: Mesh, face: int, shares: Floats, distance: float = 0.0) -> SurfacePoint:
-    """The point of a face with barycentric coordinates `shares` (3,)."""
+def surface_point(mesh: Mesh, face: int, barycentric: Floats, distance: float = 0.0) -> SurfacePoint:
+    """The point of a face with barycentric coordinates `barycentric` (3,)."""
     surface = _surface_of(mesh)
     corners = surface.corners[face]
-    normal = np.asarray(shares) @ surface.normals[mesh.faces[face]]
+    normal = np.asarray(barycentric) @ surface.normals[mesh.faces[face]]
     size = float(np.linalg.norm(normal))
     if size < 1e-9:
         a, b, c = corners
         normal = np.cross(b - a, c - a)
         size = max(float(np.linalg.norm(normal)), 1e-20)
-    return SurfacePoint(np.asarray(shares) @ corners, normal / size, int(face), np.asarray(shares), distance)
+    return SurfacePoint(np.asarray(barycentric) @ corners, normal / size, int(face), np.asarray(barycentric), distance)
 
 
 def nearest_on(mesh: Mesh, point: Floats) -> SurfacePoint:
@@ -97,9 +96,9 @@ def nearest_on(mesh: Mesh, point: Floats) -> SurfacePoint:
     feet = trimesh.triangles.closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
     away = ((feet - point) ** 2).sum(axis=1)
     near = int(away.argmin())
-    shares = trimesh.triangles.points_to_barycentric(corners[near : near + 1], feet[near : near + 1])[0]
-    shares = shares if np.isfinite(shares).all() else np.full(3, 1.0 / 3.0)
-    return surface_point(mesh, int(faces[near]), shares, float(np.sqrt(away[near])))
+    barycentric = trimesh.triangles.points_to_barycentric(corners[near : near + 1], feet[near : near + 1])[0]
+    barycentric = barycentric if np.isfinite(barycentric).all() else np.full(3, 1.0 / 3.0)
+    return surface_point(mesh, int(faces[near]), barycentric, float(np.sqrt(away[near])))
 
 
 def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
@@ -108,9 +107,9 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
     The centre lies on the outward normal, at the distance at which the sphere touches the faces: its radius on flat
     and convex parts. It does not fit where another part of the surface or the floor z = 0 is in its way.
     """
-    surface, reach = _surface_of(mesh), RADIUS + CREVICE
+    surface, radius = _surface_of(mesh), RADIUS + CREVICE
     distances = np.linalg.norm(mesh.points - contact.point, axis=1)
-    corners = surface.corners[surface.around(distances, mesh.faces, 2.0 * reach)]
+    corners = surface.corners[surface.around(distances, mesh.faces, 2.0 * radius)]
     height = RADIUS
     for _ in range(20):
         centre = contact.point + height * contact.normal
@@ -124,12 +123,6 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
         if abs(gap) < 1e-7:
             break
     return contact.point + height * contact.normal
-
-
-def in_cone(normal: Floats, force: Floats) -> bool:
-    """Whether a force (3,) pushes within 45 degrees of the inward normal; true of no force."""
-    size = float(np.linalg.norm(force))
-    return size == 0.0 or float(-np.dot(normal, force)) >= size * math.cos(CONE) - 1e-9
 
 
 def checked_contact(mesh: Mesh, point: Floats, force: Floats) -> tuple[SurfacePoint, Vector]:

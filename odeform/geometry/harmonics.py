@@ -51,8 +51,8 @@ def rotated_harmonics(harmonics: Harmonics, rotations: Rotations) -> Harmonics:
         block = slice(start, start + BLOCK)
         values = harmonic_basis(directions @ (rotations if rotations.ndim == 2 else rotations[block]), degree)
         for n in range(1, degree + 1):
-            own = _coefficients(n)
-            out[block, own] = inverses[n] @ values[..., own] @ harmonics[block, own]
+            columns = _coefficients(n)
+            out[block, columns] = inverses[n] @ values[..., columns] @ harmonics[block, columns]
     return out
 
 

@@ -12,10 +12,10 @@ from odeform.types import Floats, Geometry, Mesh, Points
 __all__ = ["TOLERANCE", "Likeness", "compare_shapes"]
 
 TOLERANCE = 0.02
-"""Share of the body's size within which a surface counts as the body's own. Coarser meshes, points and splats of the
+"""Fraction of the body's size within which a surface counts as the body's own. Coarser meshes, points and splats of the
 trained ball measure 0.010 to 0.018; a ball that is 3 % flatter measures 0.03, a shoe 0.64. What a flatter ball does in
 the simulator differs from the model's motion by about as much as the model's own error at 0.02, and by more beyond."""
-SHARE = 0.99  # of either surface that has to lie within the distance: scans and splats have stray points
+FRACTION = 0.99  # of either surface that has to lie within the distance: scans and splats have stray points
 SAMPLES = 4_000  # points of each surface that are compared
 WIDEST = 0.1  # of the body's size: points farther apart than this do not show a surface
 NEAREST = 4  # samples whose triangles are tried for the nearest point of a mesh
@@ -59,7 +59,7 @@ def _compare(geometry: Geometry, body: Mesh) -> Likeness:
     widest = WIDEST / TOLERANCE * tolerance
     ways = _distances(_samples(geometry)[0], body, widest), _distances(_samples(body)[0], geometry, widest)
     return Likeness(
-        max(float(np.quantile(way, SHARE)) for way in ways), max(float(way.mean()) for way in ways), tolerance
+        max(float(np.quantile(way, FRACTION)) for way in ways), max(float(way.mean()) for way in ways), tolerance
     )
 
 
@@ -71,8 +71,8 @@ def _samples(geometry: Geometry) -> tuple[Points, np.ndarray]:
         return points[chosen], np.zeros(0, dtype=int)
     corners = points[geometry.faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    share = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    face = np.minimum(np.searchsorted(np.cumsum(area), share * area.sum()), len(area) - 1)
+    fraction = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    face = np.minimum(np.searchsorted(np.cumsum(area), fraction * area.sum()), len(area) - 1)
     # uniform in a triangle: Turk, Generating random points in triangles (Graphics Gems, 1990)
     rng = np.random.default_rng(0)
     root, along = np.sqrt(rng.random((SAMPLES, 1))), rng.random((SAMPLES, 1))

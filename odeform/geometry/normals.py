@@ -36,8 +36,8 @@ def nearest_normals(surface: Mesh, points: Points) -> Points:
         away = ((foot - points) ** 2).sum(axis=1)
         closer = np.flatnonzero(away < distance)
         distance[closer] = away[closer]
-        shares = _barycentric(corners[closer], foot[closer])
-        found[closer] = np.einsum("nc,nci->ni", shares, normals[surface.faces[face[closer]]])
+        barycentric = _barycentric(corners[closer], foot[closer])
+        found[closer] = np.einsum("nc,nci->ni", barycentric, normals[surface.faces[face[closer]]])
     size = np.linalg.norm(found, axis=1, keepdims=True)
     return np.where(size > 1e-6, found / np.maximum(size, 1e-6), (0.0, 0.0, 1.0))
 

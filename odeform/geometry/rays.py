@@ -1,4 +1,4 @@
-"""What a ray meets: the triangles of a mesh, or the points of a cloud."""
+"""Finds what a ray meets: the triangles of a mesh, or the points of a cloud."""
 
 import numpy as np
 

@@ -17,15 +17,15 @@ EVEN = 0.2  # length of the mean unit vector below which the surroundings give n
 
 
 def surface_weights(geometry: Geometry) -> Perpoint:
-    """(N,) share of the surface at each point, summing to 1: a third of the adjacent faces; equal without faces."""
+    """(N,) fraction of the surface at each point, summing to 1: a third of the adjacent faces; equal without faces."""
     count = len(geometry.points)
     if not isinstance(geometry, Mesh):
         return np.full(count, 1.0 / count)
     corners = np.asarray(geometry.points, dtype=float)[geometry.faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    shares = np.bincount(geometry.faces.ravel(), np.repeat(area, 3), minlength=count)
-    total = shares.sum()
-    return shares / total if total > 0.0 else np.full(count, 1.0 / count)
+    fractions = np.bincount(geometry.faces.ravel(), np.repeat(area, 3), minlength=count)
+    total = fractions.sum()
+    return fractions / total if total > 0.0 else np.full(count, 1.0 / count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class FittedShape:
     region: Region | None
     """The part that moves, in the units of the file; None for all of it."""
     transform: Similarity
-    """From the file to the scene (metres)."""
+    """Maps the file's coordinates to the scene (metres)."""
     geometry: Geometry
     """The part that moves, at rest in the scene."""
     remainder: Geometry | None

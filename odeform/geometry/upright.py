@@ -1,4 +1,4 @@
-"""Which axis of a shape points up: what its file says, else for a mesh a guess, else z.
+"""Finds which axis of a shape points up: what its file says, else for a mesh a guess, else z.
 
 The viewer, the command line and `fit_to` follow this one rule.
 """
@@ -45,7 +45,7 @@ def guess_up(mesh: Mesh) -> str:
 
 
 def _stand(points: Floats, up: int) -> float:
-    """Share of the bounding rectangle from above that the hull of the lowest points covers."""
+    """Fraction of the bounding rectangle from above that the hull of the lowest points covers."""
     height, across = points[:, up], np.delete(points, up, axis=1)
     footprint = float(np.prod(np.ptp(across, axis=0)))
     low = across[height <= height.min() + NEAR * np.ptp(height)]

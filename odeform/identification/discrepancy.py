@@ -26,7 +26,7 @@ __all__ = ["LEAST", "NOMINAL", "PREFIX", "TWO_SIDED", "Discrepancy", "calibrate"
 NOMINAL, TWO_SIDED = 0.9, 1.6449
 """Nominal coverage of the intervals, and the matching number of standard deviations of a normal distribution."""
 PREFIX = "discrepancy."
-"""Of its arrays in a checkpoint."""
+"""Prefixes the names of its arrays in a checkpoint."""
 FLOOR_MM = 2e-3  # error of a cause from rounding of the data
 FIRST_SPAN = 0.025  # s; each span of time is twice as long as all before it
 DISCOUNT = 2.0
@@ -60,12 +60,12 @@ class Discrepancy:
         """A comparison at theta (P,), minus the expected error of the model there."""
         means = _between(times, self.times, self.means)
         expected = linear.spread @ (means @ np.concatenate([[1.0], theta]))[..., None]
-        slopes = means[..., 1 : 1 + linear.gain.shape[-1]]  # empty if the comparison has no gains
-        return replace(linear, off=linear.off - expected[..., 0], gain=linear.gain + slopes)
+        slopes = means[..., 1 : 1 + linear.jacobian.shape[-1]]  # empty if the comparison has no jacobians
+        return replace(linear, residual=linear.residual - expected[..., 0], jacobian=linear.jacobian + slopes)
 
 
 def stored_discrepancy(predictor: Predictor) -> Discrepancy | None:
-    """That of a predictor's checkpoint; None where it has none. `InputError` for a damaged one."""
+    """Reads the discrepancy of a predictor's checkpoint; None where it has none. `InputError` for a damaged one."""
     arrays = predictor.checkpoint.arrays
     if f"{PREFIX}times" not in arrays:
         return None
@@ -86,13 +86,13 @@ def _between(queries: Floats, times: Floats, values: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Errors (S, T, 6 + K) mm and gains (S, T, 6 + K, P) of sequences whose parameters are residuals."""
+    """Errors (S, T, 6 + K) mm and jacobians (S, T, 6 + K, P) of sequences whose parameters are residuals."""
 
     errors: Floats
-    gains: Floats
+    jacobians: Floats
 
     def part(self, rows: slice) -> "_Residuals":
-        return _Residuals(self.errors[rows], self.gains[rows])
+        return _Residuals(self.errors[rows], self.jacobians[rows])
 
 
 def calibrate(
@@ -123,20 +123,20 @@ def calibrate(
     entries = dataset.select(split)
     if len(entries) < LEAST:
         raise InputError(f"split {split}: expected at least {LEAST} sequences to calibrate on, got {len(entries)}")
-    errors, gains, thetas, times = [], [], [], np.zeros(0)
+    errors, jacobians, thetas, times = [], [], [], np.zeros(0)
     for index, entry in enumerate(entries):
         sequence = dataset.read(entry)
         observation = observe(sequence, predictor.schema, View()).subsampled()
         thetas.append(predictor.schema.vector(sequence.parameters))
         linear = Comparison(predictor, observation).at(thetas[-1])
         normal = linear.spread.swapaxes(1, 2) @ linear.spread
-        pulled = linear.spread.swapaxes(1, 2) @ linear.off[..., None]
+        pulled = linear.spread.swapaxes(1, 2) @ linear.residual[..., None]
         errors.append(np.linalg.solve(normal, pulled)[..., 0])
-        gains.append(linear.gain)
+        jacobians.append(linear.jacobian)
         times = observation.times  # the frames of the window, the same for all
         progress((index + 1) / len(entries))
     means, rest = _linear_part(np.array(errors), np.array(thetas))
-    residuals = _Residuals(rest, np.array(gains) + means[..., 1:])
+    residuals = _Residuals(rest, np.array(jacobians) + means[..., 1:])
     table = _variances(residuals, times)
     # cross-validation: each half scores the intervals of the other
     halves = [slice(0, None, 2), slice(1, None, 2)]
@@ -154,8 +154,8 @@ def _linear_part(errors: Floats, thetas: Floats) -> tuple[Floats, Floats]:
     ridge = RIDGE * np.diag([0.0] + [1.0] * thetas.shape[1])
     solved = np.linalg.solve(terms.T @ terms + ridge, terms.T)
     means = np.einsum("ps,stc->tcp", solved, errors)
-    own = np.einsum("sp,ps->s", terms, solved)  # the weight that each has in its own mean
-    return means, (errors - np.einsum("tcp,sp->stc", means, terms)) / (1.0 - own)[:, None, None]
+    leverage = np.einsum("sp,ps->s", terms, solved)  # the weight that each has in its own mean
+    return means, (errors - np.einsum("tcp,sp->stc", means, terms)) / (1.0 - leverage)[:, None, None]
 
 
 def _spans(times: Times) -> Ints:
@@ -178,10 +178,10 @@ def _weighted(residuals: _Residuals, variances: Floats, block: tuple[Ints, Ints]
     """Fisher information (S, P, P) and score (S, P) of a block of frames and causes."""
     frames, causes = block
     deviations = np.sqrt(variances[block])
-    count, parameters = len(residuals.errors), residuals.gains.shape[-1]
-    gains = (residuals.gains[:, frames, causes] / deviations[..., None]).reshape(count, -1, parameters)
+    count, parameters = len(residuals.errors), residuals.jacobians.shape[-1]
+    jacobians = (residuals.jacobians[:, frames, causes] / deviations[..., None]).reshape(count, -1, parameters)
     errors = (residuals.errors[:, frames, causes] / deviations).reshape(count, -1)
-    return gains.swapaxes(1, 2) @ gains, np.einsum("snp,sn->sp", gains, errors)
+    return jacobians.swapaxes(1, 2) @ jacobians, np.einsum("snp,sn->sp", jacobians, errors)
 
 
 def _inflation(residuals: _Residuals, variances: Floats, block: tuple[Ints, Ints]) -> float:

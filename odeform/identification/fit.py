@@ -43,16 +43,16 @@ def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tupl
     """
     square, deviations = noise_mm**2, np.sqrt(variances)[:, :, None]
     turned = linear.spread.swapaxes(1, 2)
-    normal, pulled = turned @ linear.spread, turned @ linear.off[..., None]
+    normal, pulled = turned @ linear.spread, turned @ linear.residual[..., None]
     causes = np.arange(normal.shape[1])
     inner = deviations * normal * deviations.swapaxes(1, 2)
     inner[:, causes, causes] += square
-    known = np.concatenate([deviations * (normal @ linear.gain), deviations * pulled], axis=2)
+    known = np.concatenate([deviations * (normal @ linear.jacobian), deviations * pulled], axis=2)
     solved = np.linalg.solve(inner, known)
-    gain = linear.gain / deviations
-    information = np.einsum("tkp,tkq->pq", gain, solved[..., :-1])
-    score = np.einsum("tkp,tk->p", gain, solved[..., -1])
-    cost = float((linear.off**2).sum() - (known[..., -1] * solved[..., -1]).sum()) / square
+    jacobian = linear.jacobian / deviations
+    information = np.einsum("tkp,tkq->pq", jacobian, solved[..., :-1])
+    score = np.einsum("tkp,tk->p", jacobian, solved[..., -1])
+    cost = float((linear.residual**2).sum() - (known[..., -1] * solved[..., -1]).sum()) / square
     return 0.5 * (information + information.T), score, cost
 
 

@@ -29,7 +29,7 @@ class Identified:
         identifiable: Whether the interval is narrower than the trained range. If not, the motion does not determine
             the parameter.
         unit: `value` with the trained range mapped to [-1, 1].
-        reach: Half the width of the interval, on the same scale.
+        half_width: Half the width of the interval, on the same scale.
     """
 
     value: float
@@ -37,7 +37,7 @@ class Identified:
     high: float
     identifiable: bool
     unit: float
-    reach: float
+    half_width: float
 
 
 @dataclass(frozen=True)
@@ -100,19 +100,19 @@ def identify(
         progress({p.name: p.denormalise(float(unit)) for p, unit in zip(predictor.schema.learned, theta, strict=True)})
 
     found = fit_parameters(Comparison(predictor, observation.subsampled()), discrepancy, report)
-    reaches = _reaches(found)
-    pairs = zip(predictor.schema.learned, found.theta, reaches, strict=True)
-    parameters = {p.name: _identified(p, float(unit), float(reach)) for p, unit, reach in pairs}
+    half_widths = _half_widths(found)
+    pairs = zip(predictor.schema.learned, found.theta, half_widths, strict=True)
+    parameters = {p.name: _identified(p, float(unit), float(half_width)) for p, unit, half_width in pairs}
     return Identification(parameters, found.misfit, time.perf_counter() - begin)
 
 
-def _reaches(found: ParameterFit) -> Floats:
+def _half_widths(found: ParameterFit) -> Floats:
     """(P,) half widths of the intervals: from the curvature, and wider where the observation is not explained."""
     size = len(found.theta)
     covariance = np.linalg.inv(found.information + 1e-6 * np.eye(size))
     return TWO_SIDED * np.sqrt(np.diag(covariance) * max(found.misfit, 1.0))
 
 
-def _identified(parameter: Parameter, unit: float, reach: float) -> Identified:
-    low, high = (parameter.denormalise(float(np.clip(unit + side * reach, -1.0, 1.0))) for side in (-1.0, 1.0))
-    return Identified(parameter.denormalise(unit), low, high, reach < 1.0, unit, reach)
+def _identified(parameter: Parameter, unit: float, half_width: float) -> Identified:
+    low, high = (parameter.denormalise(float(np.clip(unit + side * half_width, -1.0, 1.0))) for side in (-1.0, 1.0))
+    return Identified(parameter.denormalise(unit), low, high, half_width < 1.0, unit, half_width)

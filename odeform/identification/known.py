@@ -33,7 +33,7 @@ def why_not_identifiable(predictor: Predictor) -> str:
 
 
 def known_discrepancy(predictor: Predictor, progress: Callable[[float], None] = lambda _: None) -> Discrepancy:
-    """That of the predictor's checkpoint, or `calibrate` on the bundled data set of its scene, once for each predictor.
+    """Reads the checkpoint's discrepancy, or calibrates it on the scene's bundled data set, once for each predictor.
 
     `progress` is called with the fraction of a calibration that is done; an exception that it raises ends it.
 

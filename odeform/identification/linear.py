@@ -28,7 +28,7 @@ __all__ = ["ACCURATE", "Comparison", "Linear", "derivatives", "parameters_of"]
 ACCURATE, ACCURATE_MM = SolverSettings("dopri5", tolerance=1e-6), 0.01
 """Solver errors stay below 0.01 mm: the first frames of a kick, with model errors of some hundredths, matter most."""
 ENOUGH = 4  # points that define a pose
-APART = 1e-2  # step of central differences, in halves of the trained range
+DIFFERENCE = 1e-2  # step of central differences, in halves of the trained range
 
 
 @runtime_checkable
@@ -45,18 +45,18 @@ class Linear:
     """A linearised comparison.
 
     `off` (T, 3 N) mm is observed minus predicted, `spread` (T, 3 N, 6 + K) the effect of each cause on the points, and
-    `gain` (T, 6 + K, P) mm the causes for a change of each parameter by half of its trained range.
+    `jacobian` (T, 6 + K, P) mm the causes for a change of each parameter by half of its trained range.
     """
 
-    off: Float[np.ndarray, "times coordinates"]
+    residual: Float[np.ndarray, "times coordinates"]
     spread: Float[np.ndarray, "times coordinates causes"]
-    gain: Float[np.ndarray, "times causes parameters"]
+    jacobian: Float[np.ndarray, "times causes parameters"]
 
 
-def parameters_of(schema: Schema, theta: Floats, heading: float) -> Parameters:
+def parameters_of(schema: Schema, theta: Floats, azimuth: float) -> Parameters:
     """Parameters in their units from (P,) in [-1, 1] and the azimuth, if the scene has one; a body has its own."""
     found = {p.name: p.denormalise(float(unit)) for p, unit in zip(schema.learned, theta, strict=True)}
-    return found | {p.name: heading for p in schema.parameters if p.role == "azimuth"}
+    return found | {p.name: azimuth for p in schema.parameters if p.role == "azimuth"}
 
 
 def _solved(
@@ -83,9 +83,9 @@ def derivatives(predictor: Predictor, theta: Floats, times: Times) -> Float[np.n
     window = predictor.schema.window
     if isinstance(predictor, Differentiable) and (not window.reach or times.max() <= window.stop):
         return predictor.sensitivities(theta, times, ACCURATE)
-    ahead = APART * np.eye(len(theta))
+    ahead = DIFFERENCE * np.eye(len(theta))
     slopes = [
-        (_motion(predictor, theta + h, times) - _motion(predictor, theta - h, times)) / (2 * APART) for h in ahead
+        (_motion(predictor, theta + h, times) - _motion(predictor, theta - h, times)) / (2 * DIFFERENCE) for h in ahead
     ]
     return np.stack([_motion(predictor, theta, times), *slopes])
 
@@ -96,12 +96,12 @@ class Comparison:
     def __init__(self, predictor: Predictor, observation: Observation) -> None:
         self.predictor, self.observation = predictor, observation
         self._space = _solved(predictor, {}).space
-        evaluated = evaluate_basis(PointCloud(observation.rest), self._space, observation.heading)
+        evaluated = evaluate_basis(PointCloud(observation.rest), self._space, observation.azimuth)
         self._rest, self._modes = evaluated.rest.astype(float), evaluated.values.astype(float)
-        self._observed = to_canonical(observation.positions, self._space.anchor, observation.heading)
+        self._observed = to_canonical(observation.positions, self._space.anchor, observation.azimuth)
 
     def at(self, theta: Floats, sloped: bool = True) -> Linear:
-        """The comparison at theta (P,) in [-1, 1]; without gains unless `sloped`, which is cheaper."""
+        """The comparison at theta (P,) in [-1, 1]; without jacobians unless `sloped`, which is cheaper."""
         times, modes = self.observation.times, self._modes
         jet = derivatives(self.predictor, theta, times) if sloped else _motion(self.predictor, theta, times)[None]
         y, change = jet[0], jet[1:]
@@ -120,11 +120,11 @@ class Comparison:
         spread[..., 3:POSE] = np.cross(np.eye(3)[:, None, None], body).transpose(1, 2, 3, 0) / lever
         spread[..., POSE:] = modes.reshape(len(modes), -1, 3).transpose(1, 2, 0)
         spread = spread.reshape(len(y), -1, y.shape[1])
-        off = 1e3 * ((self._observed - shift[:, None]) @ turn - body).reshape(len(y), -1)
-        off += (spread[..., :POSE] @ posed[..., None])[..., 0]
+        residual = 1e3 * ((self._observed - shift[:, None]) @ turn - body).reshape(len(y), -1)
+        residual += (spread[..., :POSE] @ posed[..., None])[..., 0]
         spin = lever * body_spin(y[:, 3:POSE], change[..., 3:POSE])
-        gain = 1e3 * np.concatenate([change[..., :3], spin, change[..., POSE:]], axis=2)
-        return Linear(off, spread, gain.transpose(1, 2, 0))
+        jacobian = 1e3 * np.concatenate([change[..., :3], spin, change[..., POSE:]], axis=2)
+        return Linear(residual, spread, jacobian.transpose(1, 2, 0))
 
 
 def _pose(body: Frames, observed: Frames) -> tuple[Rotations, Vectors]:

@@ -25,7 +25,7 @@ class Observation:
         rest: (N, 3) metres: points anywhere on the body, as it rests in the scene.
         times: (T,) seconds from the start of the motion.
         positions: (T, N, 3) metres: the same points at these times.
-        heading: The scene's azimuth in radians, which has to be known; 0 for a scene without one.
+        azimuth: The scene's azimuth in radians, which has to be known; 0 for a scene without one.
         noise_mm: Standard deviation of each coordinate in millimetres.
 
     Raises:
@@ -44,7 +44,7 @@ class Observation:
     rest: Points
     times: Times
     positions: Float[np.ndarray, "frames points 3"]
-    heading: float = 0.0
+    azimuth: float = 0.0
     noise_mm: float = ROUNDING_MM
 
     def __post_init__(self) -> None:
@@ -59,10 +59,10 @@ class Observation:
             raise InputError("observation: expected times of at least 0 and positive noise")
 
     def subsampled(self, points: int = MOST_POINTS, frames: int = MOST_FRAMES) -> "Observation":
-        """At most `points` points and `frames` frames, evenly chosen: more take time and add little."""
+        """Keeps at most `points` points and `frames` frames, evenly chosen: more take time and add little."""
         kept, at = _evenly(len(self.rest), points), _evenly(len(self.times), frames)
         positions = self.positions[at][:, kept]
-        return Observation(self.rest[kept], self.times[at], positions, self.heading, self.noise_mm)
+        return Observation(self.rest[kept], self.times[at], positions, self.azimuth, self.noise_mm)
 
 
 def _evenly(count: int, most: int) -> Ints:

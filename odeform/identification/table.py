@@ -70,19 +70,19 @@ def _identified(
 
 
 def _calibrated(predictor: Predictor, dataset: Dataset) -> Discrepancy:
-    """That of the checkpoint, else measured on the data set."""
+    """Reads the discrepancy of the checkpoint, else measures it on the data set."""
     if (stored := stored_discrepancy(predictor)) is not None:
         return stored
     progress = Progress("calibrate", 100)
     done = 0
 
-    def report_share(share: float) -> None:
+    def report_fraction(fraction: float) -> None:
         nonlocal done
-        ahead = int(100 * share) - done
+        ahead = int(100 * fraction) - done
         progress.advance(ahead)
         done += ahead
 
-    discrepancy = calibrate(predictor, dataset, CALIBRATION, report_share)
+    discrepancy = calibrate(predictor, dataset, CALIBRATION, report_fraction)
     progress.close()
     return discrepancy
 
@@ -99,16 +99,16 @@ def _found_json(one: Identified) -> dict[str, Any]:
 def _scores(parameter: Parameter, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Errors over all rows, in the parameter's unit and in halves of the trained range, and coverage of the intervals.
 
-    Coverage is over rows where the parameter is identifiable; `identifiable` is their share.
+    Coverage is over rows where the parameter is identifiable; `identifiable` is their fraction.
     """
     found = [row["parameters"][parameter.name] for row in rows]
-    apart = [parameter.normalise(one["found"]) - parameter.normalise(one["true"]) for one in found]
+    difference = [parameter.normalise(one["found"]) - parameter.normalise(one["true"]) for one in found]
     covered = [one["low"] <= one["true"] <= one["high"] for one in found if one["identifiable"]]
     return {
         "mae": float(np.mean([abs(one["found"] - one["true"]) for one in found])),
         "unit": parameter.unit,
-        "mae_normalised": float(np.abs(apart).mean()),
-        "largest_normalised": float(np.abs(apart).max()),
+        "mae_normalised": float(np.abs(difference).mean()),
+        "largest_normalised": float(np.abs(difference).max()),
         "coverage_90": float(np.mean(covered)) if covered else None,
         "identifiable": len(covered) / len(found),
     }

@@ -71,7 +71,7 @@ class Predictor(ABC):
     model: str
     """The name under which checkpoints and the command line know this class."""
     made_of: str = ""
-    """What it has of neural networks, of mechanics and of regression, in words."""
+    """Says in words what the model has of neural networks, of mechanics and of regression."""
     qualities: Mapping[str, SolverSettings] = {}
     """Solver settings by name (draft, balanced, reference); empty for models that do not integrate."""
     frontier: tuple[FrontierPoint, ...] = ()
@@ -148,8 +148,8 @@ class Predictor(ABC):
         until: float,
         observed: MotionSequence | None,
     ) -> Motion:
-        """As `solve`, with everything filled in: all parameters, the settings (None for a model without qualities
-        that was given a quality by name), and the end in seconds, soft-clamped to what models are asked for."""
+        """Solves what `solve` is asked for, with all parameters, the settings (None for a model without qualities that
+        was given a quality by name), and the end in seconds, soft-clamped to what models are asked for."""
 
     def solve(
         self,

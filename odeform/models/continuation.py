@@ -60,12 +60,12 @@ class Dynamics:
 
     gravity: Float[np.ndarray, "3"]
     """Metres per frame squared."""
-    touch: float
+    contact_height: float
     """The height in metres below which a body that has not turned is in contact."""
     width: float
-    """Metres below `touch` over which contacts set in."""
-    gains: Float[np.ndarray, "features"]
-    """Of all features."""
+    """Metres below `contact_height` over which contacts set in."""
+    inverse_lengths: Float[np.ndarray, "features"]
+    """The inverse length scales of all features."""
     pose: KernelRegression
     """Its features are those without the side that is down."""
     deformation: KernelRegression
@@ -83,14 +83,14 @@ class Dynamics:
         now: Float[np.ndarray, "*batch y"],
         theta: Float[np.ndarray, "*batch parameters"],
     ) -> tuple[Floats, Floats]:
-        """(..., features): depths below `touch`, motion since the last frame, parameters, and which side of the body is
-        down. And (..., 1) how near the ground is, 0 to 1. All are zero off the ground."""
+        """(..., features): depths below `contact_height`, motion since the last frame, parameters, and which side of
+        the body is down. And (..., 1) how near the ground is, 0 to 1. All are zero off the ground."""
         ahead = 2.0 * now[..., 2:3] - before[..., 2:3] + self.gravity[2]
-        depths = np.maximum(self.touch - np.concatenate([ahead, now[..., 2:3]], axis=-1), 0.0)
+        depths = np.maximum(self.contact_height - np.concatenate([ahead, now[..., 2:3]], axis=-1), 0.0)
         near = np.tanh(depths.sum(axis=-1, keepdims=True) / self.width)
         side = rotation_from_vector(now[..., 3:POSE])[..., 2, :] - UPRIGHT
         moving = np.concatenate([(now - before)[..., :POSE], theta, side], axis=-1)
-        return self.gains * np.concatenate([depths, near * moving], axis=-1), near
+        return self.inverse_lengths * np.concatenate([depths, near * moving], axis=-1), near
 
     def next(
         self,
@@ -107,7 +107,8 @@ class Dynamics:
 
     def arrays(self) -> Arrays:
         """The float32 arrays of a checkpoint, by name; `from_arrays` reads them."""
-        named = {"gravity": self.gravity, "ground": np.array([self.touch, self.width]), "gains": self.gains}
+        ground = np.array([self.contact_height, self.width])
+        named = {"gravity": self.gravity, "ground": ground, "gains": self.inverse_lengths}
         for name in PARTS:
             part: KernelRegression = getattr(self, name)
             named |= {f"{name}.centers": part.inputs, f"{name}.weights": part.weights}
@@ -130,10 +131,10 @@ class Dynamics:
             count = len(arrays[f"{PREFIX}{name}.weights"])
             return spread_regression(read(f"{name}.centers", count, inputs), read(f"{name}.weights", count, outputs))
 
-        touch, width = read("ground", 2).tolist()
+        contact_height, width = read("ground", 2).tolist()
         return cls(
             read("gravity", 3),
-            touch,
+            contact_height,
             width,
             read("gains", features),
             regression("pose", features - len(UPRIGHT), POSE),
@@ -166,12 +167,12 @@ def continued(solved: Trajectory, dynamics: Dynamics, theta: Floats, window: Win
 def continued_batch(
     solved: BatchTrajectory, dynamics: Dynamics, theta: Float[np.ndarray, "batch parameters"], window: Window
 ) -> BatchTrajectory:
-    """As `continued`, of many motions."""
+    """Continues many motions as `continued` does one."""
     return PiecewiseBatch(solved, window.stop, lambda: _LaterBatch(solved, _Frames(solved, dynamics, theta, window)))
 
 
 class _Frames:
-    """What the dynamics make of the last two frames of a window, of one motion or of many.
+    """Continues the last two frames of a window by the dynamics, of one motion or of many.
 
     Frames have the trained rate, and each follows from the two before: they never depend on the requested times. The
     spline between them is exact for free flight.
@@ -210,22 +211,22 @@ class _Later:
 
     @property
     def stats(self) -> SolveStats:
-        """Those of the window."""
+        """Statistics of the window's solution."""
         return self._solved.stats
 
 
 class _LaterBatch:
-    """As `_Later`, of many motions."""
+    """Continues many motions as `_Later` does one."""
 
     def __init__(self, solved: BatchTrajectory, frames: _Frames) -> None:
         self._solved, self.reduced = solved, frames.reduced
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:
-        """(B,) those of the window."""
+        """(B,) statistics of the window's solutions."""
         return self._solved.ok
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) those of the window."""
+        """(B,) statistics of the window's solutions."""
         return self._solved.stats

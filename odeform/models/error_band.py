@@ -17,7 +17,7 @@ TINY = 1e-6  # mm
 OUTSIDE = "val.outside"
 """(2, P): by how much the logarithm of errors grows, per half trained range below and above it."""
 FARTHEST = 10.0  # doublings outside the trained range, at which the band stops widening
-ABOUT = 0.05  # share of the frames, on either side, that the quantiles of a frame are taken over
+ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a frame are taken over
 
 
 def error_band(arrays: Arrays) -> "ErrorBand | None":
@@ -27,7 +27,7 @@ def error_band(arrays: Arrays) -> "ErrorBand | None":
 
 
 class ErrorBand:
-    """The RMSE over time that half, and a share `NOMINAL`, of unseen motions with given parameters stay within.
+    """The RMSE over time that half, and a fraction `NOMINAL`, of unseen motions with given parameters stay within.
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
     the product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles
@@ -39,7 +39,7 @@ class ErrorBand:
     """
 
     def __init__(self, arrays: Arrays) -> None:
-        """From `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
+        """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
         self._growth = arrays.get(OUTSIDE)
         self._theta = arrays["val.theta"].astype(float)

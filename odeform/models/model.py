@@ -1,4 +1,4 @@
-"""What the three families of ODeform share: a motion is the solution of an ODE, read out, and a residual."""
+"""Defines what the three families of ODeform have in common: a motion is a solved ODE, read out, and a residual."""
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -52,12 +52,12 @@ class Model(ReducedModel):
     def batch_problem(
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
     ) -> Callable[[], BatchProblem]:
-        """As `problem`, for theta (B, P) and azimuths (B,) in radians; asked of families that solve motions
-        `together`, whenever later times are asked for."""
+        """States what `problem` does for theta (B, P) and azimuths (B,) in radians; families that solve motions
+        `together` are asked for it whenever later times are."""
         raise NotImplementedError
 
     def residual_inputs(self, theta: Floats) -> Any:
-        """What the residual is regressed on, for theta (P,) in [-1, 1], or (B, P): by default theta itself."""
+        """Returns what the residual is regressed on, for theta (P,) in [-1, 1], or (B, P): by default theta itself."""
         return theta
 
     def integrate(

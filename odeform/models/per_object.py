@@ -48,8 +48,8 @@ def joined(schema: Schema, parts: Mapping[str, Checkpoint]) -> Checkpoint:
 
 def _rescaled(part: Checkpoint, schema: Schema) -> Floats:
     """(S, P) the training parameters of a part in the ranges of `schema`."""
-    own, theta = part.schema.learned, part.arrays["training.theta"]
-    values = [{p.name: p.denormalise(float(unit)) for p, unit in zip(own, row, strict=True)} for row in theta]
+    learned, theta = part.schema.learned, part.arrays["training.theta"]
+    values = [{p.name: p.denormalise(float(unit)) for p, unit in zip(learned, row, strict=True)} for row in theta]
     return np.array([schema.vector(row) for row in values], dtype=np.float32)
 
 

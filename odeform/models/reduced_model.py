@@ -1,4 +1,4 @@
-"""What all models of reduced coordinates share: a geometry in, its evaluated basis cached, a motion out."""
+"""Defines models of reduced coordinates: a geometry goes in, its evaluated basis is cached, a motion comes out."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -55,12 +55,12 @@ class ReducedModel(Predictor):
 
     @cached_property
     def space(self) -> ReducedSpace:
-        """That of its coordinates."""
+        """Reads the space of its coordinates."""
         return ReducedSpace.from_parts(self.checkpoint.config["space"], self.checkpoint.arrays, self.rest)
 
     @cached_property
     def dynamics(self) -> Dynamics | None:
-        """What continues motions beyond the trained window; None where they do so by themselves, or stop."""
+        """Reads what continues motions beyond the trained window; None where they do so by themselves, or stop."""
         return Dynamics.from_arrays(self.checkpoint.arrays, self.space.coordinates, len(self.schema.learned))
 
     @cached_property

@@ -23,7 +23,6 @@ __all__ = [
     "load_model",
     "load_reduced",
     "model_class",
-    "models_of",
     "observations",
     "open_checkpoint",
 ]
@@ -45,12 +44,6 @@ def model_class(name: str) -> type[Predictor]:
     if found is None:
         raise InputError(f"unknown model {name!r}: expected one of {', '.join((*MODELS, *registered()))}")
     return found
-
-
-def models_of(kind: type[Kind]) -> dict[str, type[Kind]]:
-    """The registered models that are subclasses of `kind`, by name."""
-    classes = {name: model_class(name) for name in MODELS}
-    return {name: model for name, model in classes.items() if issubclass(model, kind)}
 
 
 def open_checkpoint(name: str | Path) -> Checkpoint:
@@ -94,7 +87,7 @@ def load_model(checkpoint: Checkpoint) -> Predictor:
 
 
 def load_continuous(name: str | Path) -> Predictor:
-    """Like `load`, with `InputError` for a network that only knows its training frames."""
+    """Loads as `load` does; `InputError` for a network that only knows its training frames."""
     predictor = load(name)
     if not predictor.extrapolates:
         raise InputError(
@@ -104,7 +97,7 @@ def load_continuous(name: str | Path) -> Predictor:
 
 
 def load_reduced(name: str | Path) -> ReducedModel:
-    """Like `load`, with `InputError` for a model that is not of reduced coordinates."""
+    """Loads as `load` does; `InputError` for a model that is not of reduced coordinates."""
     predictor = load(name)
     if not isinstance(predictor, ReducedModel):
         raise InputError(f"checkpoint {name}: expected a model of reduced coordinates, got {predictor.model}")

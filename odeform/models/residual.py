@@ -1,4 +1,4 @@
-"""What an ODE leaves unexplained of the training motions, regressed on what causes the motion.
+"""Regresses what an ODE leaves unexplained of the training motions on what causes the motion.
 
 y(t; theta) = weight * ODE(t; theta) + regression(t; theta): the autoregressive scheme of Kennedy and O'Hagan (2000),
 with the ODE in place of the cheap simulation. The regression is that of the training motions less the weighted ODE.
@@ -38,12 +38,12 @@ class FrameRegression(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """What is added to the motion of an ODE in the frames `times`; what it adds in the last stays as it is."""
+    """Adds a regression to a weighted motion of an ODE in the frames `times`; after the last, what it adds stays."""
 
     times: Times
     """(T,) s."""
     weight: Float[np.ndarray, " y"]
-    """(6 + K,) of each coordinate of the ODE's motion."""
+    """(6 + K,) weights of the ODE's motion, by coordinate."""
     regression: FrameRegression
 
     @property
@@ -106,9 +106,9 @@ class RegressedPart:
     modes: Float[np.ndarray, "modes entries"]
     """Trajectories of residuals, flat."""
     mean: Float[np.ndarray, " entries"]
-    """Of the training residuals."""
+    """Mean of the training residuals."""
     weight: float
-    """Of the ODE's own motion."""
+    """Weight of the ODE's motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ class ParameterRegression:
         return out
 
     def first(self, modes: int) -> "ParameterRegression":
-        """Of a model that keeps the first `modes` of its deformation."""
+        """Restricts the regression to a model that keeps the first `modes` of its deformation."""
         (frames, coordinates), parts = self.shape, dict(self.parts)
         if part := parts.get("deformation"):
             flat = np.stack([part.mean, *part.modes]).reshape(-1, frames, coordinates - POSE)

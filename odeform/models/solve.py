@@ -1,4 +1,4 @@
-"""What predictors solve, so that it can be pickled: a motion is solved again from what it was made of."""
+"""Records what predictors solve, so that it can be pickled: a motion is solved again from what it was made of."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -32,7 +32,8 @@ class BatchProblem(NamedTuple):
 
 
 class SolvedBatch:
-    """What `SolvedTrajectory` is of one motion, without the fixed steps that take over where a solver fails."""
+    """Solves many motions as `SolvedTrajectory` does one, without the fixed steps that take over where a solver
+    fails."""
 
     def __init__(
         self, make: Callable[[], BatchProblem], settings: SolverSettings, until: float, least: float = 0.0

@@ -32,7 +32,8 @@ class FloorProjection:
         """`lowest` maps coordinates (R, 6 + K) of `own` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
-        A moment that would have to be raised by more than `most` m stays as it is. With `grid`, in s, the change is linear between these times; after them, each moment has its own.
+        A moment that would have to be raised by more than `most` m stays as it is. With `grid`, in s, the change is
+        linear between these times; after them, each moment has its own.
         """
         self._own, self._lowest, self._limit, self._grid, self._most = own, lowest, limit, grid, most
 

@@ -76,16 +76,16 @@ class FlexBody:
     `step` restores the angular momentum, which only the contact and the applied forces may change.
     """
 
-    def __init__(self, xml: str, reference: Points, shares: Perpoint | None = None) -> None:
+    def __init__(self, xml: str, reference: Points, mass_fractions: Perpoint | None = None) -> None:
         """`xml` is the MuJoCo model; `reference` (N, 3) m are the positions at which all its coordinates are 0.
 
-        `shares` (N,) are the vertices' shares of the mass; by default all are equal.
+        `mass_fractions` (N,) are the vertices' mass fractions; by default all are equal.
         """
         self.model = mujoco.MjModel.from_xml_string(xml)
         self.data = mujoco.MjData(self.model)
-        if shares is not None:
-            masses = self.model.body_mass[-len(shares) :]
-            masses[:] = masses.sum() * shares
+        if mass_fractions is not None:
+            masses = self.model.body_mass[-len(mass_fractions) :]
+            masses[:] = masses.sum() * mass_fractions
             mujoco.mj_setConst(self.model, self.data)
         self._reference = np.array(reference, dtype=float)
         self._coordinates = self.data.qpos[-self._reference.size :].reshape(-1, 3)

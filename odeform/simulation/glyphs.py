@@ -1,4 +1,4 @@
-"""What a viewer draws for the parameters of a scene."""
+"""Describes what a viewer draws for the parameters of a scene."""
 
 from dataclasses import dataclass
 

@@ -24,7 +24,7 @@ def wall_thickness(bending: float, material: Material) -> float:
 def damping_time(thickness: float, material: Material) -> float:
     """Ratio of damping to stiffness in seconds of a wall of `thickness` metres: viscosity / (E h).
 
-    Energy is lost in a lining that is the same for all walls. If damping were a fixed share of the stiffness, every
+    Energy is lost in a lining that is the same for all walls. If damping were a fixed fraction of the stiffness, every
     force would be proportional to mass or to stiffness, and only their ratio could be recovered from a motion.
     """
     return material.viscosity / (material.young * thickness)

@@ -93,7 +93,8 @@ def floor_penetration(bound_mm: float = 5.0) -> PhysicalCheck:
 
 
 def energy_gain(bound: float = 0.05, gravity: float = GRAVITY, driven: float = 0.1) -> PhysicalCheck:
-    """Energy of the rigid motion does not exceed its largest in the share `driven` of the time, by more than `bound`.
+    """Energy of the rigid motion does not exceed its largest in the fraction `driven` of the time, by more than
+    `bound`.
 
     Until then the body falls or is pushed. Later only elastic energy comes back, and no more than went in.
     """
@@ -108,20 +109,20 @@ def energy_gain(bound: float = 0.05, gravity: float = GRAVITY, driven: float = 0
 
 
 def energy_gained(
-    times: Times, poses: Pose, points: Points, shares: Perpoint, gravity: float = GRAVITY, driven: float = 0.1
+    times: Times, poses: Pose, points: Points, mass_fractions: Perpoint, gravity: float = GRAVITY, driven: float = 0.1
 ) -> float:
-    """By how much the energy of the rigid motion later exceeds its largest in the first `driven` of the time; relative.
+    """Measures by how much the energy of the rigid motion later exceeds its largest in the first `driven`; relative.
 
-    `poses` (T, 4, 4) at `times` (T,) s move `points` (N, 3) m, which have their `shares` (N,) of the mass.
+    `poses` (T, 4, 4) at `times` (T,) s move `points` (N, 3) m, which have `mass_fractions` (N,).
     """
-    centre = shares @ points
+    centre = mass_fractions @ points
     path = poses[:, :3, :3] @ centre + poses[:, :3, 3]
     speed = np.gradient(path, times, axis=0)
     # the angle between two poses, over the time between them
     between = poses[:-1, :3, :3].swapaxes(1, 2) @ poses[1:, :3, :3]
     sine = np.linalg.norm(between - between.swapaxes(1, 2), axis=(1, 2)) / np.sqrt(8.0)
     spin = np.arcsin(np.clip(sine, 0.0, 1.0)) / np.diff(times)
-    square = shares @ ((points - centre) ** 2).sum(axis=1)
+    square = mass_fractions @ ((points - centre) ** 2).sum(axis=1)
     energy = gravity * (path[:, 2] - path[:, 2].min()) + 0.5 * (speed**2).sum(axis=1)
     # the mean moment of inertia over all axes is 2/3 of the mean square distance
     energy[1:] += square / 3.0 * spin**2
@@ -163,4 +164,4 @@ def _volume(points: Points, faces: Faces) -> float:
 
 
 STANDARD_CHECKS = (inverted_faces(), edge_strain(), volume_drift(), floor_penetration(), energy_gain())
-"""Those of a soft body over a floor under standard gravity."""
+"""Checks a soft body over a floor under standard gravity."""

@@ -1,4 +1,4 @@
-"""Which sequences a data set consists of: names, parameters and splits, and what of it a folder holds already."""
+"""Plans the sequences of a data set: names, parameters and splits, and what of it a folder holds already."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ def _chosen(scene: Scene, objects: Sequence[str]) -> list[str]:
 
 
 def counts(scene: Scene, count: int, objects: Sequence[str] = ()) -> int | dict[str, int]:
-    """What the provenance of a data set records: the number of sequences, by object in a scene with several."""
+    """Counts the sequences for the provenance of a data set, by object in a scene with several."""
     return dict.fromkeys(_chosen(scene, objects), count) if scene.schema.objects else count
 
 

@@ -50,7 +50,7 @@ class StruckBody:
 
     @property
     def weights(self) -> Floats:
-        """(N,) share of the mass at each vertex, without the projectile."""
+        """(N,) mass fraction at each vertex, without the projectile."""
         return self.body.weights
 
     @property

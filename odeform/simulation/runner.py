@@ -27,7 +27,7 @@ __all__ = ["UNEXPECTED", "simulate"]
 UNEXPECTED = "unexpected"
 """Start of the status of a sequence that failed with anything but a `SimulationError`. The next run tries it again."""
 TEST_RATE = 4  # factor on the frame rate of test sequences, to score between the trained frames
-WRITING = 0.02  # share of the time that goes into writing the index
+WRITING = 0.02  # fraction of the time that goes into writing the index
 TIME_SLACK, WEIGHT_SLACK = 1e-3, 1e-4  # of a frame; of the sum of float32 weights
 
 
@@ -45,7 +45,7 @@ def _one(entry: Entry, simulate: Callable[..., MotionSequence], rate: float, ste
 
 
 def _faults(sequence: MotionSequence, rate: float) -> Iterator[str]:
-    """What is wrong with a sequence simulated at `rate` Hz. Each check assumes that those before it passed."""
+    """Says what is wrong with a sequence simulated at `rate` Hz. Each check assumes that those before it passed."""
     times, vertices, faces, weights = sequence.times, sequence.vertices, sequence.faces, sequence.weights
     if times.ndim != 1 or len(times) < 2:
         yield f"times: expected (T,) with at least 2 frames, got shape {times.shape}"
@@ -81,7 +81,7 @@ class _Index:
         self._next = 0.0
 
     def add(self, entry: Entry) -> None:
-        """Add a finished sequence. The file is written again at most a share of the time: with thousands of entries
+        """Add a finished sequence. The file is written again at most a fraction of the time: with thousands of entries
         this takes as long as a part of a simulation."""
         self.done[entry.name] = entry
         if (begin := time.monotonic()) >= self._next:

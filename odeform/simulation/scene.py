@@ -30,7 +30,7 @@ class Scene:
     schema: Schema
     """Its name, parameters and time window."""
     simulate: Callable[..., MotionSequence]
-    """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the share done,
+    """`simulate(parameters, rate=Hz, step=s)` runs one motion. It also takes `report`, a function of the fraction done,
     and `resolution`, if the scene has `resolutions`. It raises `SimulationError` where the result is not sound."""
     rest_mesh: Callable[[], Mesh]
     """A fine mesh of the undeformed body where the motion starts, for display; of the default object, if there are
@@ -53,9 +53,9 @@ class Scene:
     glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs
     """`glyphs(parameters, rest_points)` are the arrows that show the parameters on a body of points (N, 3) m."""
     checks: tuple[PhysicalCheck, ...] = STANDARD_CHECKS
-    """What `odeform stress` asks of predicted motions."""
+    """Bounds that `odeform stress` checks predicted motions against."""
     contacts: Contacts | None = None
-    """In scenes in which a sphere pushes a body: how strongly, and for how long."""
+    """Says, in scenes in which a sphere pushes a body, how strongly and for how long."""
     sampler: Callable[[str, int, int], list[dict[str, Any]]] | None = None
     """`sampler(object, count, seed)` draws `count` parameter sets of one object ("" in a scene without any), for scenes
     whose parameters do not fill a box. A longer list starts with the shorter one. None: evenly over the box."""

@@ -23,7 +23,7 @@ class Body(Protocol):
 
     @property
     def weights(self) -> Floats:
-        """(N,) share of the mass at each vertex, summing to 1."""
+        """(N,) mass fraction at each vertex, summing to 1."""
         ...
 
     @property

@@ -46,26 +46,26 @@ def methods_of(predictor: Predictor) -> tuple[str, ...]:
     return tuple(name for name, method in METHODS.items() if stiff or not isinstance(method, LinearlyImplicit))
 
 
-def inside(schema: Schema, count: int, seed: int, reach: float = 1.0) -> list[dict[str, Any]]:
-    """`count` parameter sets, uniformly sampled from `reach` times the trained box.
+def inside(schema: Schema, count: int, seed: int, scale: float = 1.0) -> list[dict[str, Any]]:
+    """`count` parameter sets, uniformly sampled from `scale` times the trained box.
 
-    In a scene with objects they are drawn as its data are, of all objects, and then stretched by `reach`.
+    In a scene with objects they are drawn as its data are, of all objects, and then stretched by `scale`.
     """
     scene = find_scene(schema.scene) if schema.objects else None
     if scene is None:
         rng = np.random.default_rng(seed)
-        return [{p.name: p.denormalise(rng.uniform(-reach, reach)) for p in schema.parameters} for _ in range(count)]
+        return [{p.name: p.denormalise(rng.uniform(-scale, scale)) for p in schema.parameters} for _ in range(count)]
     each = -(-count // len(schema.objects))
     drawn = scene.sample(each, seed, schema.objects)
     mixed = [row for index in range(each) for row in drawn[index::each]][:count]
     return [
-        {**row, **{p.name: p.denormalise(reach * p.normalise(row[p.name])) for p in schema.parameters}} for row in mixed
+        {**row, **{p.name: p.denormalise(scale * p.normalise(row[p.name])) for p in schema.parameters}} for row in mixed
     ]
 
 
-def _edges(schema: Schema, reach: float) -> list[dict[str, Any]]:
+def _edges(schema: Schema, scale: float) -> list[dict[str, Any]]:
     """The corners of the box; in a scene with objects, which has none, draws of all objects."""
-    return inside(schema, DRAWS, 0, reach) if schema.objects else schema.corners(reach)
+    return inside(schema, DRAWS, 0, scale) if schema.objects else schema.corners(scale)
 
 
 def extreme_cases(schema: Schema, methods: tuple[str, ...], count: int, seed: int) -> list[Case]:
@@ -81,14 +81,14 @@ def extreme_cases(schema: Schema, methods: tuple[str, ...], count: int, seed: in
 
     out = dict.fromkeys(Case("body", middle, quality) for quality in ways(_limits(window, methods)))
     out |= dict.fromkeys(Case(shape, middle, None) for shape in SHAPES)
-    cornered = [tuple(corner.values()) for reach in SPREADS for corner in _edges(schema, reach)]
+    cornered = [tuple(corner.values()) for scale in SPREADS for corner in _edges(schema, scale)]
     out |= dict.fromkeys(Case("body", v, quality) for v in cornered for quality in ways(_extremes(window, methods)))
     few = ways([random_quality(rng, window, methods) for _ in range(4 if methods else 0)])
     out |= dict.fromkeys(Case("body", v, quality) for v in _enormous(schema, middle) for quality in few)
     while len(out) < count:
-        reach = rng.choice(SPREADS)
+        scale = rng.choice(SPREADS)
         body = (str(rng.choice(schema.objects)),) if schema.objects else ()
-        values = tuple(p.denormalise(float(rng.uniform(-reach, reach))) for p in schema.parameters)
+        values = tuple(p.denormalise(float(rng.uniform(-scale, scale))) for p in schema.parameters)
         out[Case("body", body + values, random_quality(rng, window, methods) if methods else None)] = None
     every = max(len(out) / count, 1.0)
     return [case for index, case in enumerate(out) if index % every < 1.0]

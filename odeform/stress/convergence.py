@@ -54,7 +54,7 @@ def check_orders(model: LatentModel, seed: int = 0) -> Checks:
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     fields = {dtype: make_field(model.weights, model.config, dtype) for dtype in (np.float64, np.longdouble)}
     methods = methods_of(model)
-    off = dict.fromkeys(methods, 0.0)
+    deviations = dict.fromkeys(methods, 0.0)
     for parameters in inside(schema, SAMPLES, seed):
         theta = schema.inputs(parameters)
         start = model.problem(theta, evaluated, np.float64).start
@@ -62,8 +62,8 @@ def check_orders(model: LatentModel, seed: int = 0) -> Checks:
             method = METHODS[name]
             dtype = np.float64 if method.order <= DOUBLE else np.longdouble
             found = _order(fields[dtype](theta), start.astype(dtype), method, schema.window.stop)
-            off[name] = max(off[name], abs(found - method.order))
-    return {f"order_{name}_deviation": Check(value, 0.2) for name, value in off.items()}
+            deviations[name] = max(deviations[name], abs(found - method.order))
+    return {f"order_{name}_deviation": Check(value, 0.2) for name, value in deviations.items()}
 
 
 def check_refining(model: Model, dataset: Dataset) -> Checks:
@@ -75,8 +75,8 @@ def check_refining(model: Model, dataset: Dataset) -> Checks:
 
     def error(quality: SolverSettings) -> float:
         moved = (model.solve(rest, truth.parameters, quality).vertices(truth.times) for rest, truth in truths)
-        off = (one - truth.vertices for one, (_, truth) in zip(moved, truths, strict=True))
-        return float(np.sqrt(np.mean([np.square(one, dtype=float).mean() for one in off])))
+        residuals = (one - truth.vertices for one, (_, truth) in zip(moved, truths, strict=True))
+        return float(np.sqrt(np.mean([np.square(one, dtype=float).mean() for one in residuals])))
 
     def ratios(method: str) -> Iterable[float]:
         errors = [error(SolverSettings(method, step=1.0 / (window.rate * steps))) for steps in STEPS_A_FRAME]

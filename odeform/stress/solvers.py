@@ -83,8 +83,8 @@ def check_calibration(model: Model, seed: int = 0) -> Checks:
     times = np.linspace(0.0, stop, 129)[1:]
     rows = []
     for index in range(CALIBRATION[0]):
-        reach = (1.0, 1.5, 1.0, 10.0)[index % 4]
-        theta = model.inputs(inside(schema, 1, seed + index, reach)[0])
+        scale = (1.0, 1.5, 1.0, 10.0)[index % 4]
+        theta = model.inputs(inside(schema, 1, seed + index, scale)[0])
         truth = model.integrate(theta, evaluated, TRUTH, stop).reduced(times)
         for quality in (
             *model.qualities.values(),
@@ -94,7 +94,7 @@ def check_calibration(model: Model, seed: int = 0) -> Checks:
             reported = motion.stats.solver_error_mm
             if reported is not None:
                 true = 1e3 * motion_rmse(motion.reduced(times), truth, model.space.gyration_radius)
-                rows.append((reach == 1.0, reported, true))
+                rows.append((scale == 1.0, reported, true))
     within, *both = np.array(rows).T
     near = np.abs(np.log2(np.divide(*both))) <= 1.0
     return {
@@ -126,7 +126,7 @@ def check_sensitivities(model: LatentModel, seed: int = 0) -> Checks:
         derivatives = model.sensitivities(theta, times, finest)[1:]
         for unit, exact in zip(np.eye(len(theta)), derivatives, strict=True):
             by = HALF_STEP * unit
-            off = (ends(theta + by) - ends(theta - by)) / (2.0 * HALF_STEP) - exact
+            difference = (ends(theta + by) - ends(theta - by)) / (2.0 * HALF_STEP) - exact
             largest = small_motion(exact, model.space.gyration_radius).max()
-            worst = max(worst, float(small_motion(off, model.space.gyration_radius).max() / largest))
+            worst = max(worst, float(small_motion(difference, model.space.gyration_radius).max() / largest))
     return {"sensitivity_relative": Check(worst, 0.05)}

@@ -48,12 +48,12 @@ def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) ->
 def stability_map(
     predictor: Predictor,
     names: tuple[str, str] | None = None,
-    reach: float = 3.0,
+    scale: float = 3.0,
     count: int = 25,
     moments: tuple[float, ...] = MOMENTS,
     quality: str = "balanced",
 ) -> StabilityMap:
-    """Solve `count` x `count` values of two parameters (default: the first two), up to `reach` times the trained box.
+    """Solve `count` x `count` values of two parameters (default: the first two), up to `scale` times the trained box.
 
     `moments` are the times, in trained windows.
     """
@@ -61,7 +61,7 @@ def stability_map(
     known = {p.name: p for p in schema.learned}
     first, second = (known[name] for name in names or list(known)[:2])
     times = schema.window.stop * np.array(moments)
-    units = np.linspace(-reach, reach, count)
+    units = np.linspace(-scale, scale, count)
     values, sound = np.empty((len(times), count, count)), np.empty((len(times), count, count), dtype=bool)
     for i, j in np.ndindex(count, count):
         given = {first.name: first.denormalise(float(units[j])), second.name: second.denormalise(float(units[i]))}
@@ -96,8 +96,8 @@ def map_image(plot: StabilityMap) -> Image.Image:
         cells = np.where(plot.sound[index][..., None], _colors(plot.values[index]), FAILED).astype(np.uint8)
         panel = Image.fromarray(cells[::-1]).resize((side, side), Image.Resampling.NEAREST)
         image.paste(panel, (left, GAP))
-        reach = plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0])
-        low, high = (0.5 * side * (1.0 + end / reach) for end in (-1.0, 1.0))
+        scale = plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0])
+        low, high = (0.5 * side * (1.0 + end / scale) for end in (-1.0, 1.0))
         case.rectangle((left + low, GAP + low, left + high, GAP + high), outline=(0, 0, 0))
         windows = time / plot.window
         caption = f"{time:.3g} s ({windows:g} trained window{'' if windows == 1.0 else 's'})"

@@ -47,7 +47,7 @@ class Outcome:
     seconds: float
     non_finite: int = 0
     """Number of frames with a non-finite coordinate."""
-    start_off: float = 0.0
+    start_error: float = 0.0
     """Largest difference between the first frame and the rest points, in metres."""
     moved: tuple[float, ...] = ()
     deformed: tuple[float, ...] = ()
@@ -75,18 +75,18 @@ def _evaluated(predictor: Predictor, case: Case, geometry: Geometry, begin: floa
         status=_status(motion, times),
         seconds=time.perf_counter() - begin,
         non_finite=int((~np.isfinite(frames).all(axis=(1, 2))).sum()),
-        start_off=float(np.abs(frames[0] - rest).max()),
+        start_error=float(np.abs(frames[0] - rest).max()),
         moved=tuple(moved.tolist()),
         deformed=tuple(motion.deformation_rms(times).tolist()),
     )
 
 
 def _status(motion: Motion, times: Times) -> str:
-    """That of the solver, and what a motion is held for at any of the (T,) `times` in seconds."""
-    held = next((stop.reason for stop in map(motion.stop_at, times.tolist()) if stop is not None), "")
+    """Joins the solver's status and why a motion is clamped at any of the (T,) `times` in seconds."""
+    clamped = next((stop.reason for stop in map(motion.stop_at, times.tolist()) if stop is not None), "")
     return (
         motion.stats.status
-        + (f", stopped: {held}" if held else "")
+        + (f", stopped: {clamped}" if clamped else "")
         + (", outside the trained box" if motion.outside else "")
     )
 
@@ -155,7 +155,7 @@ def _overall(predictor: Predictor, cases: list[Case], outcomes: list[Outcome]) -
     return {
         "faults": Check(sum(outcome.status.startswith("fault") for outcome in outcomes), 0),
         "non_finite_frames": Check(sum(outcome.non_finite for outcome in outcomes), 0),
-        "start_off_m": Check(max(outcome.start_off for outcome in outcomes), 0.0),
+        "start_off_m": Check(max(outcome.start_error for outcome in outcomes), 0.0),
         "slowest_case_s": Check(max(outcome.seconds for outcome in outcomes), PATIENCE),
         **distance,
         "deformation_growth": Check(float(sound[:, 1].max()), 2.0),

@@ -22,8 +22,8 @@ FAR = 10.0  # windows; nothing moves any more
 
 @dataclass(frozen=True)
 class Shown:
-    """What is shown of one motion: the largest depth below the floor in metres, the number of frames that are not
-    finite, and the seconds from which on it is held, if it is."""
+    """Holds what is shown of one motion: the largest depth below the floor in metres, the number of frames that
+    are not finite, and the seconds from which on it is clamped, if it is."""
 
     depth: float
     non_finite: int
@@ -47,7 +47,7 @@ def shown(predictor: Predictor, parameters: Parameters, seed: int = 0) -> Shown:
 
 
 def check_shown(checkpoint: str, count: int = DRAWS, seed: int = 0) -> tuple[Checks, dict[str, Any]]:
-    """The checks over `count` draws from the trained box, and how many of them are held and from when on."""
+    """The checks over `count` draws from the trained box, and how many of them are clamped and from when on."""
     predictor = load_reduced(checkpoint)
     draws = list(enumerate(inside(predictor.schema, count, seed)))
     found = parallel_map("motions inside the box", partial(_shown_from, checkpoint), draws, batch_size=BATCH)

@@ -1,4 +1,4 @@
-"""From a data set to a scored checkpoint, for every model that can be trained."""
+"""Trains every model that can be: from a data set to a scored checkpoint."""
 
 import platform
 import sys
@@ -197,7 +197,7 @@ def _first(dataset: Dataset, count: int) -> Dataset:
 
 
 def _calibration(predictor: Predictor, dataset: Dataset) -> Arrays:
-    """What `identify` needs to know of the error of an ODE; of baselines it is measured when it is asked for."""
+    """Measures what `identify` needs to know of the error of an ODE; that of baselines is measured when needed."""
     if not isinstance(predictor, Model) or len(dataset.select("val")) < LEAST:
         return {}
     return calibrate(predictor, dataset).arrays()

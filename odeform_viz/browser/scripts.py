@@ -1,4 +1,4 @@
-"""What a page does by itself, without the server: keys, number boxes, the system's theme, clicks on plots."""
+"""Holds what a page does without the server: keys, number boxes, the system's theme, clicks on plots."""
 
 from importlib.resources import files
 from typing import Literal

@@ -1,4 +1,4 @@
-"""What the colors of a frame show: displacement, strain, or the distance from the truth."""
+"""Computes what the colors of a frame show: displacement, strain, or the distance from the truth."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where the scene and the first model come from."""
+"""Tells where the scene and the first model come from."""
 
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel

@@ -1,4 +1,4 @@
-"""What is in view: scene, models and shape, what the colours mean, and what is not to scale."""
+"""Shows what is in view: scene, models and shape, what the colours mean, and what is not to scale."""
 
 from html import escape
 from pathlib import Path

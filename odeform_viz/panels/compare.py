@@ -14,10 +14,10 @@ from odeform.errors import InputError
 from odeform.schema import OBJECT, Schema
 from odeform.simulation.contacts import contact_parameters, push_from, vector_of
 from odeform_viz.columns import Column
-from odeform_viz.own_shapes import own_of, with_own_body
 from odeform_viz.page import Page, Panel
 from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
+from odeform_viz.user_bodies import user_body_of, with_user_body
 
 __all__ = ["ComparePanel", "pinned_label", "sweep", "swept_names"]
 
@@ -33,7 +33,7 @@ def pinned_label(name: str, parameters: Mapping[str, Any], schema: Schema) -> st
 
 
 def swept_names(schema: Schema) -> tuple[str, ...]:
-    """What can be swept: each parameter; in scenes in which a sphere pushes, the force and the objects."""
+    """Lists what can be swept: each parameter; in scenes in which a sphere pushes, the force and the objects."""
     names = tuple(p.name for p in schema.learned)
     return ("force", OBJECT)[: 1 + (len(schema.objects) > 1)] if contacts_of(schema) else names
 
@@ -114,10 +114,10 @@ class ComparePanel(Panel):
         if self._model.value not in self._models:
             raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
         predictor = odeform.load(self._models[self._model.value])
-        fit, own = self._page.model.fit, own_of(self._page.model.predictor)
+        fit, body = self._page.model.fit, user_body_of(self._page.model.predictor)
         column = Column(predictor.model, predictor, predictor.rest, origin=self._model.value)
-        if own is not None:
-            column = with_own_body([column], own)[0]
+        if body is not None:
+            column = with_user_body([column], body)[0]
         elif fit is not None:
             column = replace(column, geometry=fit.geometry, fit=fit)
         self._columns.add(column)

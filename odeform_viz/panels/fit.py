@@ -132,7 +132,7 @@ class _Search:
     """Known parameters, which are not searched."""
     show: Callable[..., None]
     note: str = ""
-    """What has to be known of the estimates."""
+    """Says what has to be known of the estimates."""
     misfits: list[str] = field(default_factory=list)
     key: int | None = None
     hidden: str = ""

@@ -1,4 +1,4 @@
-"""What each tab is for, and the hot keys."""
+"""Explains what each tab is for, and the hot keys."""
 
 import threading
 from collections.abc import Callable, Mapping

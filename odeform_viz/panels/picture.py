@@ -89,7 +89,7 @@ class PicturePanel(Panel):
         pictures = []
         try:
             for number, moment in enumerate(times):
-                if not self._reach(float(moment)):
+                if not self._go_to(float(moment)):
                     return None
                 pictures.append(_draw(client, width, height))
                 self._bar.value = 100.0 * (number + 1) / len(times)
@@ -101,7 +101,7 @@ class PicturePanel(Panel):
         notes = export_notes(page.session, page.request(), whole=True)
         return "motion.webp", webp_bytes(pictures, length / (len(times) - 1), notes)
 
-    def _reach(self, moment: float) -> bool:
+    def _go_to(self, moment: float) -> bool:
         """Show `moment` in seconds with all columns; false if the film was cancelled."""
         page, end = self._page, time.monotonic() + TIMEOUT
         page.pause_at(moment)
@@ -124,8 +124,8 @@ def _draw(client: viser.ClientHandle, width: int, height: int) -> Picture:
 
 
 def _render(client: viser.ClientHandle, width: int, height: int) -> Picture:
-    """What the browser draws. `InputError` if it takes too long; viser's own limit is one of the wall clock, which may
-    jump."""
+    """Asks the browser for what it draws. `InputError` if it takes too long; viser's own limit is one of the wall
+    clock, which may jump."""
     drawn: Future[Picture] = Future()
 
     def render() -> None:

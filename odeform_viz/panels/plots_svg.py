@@ -76,8 +76,8 @@ def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str
 
 def cursor_css(window: Window, time: float) -> str:
     """A style that moves the cursors of all plots to `time` in seconds; sent instead of the plots."""
-    share = (time - window.start) / (shown_until(window) - window.start)
-    return f"<style>.odeform-plots .cursor{{transform:translateX({share * WIDE:.1f}px)}}</style>"
+    fraction = (time - window.start) / (shown_until(window) - window.start)
+    return f"<style>.odeform-plots .cursor{{transform:translateX({fraction * WIDE:.1f}px)}}</style>"
 
 
 def _plot(quantity: Quantity, lines: Sequence[Line], window: Window) -> str:

@@ -1,4 +1,4 @@
-"""What a sphere pushes, where and how hard: an object, a contact to click, and a force in the contact's frame."""
+"""Sets what a sphere pushes, where and how hard: an object, a contact to click, a force in the contact's frame."""
 
 import math
 import threading
@@ -14,11 +14,11 @@ from odeform.schema import OBJECT, Parameter
 from odeform.simulation.contacts import contact_parameters, push_from
 from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column
-from odeform_viz.own_shapes import own_of
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.pushing import ShownPush, contacts_of, push_excess, surface_of
 from odeform_viz.state import PageState
+from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import Description
 
 __all__ = ["PushPanel"]
@@ -36,9 +36,9 @@ class PushPanel(Panel):
         self._lock = threading.RLock()
         self._left: dict[str, dict[str, Any]] = {}  # by object: its parameters when it was left
         self._resumes: tuple[bool, float] | None = None  # whether it played, and when, before the arrow was dragged
-        own = own_of(page.model.predictor)
-        liked = own is not None and own.like in self._schema.objects
-        self._parameters = self._defaults(own.like if own and liked else self._schema.objects[0])
+        body = user_body_of(page.model.predictor)
+        liked = body is not None and body.like in self._schema.objects
+        self._parameters = self._defaults(body.like if body and liked else self._schema.objects[0])
         self._surface = surface_of(page.model, self._parameters)
         gui = page.server.gui
         with gui.add_folder("Push"):
@@ -71,7 +71,7 @@ class PushPanel(Panel):
         return gui.add_slider(name, -WIDEST, WIDEST, 0.5, 0.0, marks=marks, hint=hint)
 
     def parameters(self) -> dict[str, Any]:
-        """Those of the scene. `InputError` for values that no control can have."""
+        """Returns the scene's parameters. `InputError` for values that no control can have."""
         with self._lock:
             self._follow_surface()
             values = self._values()
@@ -143,7 +143,7 @@ class PushPanel(Panel):
         self.set(state.parameters)
 
     def _completed(self, parameters: Mapping[str, Any], changed: bool) -> dict[str, Any]:
-        """With the defaults of an object that was not shown before."""
+        """Adds the defaults of an object that was not shown before."""
         return {**self._defaults(str(parameters[OBJECT])), **parameters} if changed else dict(parameters)
 
     def _defaults(self, name: str) -> dict[str, Any]:
@@ -202,8 +202,8 @@ class PushPanel(Panel):
             surface: Mesh = surface_of(self._page.model, self._parameters)
             if surface is self._surface:
                 return
-            own = own_of(self._page.model.predictor)
-            like = own.like if own and own.like in self._schema.objects else str(self._parameters[OBJECT])
+            body = user_body_of(self._page.model.predictor)
+            like = body.like if body and body.like in self._schema.objects else str(self._parameters[OBJECT])
             self._surface, self._left = surface, {}
             self._parameters = self._defaults(like)
             self._write()

@@ -82,7 +82,7 @@ class QualityPanel(Panel):
 
     @property
     def _frontier(self) -> tuple[FrontierPoint, ...]:
-        """That of the body that the parameters select."""
+        """Returns the frontier of the body that the parameters select."""
         return self._predictor.frontier_of(self._predictor.complete(self._page.controls.parameters()))
 
     def _changed(self) -> None:

@@ -1,4 +1,4 @@
-"""Which part of a loaded shape moves: all of it, or what lies in a sphere or a box that the user drags."""
+"""Selects which part of a loaded shape moves: all of it, or what lies in a sphere or a box that the user drags."""
 
 from collections.abc import Callable
 

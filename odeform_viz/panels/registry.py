@@ -26,7 +26,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Explore", "odeform_viz.panels.parameters:ParameterPanel"),
     Entry("side/Explore", "odeform_viz.panels.quality:QualityPanel"),
     Entry("side/Explore", "odeform_viz.panels.shape:ShapePanel"),
-    Entry("side/Explore", "odeform_viz.panels.own_shape:OwnShapePanel"),
+    Entry("side/Explore", "odeform_viz.panels.user_body:UserBodyPanel"),
     Entry("side/Explore", "odeform_viz.panels.camera:CameraPanel"),
     Entry("side/Explore", "odeform_viz.panels.about:AboutPanel"),
     Entry("side/Compare", "odeform_viz.panels.truth:TruthPanel"),

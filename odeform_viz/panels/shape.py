@@ -14,13 +14,13 @@ from odeform.geometry.shape import FittedShape, fit_to
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.types import Rotations
 from odeform_viz.fitting import MOST_POINTS, describe_fit, shape_from
-from odeform_viz.own_shapes import takes_user_bodies
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.alignment import Alignment
 from odeform_viz.panels.callbacks import LOCK, serialized
 from odeform_viz.panels.region import RegionEditor
 from odeform_viz.panels.uploads import path_of, take_upload
 from odeform_viz.state import PageState
+from odeform_viz.user_bodies import takes_user_bodies
 
 __all__ = ["ShapePanel"]
 

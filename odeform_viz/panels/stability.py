@@ -1,4 +1,4 @@
-"""Where a model is stable: a map over two parameters and time, made on request."""
+"""Maps where a model is stable, over two parameters and time, on request."""
 
 import threading
 

@@ -63,7 +63,7 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
-    """What is wrong with the solution, and from where on the motion is not physically possible."""
+    """Says what is wrong with the solution, and from where on the motion is not physically possible."""
     status, lines = motion.stats.status, []
     if status != "ok":
         last = motion.last_good

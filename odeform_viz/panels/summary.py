@@ -26,7 +26,7 @@ def summarize(frame: Frame) -> str:
 
 
 def _push(frame: Frame) -> list[str]:
-    """What pushes which body, where a sphere does."""
+    """Says what pushes which body, where a sphere does."""
     found = first_push(frame)
     return [] if found is None else [describe_push(*found)]
 

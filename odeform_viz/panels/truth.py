@@ -17,17 +17,17 @@ from odeform.simulation.contacts import vector_of
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import MotionSequence
 from odeform_viz.columns import Column
-from odeform_viz.own_shapes import own_of
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.uploads import content_of, take_upload
 from odeform_viz.pushing import contacts_of
-from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_own_body
+from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_user_body
+from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import Description
 
 __all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
 NONE, SIMULATED = "none", "simulated here"
-OWN = "an .npz file: times (T,) in s, vertices (T, N, 3) in m; if known, faces and parameters"
+FORMAT = "an .npz file: times (T,) in s, vertices (T, N, 3) in m; if known, faces and parameters"
 NO_SIMULATOR = "This scene was imported, so it cannot be simulated here."
 OVERSAMPLING = 4  # simulated frames per frame of training, to compare between those too
 
@@ -74,7 +74,7 @@ class TruthPanel(Panel):
             if self._dataset is not None:
                 self._browser = gui.add_dropdown("test sequence", (NONE, *self._entries))
                 self._browser.on_update(self._chosen)
-            upload = gui.add_upload_button("Open a motion...", color="gray", mime_type=".npz", hint=OWN)
+            upload = gui.add_upload_button("Open a motion...", color="gray", mime_type=".npz", hint=FORMAT)
             upload.on_upload(lambda event: self._upload(take_upload(event)))
             self._build_simulation(gui)
             self._back = gui.add_button("Set sliders to the truth", color="gray", visible=False)
@@ -184,11 +184,11 @@ class TruthPanel(Panel):
         except InputError as error:
             self._page.notices.show("Simulation not started", str(error))
             return
-        rate, own = OVERSAMPLING * self._schema.window.rate, own_of(self._page.model.predictor)
-        if own is None:
+        rate, body = OVERSAMPLING * self._schema.window.rate, user_body_of(self._page.model.predictor)
+        if body is None:
             work, arguments = simulate_motion, (self._schema.scene, parameters, rate)
         else:
-            work, arguments = simulate_own_body, (own.item, parameters, rate)
+            work, arguments = simulate_user_body, (body.item, parameters, rate)
         with self._starting:
             if self._job is not None and self._job.running:
                 return

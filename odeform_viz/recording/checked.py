@@ -26,7 +26,7 @@ class CheckedColumn:
     skipped: str = ""
     """Why the column cannot be computed again."""
     note: str = ""
-    """What one has to know of it: that its shape was not trained."""
+    """Says what has to be known of it: that its shape was not trained."""
     problem: str = ""
     """Why it differs from the recording, regardless of its frames."""
 
@@ -38,13 +38,13 @@ class CheckedColumn:
             return
         distances = np.nan_to_num(np.linalg.norm(recorded - computed, axis=1), nan=np.inf)
         worst = int(distances.argmax())
-        if self.frames == 1 or distances[worst] > self.off:
-            self.off, self.frame, self.time, self.vertex = float(distances[worst]), frame, time, worst
+        if self.frames == 1 or distances[worst] > self.error:
+            self.error, self.frame, self.time, self.vertex = float(distances[worst]), frame, time, worst
 
     def agrees(self, tolerance: float, closed: bool) -> bool:
         """Whether all points agree within `tolerance` m. The last frames of a recording not `closed` may be missing."""
         lacks = self.missing and (closed or not self.frames)
-        return not self.problem and self.off <= tolerance and not lacks
+        return not self.problem and self.error <= tolerance and not lacks
 
     def describe(self) -> str:
         """The result in one line."""
@@ -52,7 +52,8 @@ class CheckedColumn:
             return f"{self.label}: {self.problem or f'skipped, {self.skipped}'}"
         text = f"{self.label}: {self.frames} frames"
         if self.frames:
-            text += f", at most {self.off:.2g} m off (frame {self.frame}, t = {self.time:.4f} s, vertex {self.vertex})"
+            where = f"frame {self.frame}, t = {self.time:.4f} s, vertex {self.vertex}"
+            text += f", at most {self.error:.2g} m off ({where})"
         if self.missing:
             text += f"; the points of {self.missing} more are missing"
         return "; ".join(part for part in (text, self.note, self.problem) if part)

@@ -1,4 +1,4 @@
-"""What Rerun writes to a file, taken through a pipe instead: its own writer hangs for good when the disk is full."""
+"""Takes what Rerun writes to a file through a pipe: its own writer hangs for good when the disk is full."""
 
 import os
 import select

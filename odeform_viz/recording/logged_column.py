@@ -71,7 +71,7 @@ class LoggedColumn:
         self._stream.log(f"{REST}/{name}", rr.Points3D(points), static=True)
         body = f"{WORLD}/{name}/body"
         if isinstance(column.geometry, Mesh):
-            colors = _checkerboard(points, color) if column.geometry.colors is None else _own_colors(column.geometry)
+            colors = _checkerboard(points, color) if column.geometry.colors is None else _vertex_colors(column.geometry)
             mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=colors)
             self._stream.log(body, mesh, static=True)
         elif isinstance(column.geometry, GaussianSplats):
@@ -174,7 +174,7 @@ class LoggedColumn:
             self._status = status
 
 
-def _own_colors(mesh: Mesh) -> np.ndarray:
+def _vertex_colors(mesh: Mesh) -> np.ndarray:
     """Vertex colors (N, 3) of a mesh that has colors: the mean of those at the corners of its faces."""
     assert mesh.colors is not None
     corners = np.asarray(mesh.faces).ravel()

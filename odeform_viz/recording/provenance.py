@@ -1,4 +1,4 @@
-"""Where a column comes from, as plain values: enough to load it again elsewhere, and to notice if it has changed."""
+"""Tells where a column comes from, in plain values that suffice to load it again and to notice a change."""
 
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -35,15 +35,15 @@ def provenance_of(column: Column) -> dict[str, Any]:
     trained body, and left out for other shapes.
     """
     truth = column.truth
-    own = column.predictor if isinstance(column.predictor, UserBodyPredictor) else None
+    user_model = column.predictor if isinstance(column.predictor, UserBodyPredictor) else None
     common = {
         "label": column.label,
         "origin": origin_of(column),
         "pinned": None if column.pinned is None else dict(column.pinned),
         "geometry": _kind(column.geometry),
         "shape": column.fit and fit_to_json(column.fit),
-        "own_body": own is not None,
-        "distance": own and own.distance,
+        "own_body": user_model is not None,
+        "distance": user_model and user_model.distance,
     }
     if truth is not None:
         return {**common, "truth": True, "parameters": dict(truth.parameters)}

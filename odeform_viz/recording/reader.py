@@ -47,7 +47,7 @@ class Recording:
     columns: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     """The provenance of each column."""
     requests: dict[int, Mapping[str, Any]] = field(default_factory=dict)
-    """For each frame `{"time", "quality", "parameters", "columns"}`.
+    """Reads `{"time", "quality", "parameters", "columns"}` of each frame.
 
     `columns` gives, for each visible column, the frame in which its points were logged.
     """
@@ -56,7 +56,7 @@ class Recording:
     faces: dict[str, Faces] = field(default_factory=dict)
     """(F, 3): the faces of columns that are meshes."""
     modes: dict[str, dict[int, Points]] = field(default_factory=dict)
-    """For each column, by the frame in which it was added, a mode (N, 3) of its deformations; see `recording.modes`."""
+    """Reads a mode (N, 3) of each column's deformations, by the frame that added it; see `recording.modes`."""
     coefficients: dict[tuple[str, int], Floats] = field(default_factory=dict)
     """(M,) in m, of the first M modes: the points of a column in a frame."""
     poses: dict[tuple[str, int], Floats] = field(default_factory=dict)

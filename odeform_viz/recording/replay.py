@@ -48,7 +48,7 @@ def replay(path: str | Path, tolerance: float = TOLERANCE) -> bool:
 
 
 def _failure(recording: Recording, checked: list[CheckedColumn], tolerance: float) -> str:
-    """What is wrong, in one line; empty if nothing is."""
+    """Says in one line what is wrong; empty if nothing is."""
     closed = recording.frames is not None
     if closed and recording.frames != len(recording.requests):
         return f"expected {recording.frames} frames, got {len(recording.requests)}"
@@ -71,8 +71,8 @@ def check_recording(recording: Recording) -> list[CheckedColumn]:
 def _check(recording: Recording) -> list[CheckedColumn]:
     columns, checked = _load_columns(recording)
     uses = _uses(recording)
-    if lost := {name for name, _ in uses} - checked.keys():
-        raise InputError(f"recording {recording.path}: no provenance of {', '.join(sorted(lost))}")
+    if missing := {name for name, _ in uses} - checked.keys():
+        raise InputError(f"recording {recording.path}: no provenance of {', '.join(sorted(missing))}")
     session = Session(next(iter(columns.values())).source.schema) if columns else None
     for name, logged, points in recording.points():
         for frame in uses.pop((name, logged), ()):
@@ -92,7 +92,7 @@ def _check(recording: Recording) -> list[CheckedColumn]:
 
 
 def _uses(recording: Recording) -> dict[tuple[str, int], list[int]]:
-    """For each column and each frame in which its points were logged, the frames that show these points."""
+    """Lists, for each column and frame in which its points were logged, the frames that show these points."""
     uses: dict[tuple[str, int], list[int]] = {}
     for frame, request in sorted(recording.requests.items()):
         for name, logged in request["columns"].items():
@@ -144,7 +144,7 @@ def _load_column(recording: Recording, name: str, facts: Mapping[str, Any], mode
 
 
 def _changed(column: Column, recorded: str) -> str:
-    """What to say if the checkpoint has changed; empty if not, or if only what motions do not depend on has."""
+    """Says that the checkpoint has changed; empty if not, or if only what motions do not depend on has."""
     assert column.predictor is not None
     checkpoint = column.predictor.checkpoint
     found = checkpoint.sha256

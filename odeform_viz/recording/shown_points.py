@@ -1,4 +1,4 @@
-"""Which deformations Rerun shows: the largest changes that fit into a recording of bounded size.
+"""Chooses which deformations Rerun shows: the largest changes that fit into a recording of bounded size.
 
 The points that are shown are apart from those that a replay checks: the latter are complete and exact.
 """

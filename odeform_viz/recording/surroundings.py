@@ -1,4 +1,4 @@
-"""What surrounds the columns of a recording: the floor, the part of a scene that does not move, and arrows."""
+"""Logs what surrounds the columns: the floor, the part of a scene that does not move, and arrows."""
 
 from collections.abc import Sequence
 

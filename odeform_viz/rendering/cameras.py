@@ -64,9 +64,9 @@ class Cameras:
         """
         if self._framing is None:
             return False
-        own, initial = self._framing.camera(_size(client)).position, self._server.initial_camera.position
+        framed, initial = self._framing.camera(_size(client)).position, self._server.initial_camera.position
         return bool(
-            np.allclose(client.camera.position, initial, atol=SAME) and not np.allclose(own, initial, atol=SAME)
+            np.allclose(client.camera.position, initial, atol=SAME) and not np.allclose(framed, initial, atol=SAME)
         )
 
 

@@ -62,8 +62,8 @@ def _cut(weights: sparse.csr_array, faces: Faces, height: Floats) -> tuple[spars
     rotated = np.take_along_axis(faces, (first[:, None] + np.arange(3)) % 3, axis=1)[crossed]
     edges = np.concatenate([rotated[:, [0, 1]], rotated[:, [0, 2]], rotated[:, [1, 2]]])
     edges = np.unique(np.sort(edges[height[edges].prod(axis=1) < 0.0], axis=1), axis=0)
-    share = (height[edges[:, 0]] / (height[edges[:, 0]] - height[edges[:, 1]])).astype(np.float32)
-    added = sparse.diags_array(1.0 - share) @ weights[edges[:, 0]] + sparse.diags_array(share) @ weights[edges[:, 1]]
+    part = (height[edges[:, 0]] / (height[edges[:, 0]] - height[edges[:, 1]])).astype(np.float32)
+    added = sparse.diags_array(1.0 - part) @ weights[edges[:, 0]] + sparse.diags_array(part) @ weights[edges[:, 1]]
     number = {(a, b): len(height) + index for index, (a, b) in enumerate(edges.tolist())}
     pieces = [faces[~crossed]]
     for a, b, c in rotated.tolist():

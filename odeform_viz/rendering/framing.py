@@ -1,4 +1,4 @@
-"""Where columns stand and where the camera is, so that each body is whole, unobscured and seen from the same angle.
+"""Places columns and camera so that each body is whole, unobscured and seen from the same angle.
 
 Columns stand on a grid in the plane of the view. A long lens far away shows each of them from nearly one direction.
 """
@@ -32,7 +32,7 @@ SPREAD = 1.5  # largest distance between columns, in widths of a column
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Of a browser: positions (3,) in m, and the vertical field of view in rad."""
+    """Describes a browser's camera: positions (3,) in m, and the vertical field of view in rad."""
 
     position: Vector
     look_at: Vector

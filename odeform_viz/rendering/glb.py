@@ -23,8 +23,8 @@ LINEAR = np.round(65535.0 * np.where(_SRGB <= 0.04045, _SRGB / 12.92, ((_SRGB + 
 class GlbWriter:
     """Writes one mesh again and again with other positions and colors; all else is laid out once."""
 
-    def __init__(self, count: int, faces: Faces, reach: float, opacity: float | None, wireframe: bool) -> None:
-        """A mesh of `count` vertices, never farther than `reach` m from the origin; `opacity` None for opaque."""
+    def __init__(self, count: int, faces: Faces, radius: float, opacity: float | None, wireframe: bool) -> None:
+        """A mesh of `count` vertices, never farther than `radius` m from the origin; `opacity` None for opaque."""
         self._count = count
         index = _edges(faces) if wireframe else faces
         self._index = index.astype(np.uint16 if count < 1 << 16 else np.uint32).tobytes()
@@ -36,7 +36,7 @@ class GlbWriter:
             {"componentType": FLOAT, "count": count, "type": "VEC3"},
             {"bufferView": 2, "componentType": UINT16 if count < 1 << 16 else UINT32, "count": index.size},
         ]
-        accessors[0] |= {"min": [-reach] * 3, "max": [reach] * 3}
+        accessors[0] |= {"min": [-radius] * 3, "max": [radius] * 3}
         accessors[3]["type"] = "SCALAR"
         sizes, offset, views = (12 * count, 8 * count, len(self._index)), 0, []
         for size in sizes:

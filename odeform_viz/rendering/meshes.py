@@ -18,30 +18,31 @@ class MeshView:
 
     def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
         self._rest = np.asarray(mesh.points, dtype=np.float32)
-        own = None if mesh.colors is None else _Own(mesh, mesh.colors)
-        self._own = own and (own, _Colored(server, f"{root}/own", len(own.vertices), own.faces, _reach(mesh)))
-        self._checkerboard = _Checkerboard(server, root, mesh, color) if own is None else None
-        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, _reach(mesh))
+        given = None if mesh.colors is None else _VertexColors(mesh, mesh.colors)
+        radius = _radius(mesh)
+        self._given = given and (given, _Colored(server, f"{root}/own", len(given.vertices), given.faces, radius))
+        self._checkerboard = _Checkerboard(server, root, mesh, color) if given is None else None
+        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, radius)
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         """See `ShapeView`: (N, 3) m. A mesh has no covariances."""
         present = self._rest if points is None else points
         if look.colors is not None:
-            if self._own is not None:
-                self._own[1].hide()
+            if self._given is not None:
+                self._given[1].hide()
             if self._checkerboard is not None:
                 self._checkerboard.hide()
             self._colored.show(present, look.colors, look)
             return
         self._colored.hide()
-        if self._own is not None:
-            own, view = self._own
-            view.show(present[own.vertices], own.colors, look)
+        if self._given is not None:
+            given, view = self._given
+            view.show(present[given.vertices], given.colors, look)
         elif self._checkerboard is not None:
             self._checkerboard.show(points, self._rest, look)
 
 
-class _Own:
+class _VertexColors:
     """The colors of a file, for each vertex: one whose faces differ in color is split.
 
     `vertices` (M,) index those of the mesh; `faces` (F, 3) and `colors` (M, 3) refer to the M.
@@ -55,7 +56,7 @@ class _Own:
         self.colors = colors.reshape(-1, 3)[first]
 
 
-def _reach(mesh: Mesh) -> float:
+def _radius(mesh: Mesh) -> float:
     """Metres from the origin that the deformed mesh stays within, with room to spare."""
     return 4.0 * float(np.abs(mesh.points).max())
 
@@ -87,8 +88,8 @@ class _Checkerboard:
 class _Colored:
     """Everything is sent with each change: viser colors vertices in glTF files only."""
 
-    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, reach: float) -> None:
-        self._server, self._node, self._mesh = server, node, (count, faces, reach)
+    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, radius: float) -> None:
+        self._server, self._node, self._mesh = server, node, (count, faces, radius)
         self._writer: tuple[object, GlbWriter] | None = None
         self._handle: viser.GlbHandle | None = None
         self._sent: tuple[Points, Colors, object] | None = None

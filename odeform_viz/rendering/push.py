@@ -14,7 +14,7 @@ __all__ = ["Pull", "PushView"]
 Pull = Callable[[ShownPush, Vector, str], None]
 """Called while the arrow's tail is dragged: the push as it was, where the tail is (3,) m, and the phase of the drag
 ("start", "update" or "end")."""
-MARKER, GRIP = 0.022, 0.035  # radius of the contact's marker and of the arrow's grip, in sizes of the body
+MARKER, HANDLE_SIZE = 0.022, 0.035  # radius of the contact's marker and of the arrow's handle, in sizes of the body
 SHAFT, HEAD, POINT = 0.016, 0.045, 0.1  # radii and the head's length, likewise
 
 
@@ -35,8 +35,8 @@ class PushView:
         if self._nodes is None:
             self._nodes = _Nodes(self._scene, self._ground, self._body, push)
             if self._pull is not None:
-                self._nodes.grip.on_drag(self._dragged)
-            self._nodes.grip.visible = self._pull is not None
+                self._nodes.handle.on_drag(self._dragged)
+            self._nodes.handle.visible = self._pull is not None
         contact, acting = push.contact(points), push.acts(time)
         self._nodes.marker.position = contact
         self._nodes.place.position = push.shift(pose[:3, :3] @ contact + pose[:3, 3]) if acting else np.zeros(3)
@@ -49,7 +49,7 @@ class PushView:
         if self._pull is None or self._push is None or self._nodes is None:
             return
         if event.phase == "start":
-            self._grabbed = self._push, np.subtract(event.start_position, self._nodes.grip.position)
+            self._grabbed = self._push, np.subtract(event.start_position, self._nodes.handle.position)
         if self._grabbed is not None:
             push, origin = self._grabbed
             self._pull(push, np.subtract(event.end_position, origin), event.phase)
@@ -65,7 +65,7 @@ class _Nodes:
         self.place = scene.add_frame(self._root, show_axes=False)
         self.marker = scene.add_icosphere(f"{body}/contact", 1.0, CONTACT, subdivisions=2, cast_shadow=False)
         self.sphere = scene.add_icosphere(f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4)
-        self.grip = scene.add_icosphere(f"{self._root}/grip", 1.0, HANDLE, subdivisions=2, cast_shadow=False)
+        self.handle = scene.add_icosphere(f"{self._root}/handle", 1.0, HANDLE, subdivisions=2, cast_shadow=False)
         self.label = scene.add_label(f"{self._root}/label", "", anchor="bottom-center")
         self._arrow: viser.ArrowsHandle | None = None
 
@@ -74,8 +74,8 @@ class _Nodes:
         tail, head = push.arrow
         self.marker.scale = MARKER * push.size
         self.sphere.position, self.sphere.visible = push.centre, acting
-        self.grip.position, self.grip.scale = tail, GRIP * push.size
-        self.label.position = tail + np.array([0.0, 0.0, GRIP * push.size])
+        self.handle.position, self.handle.scale = tail, HANDLE_SIZE * push.size
+        self.label.position = tail + np.array([0.0, 0.0, HANDLE_SIZE * push.size])
         text = f"{push.push.strength:.3g} N"
         if self.label.text != text:
             self.label.text = text

@@ -104,7 +104,7 @@ class SceneView:
         self._pick(column, point)
 
     def _frame_columns(self, frame: Frame, row: list[int], options: DisplayOptions, together: bool) -> Framing:
-        """Where columns stand. The cameras are aimed only when that changes, or the body does."""
+        """Places the columns. The cameras are aimed only when that changes, or the body does."""
         shapes = [id(shown.column.geometry) for shown in frame.columns]
         reasons = (row, shapes, together, options.viewport, frame.still is None)
         if frame.columns and self._framed != reasons:
@@ -158,7 +158,7 @@ class _DrawnBody:
     """(4, 4) to the world of the viewport."""
 
     def hit(self, origin: Floats, direction: Floats) -> tuple[float, Column, Vector] | None:
-        """Where a ray meets the body: its distance, the column, and the point (3,) m at rest."""
+        """Describes where a ray meets the body: its distance, the column, and the point (3,) m at rest."""
         turn, shift = self.pose[:3, :3], self.pose[:3, 3]
         found = picked(self.column.geometry, self.points, (origin - shift) @ turn, direction @ turn)
         return None if found is None else (found[1], self.column, found[0])

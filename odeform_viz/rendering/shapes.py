@@ -44,17 +44,17 @@ class _CloudView:
     def __init__(self, server: viser.ViserServer, root: str, cloud: PointCloud, color: Color) -> None:
         self._rest = np.asarray(cloud.points, dtype=np.float32)
         plain = np.tile(np.array(color, dtype=np.uint8), (len(cloud.points), 1))
-        self._own = plain if cloud.colors is None else cloud.colors
+        self._default_colors = plain if cloud.colors is None else cloud.colors
         self._cloud = server.scene.add_point_cloud(
-            f"{root}/points", self._rest, self._own, point_size=0.003, precision="float32"
+            f"{root}/points", self._rest, self._default_colors, point_size=0.003, precision="float32"
         )
-        self._at_rest, self._colors = True, self._own
+        self._at_rest, self._colors = True, self._default_colors
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         if points is not None or not self._at_rest:
             self._cloud.points = self._rest if points is None else points
             self._at_rest = points is None
-        colors: Colors = self._own if look.colors is None else look.colors
+        colors: Colors = self._default_colors if look.colors is None else look.colors
         if colors is not self._colors:
             self._cloud.colors = self._colors = colors
 
@@ -62,7 +62,7 @@ class _CloudView:
 class _SplatView:
     def __init__(self, server: viser.ViserServer, root: str, splats: GaussianSplats) -> None:
         self._unit = _unit(splats)
-        self._own, self._opacities = (
+        self._default_colors, self._opacities = (
             np.round(255.0 * np.clip(part, 0.0, 1.0)).astype(np.uint8)
             for part in (splats.colors, splats.opacities[:, None])
         )
@@ -71,18 +71,18 @@ class _SplatView:
             f"{root}/splats",
             self._centers(splats.points),
             self._covariances,
-            self._own,
+            self._default_colors,
             self._opacities,
             scale=self._unit,
         )
-        self._at_rest, self._colors = True, self._own
+        self._at_rest, self._colors = True, self._default_colors
 
     def _centers(self, points: Floats) -> Points:
         return (points / self._unit).astype(np.float32)
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         """Splats keep their own opacities, and have no wireframe."""
-        colors = self._own if look.colors is None else look.colors
+        colors = self._default_colors if look.colors is None else look.colors
         if points is None and self._at_rest and colors is self._colors:
             return
         rescaled = self._covariances if covariances is None else _rescaled(covariances, self._unit)

@@ -1,4 +1,4 @@
-"""What surrounds the columns: the floor, and the part of a captured scene that does not move."""
+"""Draws what surrounds the columns: the floor, and the part of a captured scene that does not move."""
 
 import numpy as np
 import viser
@@ -11,7 +11,7 @@ from odeform_viz.view import Frame
 
 __all__ = ["Stage", "set_floor_theme"]
 
-SINK = 0.01  # of the body's size
+LOWERED = 0.01  # of the body's size
 LIGHT = {"cell_color": (205, 208, 214), "section_color": (150, 156, 168), "plane_color": (243, 244, 247)}
 DARK = {"cell_color": (52, 55, 61), "section_color": (84, 89, 99), "plane_color": (27, 29, 33)}
 
@@ -46,7 +46,7 @@ class Stage:
         """
         # a floor at zero would cut through splats that lie on it
         splats = any(isinstance(shown.column.geometry, GaussianSplats) for shown in frame.columns)
-        self._floor.position = (0.0, 0.0, -SINK * self._extent if splats else 0.0)
+        self._floor.position = (0.0, 0.0, -LOWERED * self._extent if splats else 0.0)
         self._floor.visible = frame.still is None and not discs
         if frame.still is (self._background and self._background[0]):
             return

@@ -1,4 +1,4 @@
-"""Which addresses and pages may reach the viewer: those of this machine, and those that the user names.
+"""Decides which addresses and pages may reach the viewer: those of this machine, and those that the user names.
 
 A browser lets any website open a websocket to 127.0.0.1, and sends the website's name as `Origin`: that keeps it out.
 The `Host` keeps out a website whose name was made to resolve to 127.0.0.1 (DNS rebinding).
@@ -44,7 +44,8 @@ def reachable_address(host: str) -> str:
 
 @dataclass(frozen=True)
 class Access:
-    """What a server on `host` accepts; `origins` are pages of other addresses, as `https://lab.example:8443`."""
+    """Returns what a server on `host` accepts; `origins` are pages of other addresses, as
+    `https://lab.example:8443`."""
 
     host: str = "127.0.0.1"
     origins: frozenset[tuple[str, str, int]] = frozenset()

@@ -24,9 +24,9 @@ __all__ = [
     "Job",
     "Report",
     "fit_parameters",
-    "own_body_of",
+    "make_user_body",
     "simulate_motion",
-    "simulate_own_body",
+    "simulate_user_body",
     "stability_image",
 ]
 
@@ -145,14 +145,14 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
     return known.simulate(parameters, rate=rate, report=report, **longer)
 
 
-def simulate_own_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
-    """Like `simulate_motion`, for a soft object (`SoftObject`) that is none of the scene's."""
+def simulate_user_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
+    """Simulates a motion of a soft object (`SoftObject`) that is none of the scene's; see `simulate_motion`."""
     from odeform.simulation.scenes.contact_force import UNTIL, simulate_object
 
     return simulate_object(item, parameters, rate, report=report, until=UNTIL)
 
 
-def own_body_of(_: Report, geometry: Geometry, name: str) -> Any:
+def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:
     """A shape as a soft body (`UserBody`)."""
     from odeform.models.modal.user_body import user_body
 

@@ -7,7 +7,7 @@ import threading
 
 import pyarrow as pa
 
-__all__ = ["Tidier", "allocated_mb", "share_memory"]
+__all__ = ["Tidier", "share_memory"]
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # options of mallopt
 HUGE = 4 << 20  # bytes; numpy asks for huge pages for arrays from here on
@@ -57,26 +57,6 @@ class Tidier:
         gc.collect()  # motions and their curves refer to each other
         if self._libc is not None:
             self._libc.malloc_trim(0)
-
-
-class _Usage(ctypes.Structure):
-    """glibc's `mallinfo2`."""
-
-    _fields_ = [(name, ctypes.c_size_t) for name in ["arena", "ordblks", "smblks", "hblks", "hblkhd"]]
-    _fields_ += [(name, ctypes.c_size_t) for name in ["usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"]]
-
-
-def allocated_mb() -> float | None:
-    """MB that malloc has given out and that are not freed (glibc; otherwise None).
-
-    What the process holds besides is code, small objects of Python, and free memory between pieces that are in use.
-    """
-    libc = _glibc()
-    if libc is None or not hasattr(libc, "mallinfo2"):
-        return None
-    libc.mallinfo2.restype = _Usage
-    usage = libc.mallinfo2()
-    return (usage.uordblks + usage.hblkhd) / 1e6
 
 
 def _glibc() -> ctypes.CDLL | None:

@@ -15,7 +15,7 @@ def test_round_shapes_rest_where_the_body_does(predictors: dict[str, Predictor])
     assert np.allclose(mesh.points.max(axis=0), high, atol=2e-3)
 
 
-def test_random_parameters_fill_the_box_under_one_heading(predictors: dict[str, Predictor]) -> None:
+def test_random_parameters_fill_the_box_under_one_azimuth(predictors: dict[str, Predictor]) -> None:
     predictor = predictors["odeform"]
     drawn = random_parameters(predictor, 50)
     assert not any(predictor.schema.outside(predictor.schema.complete(parameters)) for parameters in drawn)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from authors import TETRAHEDRON
-from own_sequences import TABLE, WITHOUT_RATE, folder, heights, imported, obj, refused, refused_all, shape, stl
+from user_sequences import TABLE, WITHOUT_RATE, folder, heights, imported, obj, refused, refused_all, shape, stl
 
 from odeform.cli import main
 from odeform.dataset.importers.registry import import_dataset

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from authors import TETRAHEDRON
 from fuzz.vtk_files import legacy, polydata, unstructured
-from own_sequences import (
+from user_sequences import (
     CORNERS,
     TABLE,
     WITHOUT_RATE,

@@ -4,10 +4,8 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.contact import (
-    CONE,
     RADIUS,
     checked_contact,
-    in_cone,
     nearest_on,
     projectile_centre,
     touching_centre,
@@ -34,7 +32,7 @@ def test_the_nearest_point_of_a_ball(ball: Mesh) -> None:
     assert np.allclose(found.point, [0.06, 0.0, 0.18], atol=1e-3)
     assert np.allclose(found.normal, direction, atol=0.02)
     assert found.distance == pytest.approx(0.05, abs=1e-3)
-    assert found.shares.sum() == pytest.approx(1.0)
+    assert found.barycentric.sum() == pytest.approx(1.0)
     assert np.allclose(found.moved(ball.points + UP, ball.faces), found.point + UP)
 
 
@@ -75,12 +73,6 @@ def test_forces_push_inward_or_are_none(ball: Mesh) -> None:
         checked_contact(ball, side, np.array([1.0, 0.0, 0.0]))
     with pytest.raises(InputError, match="does not fit"):
         checked_contact(ball, np.array([0.03, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-
-
-def test_the_cone() -> None:
-    for angle, inside in ((0.0, True), (0.9 * CONE, True), (1.1 * CONE, False), (np.pi, False)):
-        assert in_cone(UP, 3.0 * np.array([np.sin(angle), 0.0, -np.cos(angle)])) is inside
-    assert in_cone(UP, np.zeros(3))
 
 
 def test_the_projectile_moves_along_the_force_as_far_as_the_surface(ball: Mesh) -> None:

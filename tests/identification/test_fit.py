@@ -12,14 +12,14 @@ def problem(seed: int = 0) -> tuple[Linear, np.ndarray]:
     """A random linear problem without residuals, and variances of its causes."""
     rng = np.random.default_rng(seed)
     spread = rng.normal(size=(TIMES, COORDINATES, CAUSES))
-    gain = rng.normal(size=(TIMES, CAUSES, PARAMETERS))
-    return Linear(np.zeros((TIMES, COORDINATES)), spread, gain), rng.uniform(0.01, 2.0, size=(TIMES, CAUSES)) ** 2
+    jacobian = rng.normal(size=(TIMES, CAUSES, PARAMETERS))
+    return Linear(np.zeros((TIMES, COORDINATES)), spread, jacobian), rng.uniform(0.01, 2.0, size=(TIMES, CAUSES)) ** 2
 
 
 def observed(linear: Linear, variances: np.ndarray, theta: np.ndarray, rng: np.random.Generator) -> Linear:
-    causes = linear.gain @ theta + np.sqrt(variances) * rng.normal(size=variances.shape)
-    off = np.einsum("tnk,tk->tn", linear.spread, causes) + NOISE * rng.normal(size=linear.off.shape)
-    return Linear(off, linear.spread, linear.gain)
+    causes = linear.jacobian @ theta + np.sqrt(variances) * rng.normal(size=variances.shape)
+    residual = np.einsum("tnk,tk->tn", linear.spread, causes) + NOISE * rng.normal(size=linear.residual.shape)
+    return Linear(residual, linear.spread, linear.jacobian)
 
 
 @pytest.mark.parametrize("coordinates", [COORDINATES, 3])
@@ -27,14 +27,15 @@ def test_normal_equations_agree_with_the_full_covariance(coordinates: int) -> No
     """Also with fewer coordinates than causes, which alone could not be determined."""
     linear, variances = problem()
     linear = observed(linear, variances, np.array([0.3, -0.5]), np.random.default_rng(1))
-    linear = Linear(linear.off[:, :coordinates], linear.spread[:, :coordinates], linear.gain)
+    linear = Linear(linear.residual[:, :coordinates], linear.spread[:, :coordinates], linear.jacobian)
     information, score, cost = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS), 0.0
-    for off, spread, gain, squares in zip(linear.off, linear.spread, linear.gain, variances, strict=True):
+    rows = zip(linear.residual, linear.spread, linear.jacobian, variances, strict=True)
+    for residual, spread, jacobian, squares in rows:
         inverse = np.linalg.inv(NOISE**2 * np.eye(coordinates) + spread * squares @ spread.T)
-        slopes = spread @ gain
+        slopes = spread @ jacobian
         information += slopes.T @ inverse @ slopes
-        score += slopes.T @ inverse @ off
-        cost += off @ inverse @ off
+        score += slopes.T @ inverse @ residual
+        cost += residual @ inverse @ residual
     ours = normal_equations(linear, variances, NOISE)
     assert np.allclose(ours[0], information)
     assert np.allclose(ours[1], score)

@@ -14,7 +14,7 @@ from odeform.models.registry import load
 from odeform.solver.integrate import SolverSettings
 from odeform.types import PointCloud
 
-HEADING = 0.7
+AZIMUTH = 0.7
 FINE = SolverSettings("dopri5", tolerance=1e-7, dtype="float64")
 
 
@@ -30,9 +30,9 @@ def observed(predictor: Predictor, theta: np.ndarray, times: np.ndarray, points:
     mesh = predictor.rest
     chosen = np.random.default_rng(0).choice(len(mesh.faces), points, replace=False)
     rest = mesh.points[mesh.faces[chosen]].mean(axis=1)
-    heading = HEADING if predictor.schema.scene == "kick" else 0.0
-    motion = predictor.solve(PointCloud(rest), parameters_of(predictor.schema, theta, heading), FINE)
-    return Observation(rest, times, motion.vertices(times).astype(float), heading, 1e-3)
+    azimuth = AZIMUTH if predictor.schema.scene == "kick" else 0.0
+    motion = predictor.solve(PointCloud(rest), parameters_of(predictor.schema, theta, azimuth), FINE)
+    return Observation(rest, times, motion.vertices(times).astype(float), azimuth, 1e-3)
 
 
 def units(found: Identification) -> np.ndarray:
@@ -125,8 +125,8 @@ def test_few_noisy_points_give_wider_intervals_that_contain_the_truth() -> None:
     noisy = replace(clean, positions=clean.positions + 1e-3 * noise, noise_mm=1.0)
     sure, unsure = (identify(predictor, view, certain(predictor)) for view in (clean, noisy))
     for one, other, truth in zip(sure.parameters.values(), unsure.parameters.values(), theta, strict=True):
-        assert other.reach > 10.0 * one.reach
-        assert abs(other.unit - truth) < 2.0 * other.reach
+        assert other.half_width > 10.0 * one.half_width
+        assert abs(other.unit - truth) < 2.0 * other.half_width
         assert other.identifiable
 
 
@@ -141,8 +141,8 @@ def test_the_expected_model_error_is_subtracted() -> None:
     biased = replace(true, positions=true.positions + np.array([0.0, 0.0, 3.0 + 2.0 * theta[0]]) / 1e3)
     for means_known, close in ((means, True), (whole.means, False)):
         found = identify(predictor, biased, replace(whole, means=means_known))
-        off = max(abs(one.unit - truth) for one, truth in zip(found.parameters.values(), theta, strict=True))
-        assert (off < 1e-3) == close, off
+        error = max(abs(one.unit - truth) for one, truth in zip(found.parameters.values(), theta, strict=True))
+        assert (error < 1e-3) == close, error
 
 
 def test_free_flight_identifies_nothing() -> None:
@@ -167,7 +167,7 @@ def test_unexplained_observations_widen_the_intervals() -> None:
         for positions in (view.positions, other)
     )
     assert unsure.misfit > 100.0
-    assert all(unsure.parameters[name].reach > 10.0 * one.reach for name, one in sure.parameters.items())
+    assert all(unsure.parameters[name].half_width > 10.0 * one.half_width for name, one in sure.parameters.items())
 
 
 def test_a_model_without_gradients() -> None:

@@ -116,10 +116,10 @@ def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[floa
 
 
 @pytest.mark.parametrize("friction", [0.3, 0.45])
-@pytest.mark.parametrize("heading", [0.0, 2.0])
-def test_a_sliding_body_stops_after_the_distance_of_coulomb(block: Block, friction: float, heading: float) -> None:
+@pytest.mark.parametrize("azimuth", [0.0, 2.0])
+def test_a_sliding_body_stops_after_the_distance_of_coulomb(block: Block, friction: float, azimuth: float) -> None:
     free = Free(block, ContactParameters(floor_friction=friction), 1e-3)
-    speed = np.array([np.cos(heading), np.sin(heading), 0.0])
+    speed = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     moving = free.after(free.state(NOTHING, NOTHING, speed, NOTHING), 0.1)
     np.testing.assert_allclose(moving.velocity[0, :3], (1.0 - 0.1 * friction * GRAVITY) * speed, atol=2e-3)
     end = free.after(moving, 0.4)

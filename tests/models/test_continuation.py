@@ -131,7 +131,7 @@ def test_contacts_alone_change_a_flight(pair: tuple[LatentModel, LatentModel]) -
     assert dynamics is not None
     motion, window, theta = pair[1].solve(None, {"mass": 0.6}), pair[1].schema.window, np.zeros((1, 4))
     before, now = motion.trajectory.reduced(window.stop - np.array([1.0, 0.0]) / window.rate)[:, None]
-    low, high = (dynamics.touch + height - now[:, 2] for height in (-dynamics.width, 1.0))
+    low, high = (dynamics.contact_height + height - now[:, 2] for height in (-dynamics.width, 1.0))
     for lifted, changed in ((high, False), (low, True)):
         states = [state + np.eye(1, state.shape[1], 2) * lifted for state in (before, now)]
         added = dynamics.next(*states, theta) - dynamics.flight(*states)
@@ -166,7 +166,7 @@ def test_wrong_arrays_are_refused(flying: Dynamics) -> None:
     arrays = flying.arrays()
     read = Dynamics.from_arrays(arrays, 8, 1)
     assert read is not None
-    assert np.allclose(read.gains, flying.gains, rtol=1e-6)
+    assert np.allclose(read.inverse_lengths, flying.inverse_lengths, rtol=1e-6)
     assert read.pose.inputs.shape == flying.pose.inputs.shape
     with pytest.raises(ValueError, match="shape"):
         Dynamics.from_arrays(arrays, 9, 1)

@@ -17,9 +17,10 @@ from odeform.models.latent.model import LatentModel
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import load, load_model
 from odeform.models.training import continuation
-from odeform.models.training.continuation import fit_dynamics, predicted_errors, refitted, with_continuation
+from odeform.models.training.continuation import fit_dynamics, predicted_errors, with_continuation
 from odeform.simulation.scenes.kick import PULSE
 from odeform.types import Floats
+from odeform_figures.continuation import refitted
 
 RATE, GRAVITY, HEIGHT = 60.0, -10.0, 0.2
 

@@ -92,6 +92,7 @@ def test_arrays_are_a_data_set() -> None:
         ({"parameters": {"stiffness": np.ones(20)}}, "parameter stiffness: expected finite low < high"),
         ({"units": {"mass": "kg"}}, "units: unknown parameter 'mass'"),
         ({"splits": ["train"] * 19 + ["exam"]}, "splits: expected 20 of train, val, test"),
+        ({"surroundings": odeform.Surroundings(gravity=np.inf)}, "surroundings: expected finite numbers"),
         ({"vertices": np.full((20, 13, len(BALL.points), 3), np.nan)}, "vertices, motion_0000"),
     ],
 )
@@ -100,6 +101,17 @@ def test_other_arrays_are_refused(change: dict[str, Any], said: str) -> None:
     given = {"times": TIMES, "vertices": vertices, "parameters": parameters, "faces": BALL.faces}
     with pytest.raises(InputError, match=said):
         odeform.dataset_from_arrays(**{**given, **change})
+
+
+def test_arrays_of_a_scene_of_ones_own_may_have_a_floor(tmp_path: Path) -> None:
+    vertices, parameters = arrays()
+    around = odeform.Surroundings(floor=float(BALL.points[:, 2].min()), gravity=1.6)
+    dataset = odeform.dataset_from_arrays(TIMES, vertices, parameters, BALL.faces, surroundings=around)
+    odeform.fit(dataset, "nearest", report=quiet).save(tmp_path / "moon.safetensors")
+    moon, unknown = odeform.load(tmp_path / "moon.safetensors"), odeform.fit(balls(), "nearest", report=quiet)
+    assert moon.surroundings == around
+    assert (moon.trust.limits.floor, moon.trust.limits.gravity) == (around.floor, 1.6)
+    assert (unknown.surroundings, unknown.trust.limits.floor) == (None, None)
 
 
 def test_nothing_is_written_unless_it_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from odeform.simulation.objects.catalog import OBJECTS, get_object
 
 __all__ = ["draw_object", "main"]
 
-SIZE, FILLED = 300, 0.8  # pixels of a tile; share of it that the object takes
+SIZE, FILLED = 300, 0.8  # pixels of a tile; fraction of it that the object takes
 PAPER = 250
 COLORS = {
     "bottle": (96, 165, 205),

@@ -20,8 +20,8 @@ Position = Sequence[float] | Floats
 
 def smooth_union(first: Perpoint, second: Perpoint, blend: float) -> Perpoint:
     """The union of two solids, with a fillet about `blend` metres wide where they meet."""
-    share = np.clip(0.5 + 0.5 * (second - first) / blend, 0.0, 1.0)
-    return second * (1.0 - share) + first * share - blend * share * (1.0 - share)
+    fraction = np.clip(0.5 + 0.5 * (second - first) / blend, 0.0, 1.0)
+    return second * (1.0 - fraction) + first * fraction - blend * fraction * (1.0 - fraction)
 
 
 def smooth_intersection(first: Perpoint, second: Perpoint, blend: float) -> Perpoint:
@@ -41,9 +41,9 @@ def capsule(points: Floats, start: Position, end: Position, radius: float, end_r
     """A round rod from `start` to `end`, tapering from `radius` to `end_radius`; in the plane, points are (N, 2)."""
     axis = np.subtract(end, start)
     away = points - np.asarray(start)
-    share = np.clip(away @ axis / (axis @ axis), 0.0, 1.0)
+    fraction = np.clip(away @ axis / (axis @ axis), 0.0, 1.0)
     taper = 0.0 if end_radius is None else end_radius - radius
-    return np.linalg.norm(away - share[:, None] * axis, axis=1) - (radius + taper * share)
+    return np.linalg.norm(away - fraction[:, None] * axis, axis=1) - (radius + taper * fraction)
 
 
 def tube(points: Points, path: Sequence[Sequence[float]], radius: float, end_radius: float) -> Perpoint:

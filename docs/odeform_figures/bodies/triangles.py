@@ -14,14 +14,14 @@ STIFFNESS, STRETCH, ROUNDS = 0.2, 1.2, 120  # of the springs between neighbours;
 SLIVER = 0.1  # smallest area of a triangle, in squares of the edge; an even one has 0.43
 
 
-def triangulate(outline: Callable[[Floats], Perpoint], reach: float, edge: float) -> tuple[Floats, Faces]:
+def triangulate(outline: Callable[[Floats], Perpoint], extent: float, edge: float) -> tuple[Floats, Faces]:
     """Vertices (N, 2) m and counter-clockwise triangles (F, 3) with edges of about `edge` m.
 
-    `outline` maps points (N, 2) m to signed distances (N,) m, negative inside; all of that is within `reach` m of the
+    `outline` maps points (N, 2) m to signed distances (N,) m, negative inside; all of that is within `extent` m of the
     origin.
     """
-    rows = np.arange(-reach, reach, 0.5 * np.sqrt(3.0) * edge)
-    x, y = np.meshgrid(np.arange(-reach, reach, edge), rows)
+    rows = np.arange(-extent, extent, 0.5 * np.sqrt(3.0) * edge)
+    x, y = np.meshgrid(np.arange(-extent, extent, edge), rows)
     x[1::2] += 0.5 * edge
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     points = points[outline(points) < 1e-3 * edge]

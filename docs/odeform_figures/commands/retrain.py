@@ -103,8 +103,8 @@ def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command
     from odeform.dataset.store import open_dataset
     from odeform.models.modal.training.fit import with_measured_qualities
     from odeform.models.registry import load_model
-    from odeform.models.training.continuation import refitted
     from odeform.training.train import scored
+    from odeform_figures.continuation import refitted
 
     known = {**recorded.provenance, what: {"command": command, "versions": {"odeform": version("odeform")}}}
     checkpoint, dataset = replace(recorded, provenance=known), open_dataset(name.split("/")[0])

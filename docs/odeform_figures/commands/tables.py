@@ -18,7 +18,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--out", required=True, metavar="FILE.md", help="Markdown file to write")
     parser.add_argument(
-        "--share", type=float, default=1.0, metavar="X", help="fraction of the planned training steps (default: 1)"
+        "--fraction",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="fraction of the planned training steps (default: 1)",
     )
     parser.add_argument(
         "--jobs", type=int, default=cores, metavar="N", help=f"trainings at a time (default: {cores}, one per core)"
@@ -33,9 +37,9 @@ def run(args: argparse.Namespace) -> None:
     from odeform.cluster import on_cluster
     from odeform_figures.tables.tables import tables
 
-    positive("--share", args.share)
+    positive("--fraction", args.fraction)
     positive("--jobs", args.jobs)
     keep = Path(args.keep).resolve()  # workers have other current folders
     keep.mkdir(parents=True, exist_ok=True)
     with on_cluster(args.cluster, shared=keep):
-        tables(keep, Path(args.out), args.share, args.jobs, args.kept_only)
+        tables(keep, Path(args.out), args.fraction, args.jobs, args.kept_only)

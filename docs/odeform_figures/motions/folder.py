@@ -14,7 +14,7 @@ __all__ = ["write_folder"]
 
 SPLITS = ("train", "train", "train", "val", "train", "train", "test", "train", "train", "train",
           "train", "test", "train", "train", "val", "train", "train", "test", "train", "train")  # fmt: skip
-"""Of every twenty sequences: 15 train, 2 val, 3 test."""
+"""Splits every twenty sequences: 15 train, 2 val, 3 test."""
 
 
 def write_folder(kind: Kind, out: Path, seed: int = 0, report: Callable[[str], None] = lambda line: None) -> None:

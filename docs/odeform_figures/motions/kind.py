@@ -1,4 +1,4 @@
-"""What a kind of motion is made of."""
+"""Defines what a kind of motion is made of."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,6 +40,6 @@ class Kind:
 
 
 def smoothstep(values: Floats, start: float, stop: float) -> Floats:
-    """Of any shape (...): from 0 at `start` to 1 at `stop`, with continuous slopes."""
-    share = np.clip((values - start) / (stop - start), 0.0, 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    """Rises from 0 at `start` to 1 at `stop`, with continuous slopes; values have any shape (...)."""
+    fraction = np.clip((values - start) / (stop - start), 0.0, 1.0)
+    return fraction**2 * (3.0 - 2.0 * fraction)

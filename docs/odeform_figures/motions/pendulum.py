@@ -55,8 +55,8 @@ def _move(parameters: dict[str, float], times: Floats) -> tuple[Frames, Faces]:
     angles = _angles(parameters, times)
     fine = np.linspace(0.0, LENGTH, 600)
     # the joint is at the same place of the rope in the data, so that a sequence differs by its motion alone
-    share = smoothstep(fine, 0.5 * (LENGTH - SOFT), 0.5 * (LENGTH + SOFT))
-    phi = angles[:, :1] * (1.0 - share) + angles[:, 1:] * share
+    fraction = smoothstep(fine, 0.5 * (LENGTH - SOFT), 0.5 * (LENGTH + SOFT))
+    phi = angles[:, :1] * (1.0 - fraction) + angles[:, 1:] * fraction
     tangent = np.stack([np.sin(phi), np.zeros_like(phi), -np.cos(phi)], axis=-1)
     step = fine[1]
     line = np.concatenate(

@@ -9,7 +9,7 @@ from odeform_figures.motions.kind import Kind
 __all__ = ["KIND"]
 
 HERTZ = np.array([2.0, 2.3, 5.2, 7.0, 9.0])  # of each mode at stiffness 1
-SHARES = np.array([1.0, 0.5, 0.35, 0.3, 0.2])  # of the amplitude
+AMPLITUDES = np.array([1.0, 0.5, 0.35, 0.3, 0.2])  # of the amplitude
 DAMPING = 0.06  # of the critical
 STIFFENING = 40.0  # 1/m^2: relative frequency per squared amplitude
 
@@ -34,7 +34,7 @@ def _move(parameters: dict[str, float], times: Floats) -> tuple[Frames, Faces]:
     decay = np.exp(-DAMPING * np.outer(times, slow))
     # the phase of an oscillation whose frequency falls with its decaying square
     phase = np.outer(times, slow) + STIFFENING * size**2 * (1.0 - decay**2) / (2.0 * DAMPING)
-    moved = np.einsum("tm,mni->tni", size * SHARES * decay * np.sin(phase), _modes(points))
+    moved = np.einsum("tm,mni->tni", size * AMPLITUDES * decay * np.sin(phase), _modes(points))
     return points + moved, mesh.faces
 
 

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from odeform.benchmark.timing import as_viewed
 from odeform.cli import run_guarded
-from odeform.io import write_or_print
 from odeform.models.registry import load_reduced
+from odeform_figures.output import write_or_print
 from odeform_figures.speed.ablations import ablations
 from odeform_figures.speed.startup import startup
 

@@ -54,9 +54,9 @@ def with_modes(motion: ReducedMotion, modes: int) -> ReducedMotion:
 def _interpolated(coarse: Floats, coarse_rest: Floats, rest: Floats) -> Floats:
     """(T, M, 3), (M, 3), (N, 3) m -> (T, N, 3) m: points follow the nearest three, weighted by inverse distance."""
     distance, index = KDTree(coarse_rest).query(rest, k=3)
-    share = 1.0 / np.maximum(distance, 1e-9)
-    share /= share.sum(axis=1, keepdims=True)
-    return rest + np.einsum("tnkj,nk->tnj", (coarse - coarse_rest)[:, index], share)
+    weights = 1.0 / np.maximum(distance, 1e-9)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return rest + np.einsum("tnkj,nk->tnj", (coarse - coarse_rest)[:, index], weights)
 
 
 def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
@@ -75,7 +75,7 @@ def ablations(predictor: ReducedModel) -> list[dict[str, Any]]:
 
     whole = typical(lambda i: motion.vertices(float(moments[i % len(moments)])), len(moments))
     rows, modes = [], len(motion.evaluated.values)
-    for kept in dict.fromkeys(max(modes // share, 1) for share in (2, 4, 8)):
+    for kept in dict.fromkeys(max(modes // part, 1) for part in (2, 4, 8)):
         fewer = with_modes(motion, kept)
         rows.append(row(f"{kept} of {modes} modes", fewer.vertices, fewer.vertices(times)))
     # without deformation a frame is a pose, which the renderer applies

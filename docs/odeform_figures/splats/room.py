@@ -47,8 +47,8 @@ def _glass(x: Floats, z: Floats, blur: Floats | float) -> Perpoint:
     """Transparency from 0 to 1 on the left wall: panes between the frame and its bars."""
     left, right, low, high = PANE
     out = _step((x - left) / blur) * _step((right - x) / blur) * _step((z - low) / blur) * _step((high - z) / blur)
-    for value, share, start, stop in ((x, 0.5, left, right), (z, 0.38, low, high), (z, 0.76, low, high)):
-        out = out * _step((np.abs(value - start - share * (stop - start)) - BAR) / blur)
+    for value, fraction, start, stop in ((x, 0.5, left, right), (z, 0.38, low, high), (z, 0.76, low, high)):
+        out = out * _step((np.abs(value - start - fraction * (stop - start)) - BAR) / blur)
     return out
 
 

@@ -31,7 +31,7 @@ SEAM = 1.3e-3  # m, half the width of a groove
 REGION = Sphere(np.array([0.0, 0.0, 0.105]), 0.1052)
 """The ball, in metres with z up. It touches the floor from above and contains none of it."""
 FILE = Similarity(rotation=UPRIGHT["-y"].T)
-"""From z up to the axes of captures: y down, z forward."""
+"""Turns z up into the axes of captures: y down, z forward."""
 
 
 def volleyball_in_room() -> GaussianSplats:

@@ -13,18 +13,18 @@ import numpy as np
 
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.rigid import best_rigid
-from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.scenes.contact_force import SCENE, contact_and_force, simulate
 from odeform.types import Floats, MotionSequence
+from odeform_figures.output import write_or_print
 
 __all__ = ["main", "study"]
 
 ASIDE = 1e-3  # m by which a contact is moved along the surface
-STRONGER = 0.02  # share by which a force is raised
+STRONGER = 0.02  # fraction by which a force is raised
 
 
 def study(count: int, seed: int, workers: int) -> dict[str, Any]:

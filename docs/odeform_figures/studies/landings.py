@@ -52,10 +52,10 @@ def pictures(names: list[str]) -> Image.Image:
             frame = landing(truth, stop)
             moment = float(truth.times[frame])
             shown = model.solve(truth.rest, parameters).vertices(moment)
-            off = 1e3 * float(np.sqrt(np.square(shown - truth.vertices[frame]).mean()))
-            print(f"{name} {parameters}: {moment:.3f} s, RMSE {off:.2f} mm", flush=True)
+            difference = 1e3 * float(np.sqrt(np.square(shown - truth.vertices[frame]).mean()))
+            print(f"{name} {parameters}: {moment:.3f} s, RMSE {difference:.2f} mm", flush=True)
             soft = parameters is extremes[0]
-            said = f"{name}, {'softest' if soft else 'stiffest'}\n{moment:.2f} s, RMSE {off:.1f} mm"
+            said = f"{name}, {'softest' if soft else 'stiffest'}\n{moment:.2f} s, RMSE {difference:.1f} mm"
             columns.append(_column(truth, frame, shown, said))
     whole = Image.new("RGB", (sum(c.width for c in columns), columns[0].height), "white")
     for index, column in enumerate(columns):

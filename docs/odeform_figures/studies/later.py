@@ -16,13 +16,14 @@ from jaxtyping import Float
 from odeform.dataset.index import Dataset, Entry
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.io import atomic_write, write_or_print
+from odeform.io import atomic_write
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.parallel import parallel_map
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Faces, Floats, Frames, Mesh
+from odeform_figures.output import write_or_print
 
 __all__ = ["RESTS", "Later", "compare_later", "simulate_later"]
 
@@ -33,8 +34,8 @@ RESTS = "rest_speed_m_s"  # of the fixed values of scenes whose motions are simu
 SPEED = 0.05  # s at the end, over which the speed is measured
 COUNT = 16
 SUMMARY = ("highest_mm", "speed_at_the_end_mm_s", "energy_at_the_end_mJ_kg")
-"""What is left of a motion: how high it still gets, and at the end the speed along the floor and the energy of its
-centre, without those of spin and deformation."""
+"""Figures of what is left of a motion: how high it still gets, and at the end the speed along the floor and the
+energy of its centre, without those of spin and deformation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +79,8 @@ def _simulated(scene: str, until: float, keep: Path | None, entry: Entry) -> Fra
 
 
 def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
-    """By span: errors in mm, and which share of the frames the 90 % band covers, if the model has one. And the median
-    difference of each figure of `SUMMARY`, predicted and simulated."""
+    """Returns, by span, errors in mm, and which fraction of the frames the 90 % band covers, if the model has one. And
+    the median difference of each figure of `SUMMARY`, predicted and simulated."""
     window, errors, bands, ends = model.schema.window, [], [], []
     for entry, truth in zip(later.entries, later.vertices, strict=True):
         motion = model.solve(Mesh(truth[0], later.faces), entry.parameters)
@@ -101,8 +102,8 @@ def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
             "largest_mm": float(of_motions.max()),
             "coverage_90": float((rmse[:, inside] <= band_90[:, inside]).mean()) if known else None,
         }
-    off = np.abs(np.diff(np.array(ends), axis=1)[:, 0])
-    differences = {name: float(np.median(column)) for name, column in zip(SUMMARY, off.T, strict=True)}
+    difference = np.abs(np.diff(np.array(ends), axis=1)[:, 0])
+    differences = {name: float(np.median(column)) for name, column in zip(SUMMARY, difference.T, strict=True)}
     return {"motions": len(errors), "windows": spans, "median_difference": differences}
 
 

@@ -1,4 +1,4 @@
-"""What a study measures on the motions of a scene, besides the effect of the time step."""
+"""Measures the motions of a scene for its study, besides the effect of the time step."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -98,7 +98,7 @@ SCENES: dict[str, Callable[[], Measurements]] = {
     "kick": lambda: _bouncing("kick", ("mass", "bending", "force")),
     "mass-elastic": lambda: _bouncing("mass-elastic", ("mass", "bending")),
 }
-"""By name of the scene. Of others, a study measures the effect of the time step and the marks of all parameters."""
+"""Measurements by name of the scene. In others, a study measures the effect of the time step and of all marks."""
 
 
 def measurements_of(scene: str) -> Measurements:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.io import write_or_print
 from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters
 from odeform.simulation.scenes.registry import SCENES, get_scene
 from odeform.types import MotionSequence
+from odeform_figures.output import write_or_print
 from odeform_figures.studies.measurements import Measurements, measurements_of
 
 __all__ = ["main", "study"]

@@ -1,4 +1,4 @@
-"""What the sections of the page of tables are made of: paragraphs, tables, and scores of runs."""
+"""Makes what sections of the page of tables consist of: paragraphs, tables, and scores of runs."""
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence

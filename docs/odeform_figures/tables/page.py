@@ -35,7 +35,7 @@ PAIR = (METRICS[0], SHAPE)
 def page(found: Mapping[str, Any]) -> str:
     """Markdown of the results that `odeform_figures.tables.tables` collects."""
     runs: Mapping[str, Runs] = found["runs"]
-    share = f" --share {found['share']:g}" if found["share"] != 1.0 else ""
+    fraction = f" --fraction {found['share']:g}" if found["share"] != 1.0 else ""
     commands = dict.fromkeys(
         f"- `{result['command']}` ({result['seconds']:.0f} s)" for of in runs.values() for result in of.values()
     )
@@ -44,7 +44,7 @@ def page(found: Mapping[str, Any]) -> str:
             "# Tables I to V, ablations and learning curve",
             "",
             *paragraph(
-                f"Written by `odeform tables{share}`.",
+                f"Written by `odeform tables{fraction}`.",
                 "Within a table every model is trained on the same data and split, with a fixed budget of steps that",
                 "includes trials of its settings on the validation split.",
                 "Unlike minutes, steps do not depend on the load of the machine.",

@@ -61,7 +61,7 @@ ABLATED = {
 """Parts that ablations leave out, by model and scene. Of the latent ODE, the regression of what is left would hide what
 other parts give."""
 SEEDLESS = (OURS, DROP, ("network",))
-"""What is left there has nothing random: other seeds give the same model."""
+"""Ablations whose remainder has nothing random: other seeds give the same model."""
 MINUTES = {DROP: 4, "kick": 12}
 """About what the budget of each scene took on an idle core when it was set."""
 PUSH_STEPS = {"direct": 4800, "node": 2400, "rnn": 3300, "pe-gnn": 8400}
@@ -78,8 +78,8 @@ SUBSAMPLED_STEPS = {3: 240, 5: 180, 8: 120}
 """Steps of `odeform` on every 3rd, 5th or 8th frame of the drop: a step then takes more sequences."""
 
 
-def plan(share: float = 1.0) -> dict[str, list[Run]]:
-    """The runs of each table, with `share` of their steps."""
+def plan(fraction: float = 1.0) -> dict[str, list[Run]]:
+    """The runs of each table, with `fraction` of their steps."""
     tables = {
         "I": [_pushed(model) for model in ("odeform", *BASELINES)] + list(_each_object()),
         "II": [run for scene in BALLS for run in _unseen(scene)]
@@ -95,7 +95,7 @@ def plan(share: float = 1.0) -> dict[str, list[Run]]:
         "learning curve": list(_curve()),
     }
     return {
-        table: [run if run.steps is None else replace(run, steps=max(round(share * run.steps), 1)) for run in runs]
+        table: [run if run.steps is None else replace(run, steps=max(round(fraction * run.steps), 1)) for run in runs]
         for table, runs in tables.items()
     }
 

@@ -76,7 +76,7 @@ class Run:
 
     @property
     def request(self) -> TrainRequest:
-        """What to ask of the trainer."""
+        """Returns what to ask of the trainer."""
         window = (0, self.until) if self.until else None
         shared = {name: getattr(self, name) for name in ("model", "seed", "steps", "every", "stagger")}
         kept = {name: getattr(self, name) for name in ("sequences", "without", "objects")}

@@ -45,7 +45,7 @@ def ablations(runs: Runs) -> list[str]:
 
 
 def _label(parts: Sequence[str]) -> str:
-    """What a row leaves out, in words."""
+    """Says in words what a row leaves out."""
     return "; ".join(LABELS[part] for part in sorted(parts, key=list(LABELS).index)) or "nothing"
 
 

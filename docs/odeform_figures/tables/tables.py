@@ -33,16 +33,16 @@ __all__ = ["tables"]
 Found = dict[str, Any]
 
 
-def tables(folder: Path, out: Path, share: float, jobs: int, kept_only: bool = False) -> None:
+def tables(folder: Path, out: Path, fraction: float, jobs: int, kept_only: bool = False) -> None:
     """Write the Markdown page `out`.
 
     `folder` keeps checkpoints and scores, so that an interrupted call is continued; `jobs` runs are trained at a time.
-    `share` scales the planned training steps. With `kept_only` nothing is trained and missing entries stay empty.
+    `fraction` scales the planned training steps. With `kept_only` nothing is trained and missing entries stay empty.
     """
-    planned = plan(share)
+    planned = plan(fraction)
     results = complete_runs([run for runs in planned.values() for run in runs], folder, jobs, kept_only)
     found = {
-        "share": share,
+        "share": fraction,
         "runs": {table: {run: results[run] for run in runs if run in results} for table, runs in planned.items()},
         "shipped": _kept(folder / "shipped.json", [_sha256(scene) for scene in FRAMES], _shipped),
         "simple": _kept(folder / "simple.json", ["continued", UNTIL, AHEAD, INTERVALS, IMPACT], _simple),

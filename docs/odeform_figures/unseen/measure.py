@@ -23,7 +23,7 @@ class Measured:
 
     shape: UnseenShape
     distance: float
-    """From what was trained, see `UserBodyPredictor.distance`."""
+    """Distance from what was trained; see `UserBodyPredictor.distance`."""
     errors: Float[np.ndarray, "pushes times"]
     """mm, RMSE of the model."""
     predicted: Float[np.ndarray, "pushes times"]
@@ -34,7 +34,7 @@ class Measured:
     def to_json(self, seen: Mapping[str, Any]) -> dict[str, Any]:
         """Pooled RMSEs in mm of the displacement (`moved_mm`), the model, it without deformation (`rigid_mm`) and the
         nearest trained object's motion. `ratio` is that to the error of the trained shape, whose scores are `seen`;
-        `relative_ratio` is the same for errors as shares of the displacement."""
+        `relative_ratio` is the same for errors as fractions of the displacement."""
         relative = self.pooled["model_mm"] / self.pooled["moved_mm"]
         return {
             "kind": self.shape.kind,
@@ -73,7 +73,7 @@ def measure(predictor: UserBodyPredictor, nearest: Predictor, shape: UnseenShape
             "rigid_mm": pooled([one.rigid - one.truth for one in found]),
             "nearest_mm": pooled([one.nearest - one.truth for one in found]),
             "error_of_shift_mm": pooled([shift for shift, _, _ in parts]),
-            "error_of_rotation_mm": pooled([turn for _, turn, _ in parts]),
+            "error_of_rotation_mm": pooled([rotated for _, rotated, _ in parts]),
             "error_of_deformation_mm": pooled([bend for _, _, bend in parts]),
             "best_share_of_deformation": fitting / sum(float((mine**2).sum()) for mine, _ in local),
         },
@@ -88,12 +88,12 @@ def _rmse(error: Frames) -> Floats:
 def _parts(one: Predictions, rest: Points, weights: Perpoint) -> tuple[Frames, Frames, Frames]:
     """(T, N, 3) m: what the shift, the rotation and the deformation of the model are off, in axes of the scene."""
     moved = [_split(rest, frames, weights) for frames in (one.model, one.truth)]
-    shift, turn, bend = (mine - true for mine, true in zip(*moved, strict=True))
-    return np.broadcast_to(shift, turn.shape), turn, bend
+    shift, rotated, bend = (mine - true for mine, true in zip(*moved, strict=True))
+    return np.broadcast_to(shift, rotated.shape), rotated, bend
 
 
 def _split(rest: Points, displaced: Frames, weights: Perpoint) -> tuple[Floats, Frames, Frames]:
     rotation, shift = best_rigid(rest, rest + displaced, weights)
-    arms = rest - weights @ rest
-    turn = arms @ rotation.swapaxes(1, 2) - arms
-    return shift[:, None], turn, displaced - shift[:, None] - turn
+    centred = rest - weights @ rest
+    rotated = centred @ rotation.swapaxes(1, 2) - centred
+    return shift[:, None], rotated, displaced - shift[:, None] - rotated

@@ -25,9 +25,9 @@ class Predictions:
     truth: Frames
     model: Frames
     rigid: Frames
-    """Those of the model with its deformation set to zero."""
+    """Predictions of the model with its deformation set to zero."""
     nearest: Frames
-    """Those of the nearest trained object under the same push."""
+    """Predictions of the nearest trained object under the same push."""
 
 
 def predictions(predictor: UserBodyPredictor, nearest: Predictor, truth: MotionSequence) -> Predictions:

@@ -51,7 +51,7 @@ def instance(key: str, name: str, factors: Mapping[str, float]) -> UnseenShape:
 
 def scan(path: Path) -> UnseenShape:
     """The body of a mesh, aligned automatically. `InputError` for a file that holds no mesh of a solid."""
-    from odeform.simulation.objects.foreign import placed_object
+    from odeform.simulation.objects.from_mesh import placed_object
 
     mesh = read_geometry(path)
     if not isinstance(mesh, Mesh):
@@ -71,7 +71,7 @@ def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:
 
 
 def shape_file(folder: Path, name: str, count: int, seed: int) -> Path:
-    """Where the motions of a shape under `count` pushes are kept."""
+    """Names where the motions of a shape under `count` pushes are kept."""
     return folder / f"{name}.{count}-pushes.seed-{seed}.npz"
 
 

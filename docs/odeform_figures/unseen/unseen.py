@@ -32,12 +32,12 @@ HALVES = 50  # random halves of the shapes on which the error band is fitted, an
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure."""
+    """Settings of what is measured."""
 
     keep: Path
     """Folder of simulated motions and laws; what it holds is not made again."""
     pushes: int = 10
-    """Of each shape."""
+    """Number of pushes of each shape."""
     seed: int = 0
     objects: tuple[str, ...] = ()
     """Classes with other instances; none: those of the model."""

@@ -54,7 +54,7 @@ def seconds_to_newest(visitors: Visitors, dragging: LoopbackClient) -> float:
 
 
 def _vertices(app: App, value: float) -> Points:
-    """What a browser is sent for the body at a value of the slider."""
+    """Returns what a browser is sent for the body at a value of the slider."""
     column = app.columns.all[0]
     assert column.predictor is not None
     assert isinstance(column.geometry, Mesh)

@@ -9,7 +9,7 @@ from odeform_figures.viewer_benchmark.client import Control, LoopbackClient
 
 __all__ = ["send_random_input"]
 
-INVALID_SHARE, COMMAND_SHARE = 0.1, 0.05
+INVALID_FRACTION, COMMAND_FRACTION = 0.1, 0.05
 INVALID_NUMBERS = (float("nan"), float("inf"), -1e9, 1e9)
 INVALID_CHOICE = "nonsense"
 TETRAHEDRON = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -38,7 +38,7 @@ LABEL_WEIGHTS = {
 
 def send_random_input(client: LoopbackClient, rng: np.random.Generator, folder: Path) -> None:
     """Press a command, or set a visible control to a random value. Recordings are put into `folder`."""
-    if rng.random() < COMMAND_SHARE:
+    if rng.random() < COMMAND_FRACTION:
         client.press(str(rng.choice(client.commands)))
         return
     controls = {label: c for label, c in client.controls.items() if c.visible and not c.props.get("disabled")}
@@ -55,7 +55,7 @@ def send_random_input(client: LoopbackClient, rng: np.random.Generator, folder: 
 
 
 def _value(control: Control, rng: np.random.Generator, folder: Path) -> Any:
-    invalid = rng.random() < INVALID_SHARE
+    invalid = rng.random() < INVALID_FRACTION
     if control.kind == "Slider":
         return float(
             rng.choice(INVALID_NUMBERS) if invalid else rng.uniform(control.props["min"], control.props["max"])

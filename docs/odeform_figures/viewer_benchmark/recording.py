@@ -38,6 +38,6 @@ def record_playback(model: Predictor, origin: str, seconds: float, points: int, 
         "frames": float(recorder.frames),
         "replayed frames": float(checked.frames),
         "size_mb": recorder.path.stat().st_size / 1e6,
-        "largest_off_m": checked.off,
+        "largest_off_m": checked.error,
         "ms_per_frame": 1e3 * logging / recorder.frames,
     }

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from odeform_figures.viewer_benchmark.allocated import allocated_mb
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_figures.viewer_benchmark.newest import seconds_to_newest
 from odeform_figures.viewer_benchmark.random_input import send_random_input
@@ -18,7 +19,6 @@ from odeform_figures.viewer_benchmark.resetting import reset
 from odeform_figures.viewer_benchmark.use import SCRIPTS
 from odeform_figures.viewer_benchmark.visitors import Missed, Visitors
 from odeform_viz.app import App
-from odeform_viz.runtime.memory import allocated_mb
 
 __all__ = ["GROWTH", "Soak", "soak"]
 
@@ -44,7 +44,7 @@ class Soak:
     resident_mb: tuple[float, ...]
     """Resident memory of the process, the browsers' clients included."""
     allocated_mb: tuple[float, ...]
-    """Of that, what is allocated; empty where it is not known."""
+    """Allocated part of the resident memory; empty where it is not known."""
     wall_s: float
 
     @property

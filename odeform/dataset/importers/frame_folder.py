@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.frame_names import numbered_frames
 from odeform.dataset.importers.frame_reading import VTK, displacement_field, read_displaced, read_frames
 from odeform.dataset.importers.recording import Recording
@@ -47,7 +47,7 @@ def recorded_files(files: Sequence[Path], where: str, times: Times | None = None
 
 
 def visible(folder: Path) -> list[Path]:
-    """What is in a folder, without hidden files and what systems leave behind (`__MACOSX`), by name."""
+    """Lists a folder by name, without hidden files and what systems leave behind (`__MACOSX`)."""
     try:
         return sorted(path for path in folder.iterdir() if not path.name.startswith((".", "__MACOSX")))
     except OSError as error:

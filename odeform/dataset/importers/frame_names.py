@@ -1,4 +1,4 @@
-"""Which files are the frames of a sequence, and what their names say of order and time."""
+"""Finds which files are the frames of a sequence, and what their names say of order and time."""
 
 import re
 from collections import Counter
@@ -113,7 +113,7 @@ def _varying_columns(names: list[_Name]) -> list[int]:
 
 
 def _varying(names: list[_Name], where: str) -> int:
-    """Which number of the names counts the frames. Others may grow with it, as in frame_0010_0.25s."""
+    """Finds which number of the names counts the frames. Others may grow with it, as in frame_0010_0.25s."""
     varying = _varying_columns(names)
     first, second = (name.path.name for name in names[:2])
     if len(varying) == 1:

@@ -51,7 +51,7 @@ def displacement_field(files: Sequence[Path], where: str) -> str:
 
 
 def read_displaced(files: Sequence[Path], field: str) -> tuple[Frames, Faces]:
-    """As `read_frames` of files of VTK, whose points stand still and are displaced by a field of vectors."""
+    """Reads frames from files of VTK whose points stand still and are displaced by a field of vectors."""
     frames, first, faces = [], None, None
     for file in files:
         grid = read_grid(file, f"import {file}")

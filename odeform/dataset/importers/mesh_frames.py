@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from unicodedata import normalize
 
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.frame_folder import visible
 from odeform.dataset.importers.parameter_table import Row, find_table, has_table, read_rows
 from odeform.dataset.importers.recording import Recording, common_rate, frames_at
@@ -53,7 +53,7 @@ def mesh_source(root: Path, rate: float | None = None) -> Source:
 
 
 def _stored(root: Path) -> Stored:
-    """What a row may name: folders, and files of sequences with and without their ending."""
+    """Lists what a row may name: folders, and files of sequences with and without their ending."""
     stored: dict[str, list[Path]] = {}
     for path in visible(root):
         if path.is_dir() or path.suffix.lower() in SEQUENCE_FILES:

@@ -8,7 +8,7 @@ __all__ = ["naturally_sorted", "subfolders"]
 
 
 def naturally_sorted(paths: Iterable[Path]) -> list[Path]:
-    """By name, with frame_2 before frame_10. Hidden files are left out."""
+    """Sorts by name, with frame_2 before frame_10. Hidden files are left out."""
 
     def key(path: Path) -> list[tuple[int, int, str]]:
         parts = re.split(r"(\d+)", path.name)

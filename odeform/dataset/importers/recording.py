@@ -91,7 +91,7 @@ def _several(names: list[str]) -> str:
 
 
 def _require_one_step(recordings: Mapping[str, Recording]) -> None:
-    """At one rate, frames are numbered alike in all sequences."""
+    """Numbers frames alike in all sequences of one rate."""
     steps = {name: found.step for name, found in recordings.items() if found.step is not None and found.times is None}
     if not steps:
         return
@@ -105,7 +105,7 @@ def _require_one_step(recordings: Mapping[str, Recording]) -> None:
 
 
 def _doubt(recording: Recording, rate: float) -> str:
-    """What the numbers in the names say against the rate, or nothing."""
+    """Says how the numbers in the names contradict the rate; empty if they do not."""
     step = recording.step
     if recording.decimal and step is None:
         return (
@@ -145,5 +145,5 @@ def _timed(recording: Recording, times: Times, rate: float, given: bool) -> tupl
         frames, faces = recording.read()
         return resampled(times, frames, np.arange(count) / rate, where), faces
 
-    own = f"{1 / even[1]:.4g} Hz" if is_even(times, even[1]) else f"uneven times, {1 / even[1]:.4g} Hz on average,"
-    return count, read, f"resampled from {own} to {rate:g} Hz"
+    measured = f"{1 / even[1]:.4g} Hz" if is_even(times, even[1]) else f"uneven times, {1 / even[1]:.4g} Hz on average,"
+    return count, read, f"resampled from {measured} to {rate:g} Hz"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from odeform.dataset.importers.authors import authors_source, is_authors_layout
 from odeform.dataset.importers.conversion import convert_source
-from odeform.dataset.importers.foreign import convertible
+from odeform.dataset.importers.convertible import convertible
 from odeform.dataset.importers.mesh_frames import has_table, mesh_source
 from odeform.dataset.importers.source import Source
 from odeform.dataset.importers.units import METRES
@@ -23,7 +23,7 @@ class Importer:
     """How a folder of some layout becomes a data set."""
 
     description: str
-    """What the folder contains, for error messages."""
+    """Describes what the folder contains, for error messages."""
     recognises: Callable[[Path], bool]
     source: Callable[[Path, float | None], Source]
     """(folder, frame rate in Hz if the user gave one) -> its sequences. Raises `InputError`."""

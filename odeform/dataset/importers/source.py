@@ -1,4 +1,4 @@
-"""What an importer finds: sequences made elsewhere, described, and read one at a time."""
+"""Describes what an importer finds: sequences made elsewhere, which are read one at a time."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -39,4 +39,4 @@ class Source:
     notes: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
-    """What was assumed or left out, for the user to check."""
+    """Notes, for the user to check, say what was assumed or left out."""

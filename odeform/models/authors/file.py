@@ -31,7 +31,7 @@ NUMBER_BYTES = 12  # of memory while reading
 RADIUS, SEGMENTS = 0.1, 8  # of the ball that serves as body: metres, and edges per side of an octant
 
 SCENES = {1: AUTHORS_MASS_ELASTIC, 3: AUTHORS_CONTACT_FORCE}
-"""By the components of an offset: height alone, or all three axes."""
+"""Scenes by the components of an offset: height alone, or all three axes."""
 FRAMES = {AUTHORS_MASS_ELASTIC: (40, 20, 20), AUTHORS_CONTACT_FORCE: (0, 10, 10)}
 """First frame, number of frames, and frames per second where `args` does not say."""
 NOTES = (
@@ -153,9 +153,11 @@ def _schema(scene: str, window: Window) -> Schema:
     return Schema(scene, parameters, window, notes=NOTES)
 
 
-def _vector(name: str, unit: str, reach: float, first: float, text: str) -> tuple[Parameter, ...]:
-    """Three parameters, NAME_x to NAME_z, each from -reach to reach; `Schema.complete` also accepts them as one."""
+def _vector(name: str, unit: str, largest: float, first: float, text: str) -> tuple[Parameter, ...]:
+    """Three parameters, NAME_x to NAME_z, each from -largest to largest; `Schema.complete` also accepts them as one."""
     return tuple(
-        Parameter(f"{name}_{axis}", unit, -reach, reach, first if axis == "x" else 0.0, description=f"{text}, {axis}")
+        Parameter(
+            f"{name}_{axis}", unit, -largest, largest, first if axis == "x" else 0.0, description=f"{text}, {axis}"
+        )
         for axis in "xyz"
     )

@@ -60,8 +60,8 @@ class Affine:
             scale, shift, mean, variance = (arrays[f"{norm}.{part}"].astype(float) for part in parts)
             if {part.shape for part in (scale, shift, mean, variance)} != {bias.shape} or variance.min() < 0.0:
                 raise ValueError(f"size or variance of {norm}")
-            gain = scale / np.sqrt(variance + EPSILON)
-            weight, bias = weight * gain[:, None], (bias - mean) * gain + shift
+            factor = scale / np.sqrt(variance + EPSILON)
+            weight, bias = weight * factor[:, None], (bias - mean) * factor + shift
         return cls(np.ascontiguousarray(weight.T, dtype=np.float32), bias.astype(np.float32))
 
     def __call__(self, x: Rows) -> Rows:

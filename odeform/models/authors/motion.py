@@ -89,9 +89,9 @@ class FrameMotion(Motion):
     @cached_property
     def _gram(self) -> Float[np.ndarray, "times times"]:
         """Mean products of the frames' displacements over the surface, m^2."""
-        shares = np.repeat(surface_weights(self.geometry), 3).astype(np.float32)
+        weights = np.repeat(surface_weights(self.geometry), 3).astype(np.float32)
         out = np.zeros((len(self._times), len(self._times)))
-        for at in range(0, len(shares), CHUNK):
+        for at in range(0, len(weights), CHUNK):
             part = self._displacements[:, at : at + CHUNK]
-            out += (part * shares[at : at + CHUNK]) @ part.T
+            out += (part * weights[at : at + CHUNK]) @ part.T
         return out

@@ -59,7 +59,7 @@ class Networks:
 
     @classmethod
     def read(cls, arrays: Arrays) -> "Networks":
-        """From arrays named `global.…` and `local.…`. KeyError for missing arrays, ValueError for wrong sizes."""
+        """Reads arrays named `global.…` and `local.…`. KeyError for missing arrays, ValueError for wrong sizes."""
         local: Chain | PointNet
         if "local.encoder.stn.conv1.weight" in arrays:
             local = PointNet.read(arrays, "local.encoder.")

@@ -1,4 +1,4 @@
-"""What a regression knows of a push at a point of a body: contact, normal, force and torque, in several frames."""
+"""Makes the inputs of a regression on a push at a point: contact, normal, force and torque, in several frames."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -81,7 +81,7 @@ class ContactInputs:
 def contact_inputs(
     schema: Schema, theta: Float[np.ndarray, "sequences parameters"], space: ReducedSpace
 ) -> ContactInputs:
-    """From normalised parameters (S, P), and the space of a body that rests in the scene.
+    """Makes the inputs from normalised parameters (S, P) and the space of a body that rests in the scene.
 
     Raises `InputError` for a body of which no surface is known: its contacts have no normal.
     """

@@ -104,13 +104,13 @@ class ContactRegression:
     """Reduced motions (T, 6 + K) from contacts and forces, by blended experts."""
 
     def __init__(self, arrays: Arrays, settings: Mapping[str, Any]) -> None:
-        """From what `fit_contact_regression` returns. `KeyError` where something is missing."""
+        """Reads what `fit_contact_regression` returns. `KeyError` where something is missing."""
         self._known = ContactInputs(*(arrays[f"gp.{name}"].astype(float) for name in INPUTS))
         self._frames = len(arrays["times"])
         self._modes = arrays["gp.modes"].astype(np.float32)  # read whole for each push, and stored with less
         blend = settings["blend"]
         self._experts = {
-            part: [(share, self._expert(arrays, part, index)) for index, share in enumerate(blend[part]) if share]
+            part: [(weight, self._expert(arrays, part, index)) for index, weight in enumerate(blend[part]) if weight]
             for part in PARTS
         }
 
@@ -126,10 +126,10 @@ class ContactRegression:
         parts = []
         for part, experts in self._experts.items():
             turned = part != "deformation"
-            # all shares may be zero
+            # all weights may be zero
             values = np.zeros((len(inputs.contact), 3 * self._frames if turned else len(self._modes)))
-            for share, expert in experts:
-                values += share * expert.predict(inputs, turned)
+            for weight, expert in experts:
+                values += weight * expert.predict(inputs, turned)
             flat = values if turned else (values.astype(np.float32) @ self._modes).astype(float)
             parts.append(flat.reshape(len(values), self._frames, -1))
         return np.concatenate(parts, axis=2)
@@ -141,7 +141,7 @@ def fit_contact_regression(
     """Arrays and settings of a checkpoint, from training and validation motions (S, T, 6 + K), times (T,) and inputs.
 
     Kernels maximise the marginal likelihood; validation sets the blend. Modes of the trajectories of deformation hold
-    the share `energy` of them. The setting `errors` has, for each part, the root of the mean squared norm of what
+    the fraction `energy` of them. The setting `errors` has, for each part, the root of the mean squared norm of what
     trajectories miss, in training motions as predicted from all others and in validation motions together.
     """
     flat = {"train": _parts(train), "val": _parts(val)}
@@ -158,8 +158,8 @@ def fit_contact_regression(
         predicted = [np.concatenate([others, e.predict(asked, turned)]) for e, others in fitted]
         errors = [float(np.sqrt(((p - truth)[len(flat["train"][part]) :] ** 2).mean())) for p in predicted]
         blend[part] = _blend(predicted, truth, errors)
-        missed = np.tensordot(blend[part], predicted, axes=1) - truth
-        left[part] = float(np.sqrt((missed**2).sum() / len(truth)))
+        residual = np.tensordot(blend[part], predicted, axes=1) - truth
+        left[part] = float(np.sqrt((residual**2).sum() / len(truth)))
         for index, (expert, _) in enumerate(fitted):
             trials.append({"part": part, "expert": EXPERTS[index], "val": errors[index]})
             if blend[part][index]:
@@ -168,9 +168,10 @@ def fit_contact_regression(
 
 
 def _blend(predicted: list[Floats], truth: Floats, errors: list[float]) -> list[float]:
-    """The share of each expert. The best one alone where nothing moves."""
-    shares = nnls(np.stack([p.ravel() for p in predicted], axis=1), truth.ravel())[0]
-    return shares.tolist() if shares.any() else [float(index == int(np.argmin(errors))) for index in range(len(errors))]
+    """The weight of each expert. The best one alone where nothing moves."""
+    weights = nnls(np.stack([p.ravel() for p in predicted], axis=1), truth.ravel())[0]
+    best = int(np.argmin(errors))
+    return weights.tolist() if weights.any() else [float(index == best) for index in range(len(errors))]
 
 
 def _expert_arrays(name: str, expert: _Expert) -> Arrays:
@@ -183,8 +184,8 @@ def _parts(reduced: Floats) -> dict[str, Floats]:
     return {part: reduced[..., columns].reshape(len(reduced), -1) for part, columns in PARTS.items()}
 
 
-def _modes(flat: Floats, share: float) -> Floats:
+def _modes(flat: Floats, fraction: float) -> Floats:
     """(M, T K) the leading modes of trajectories of deformation."""
     _, s, vt = np.linalg.svd(flat, full_matrices=False)
     energy = np.cumsum(s**2)
-    return vt[: int(np.searchsorted(energy, share * energy[-1])) + 1]
+    return vt[: int(np.searchsorted(energy, fraction * energy[-1])) + 1]

@@ -30,11 +30,11 @@ def matern(
     return np.polyval(_polynomial(order), r) * np.exp(-r)
 
 
-def matern_slope(apart: Inputs, order: int = 2) -> Inputs:
-    """(rows, inputs): the derivative of the kernel by the first input, at differences `apart` from the second."""
-    r = np.sqrt((2 * order + 1) * (apart**2).sum(axis=1))
+def matern_slope(difference: Inputs, order: int = 2) -> Inputs:
+    """(rows, inputs): the derivative of the kernel by the first input, at differences `difference` from the second."""
+    r = np.sqrt((2 * order + 1) * (difference**2).sum(axis=1))
     pull = np.polyval(_polynomial(order - 1), r) * np.exp(-r)
-    return -(2 * order + 1) / (2 * order - 1) * pull[:, None] * apart
+    return -(2 * order + 1) / (2 * order - 1) * pull[:, None] * difference
 
 
 def scaled_distance(

@@ -45,8 +45,8 @@ def fit_kernel(x: Inputs, force: Forces, outputs: Outputs, linear: int) -> Float
     `linear` is the number of first inputs that a term linear in the force varies with; 0 for none.
     """
     size, places = x.shape[1], linear
-    scale, noise, share = (BOUNDS[key] for key in ("scale", "noise", "linear"))
-    bounds = [*[scale] * size, noise, *([*[scale] * places, share] if places else [])]
+    scale, noise, ratio = (BOUNDS[key] for key in ("scale", "noise", "linear"))
+    bounds = [*[scale] * size, noise, *([*[scale] * places, ratio] if places else [])]
     found = []
     for start in np.log(STARTS):
         begin = [*[start] * size, np.log(NOISE), *([*[start] * places, 0.0] if places else [])]

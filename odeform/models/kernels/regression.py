@@ -30,7 +30,7 @@ class Kernel:
     scales: Float[np.ndarray, " inputs"]
     """(D,)"""
     order: int | None = 2
-    """Of the Matern kernel; None for the Gaussian one."""
+    """Order of the Matern kernel; None for the Gaussian one."""
     linear: LinearTerm | None = None
 
     def __call__(self, x: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[np.ndarray, "rows columns"]:
@@ -62,7 +62,7 @@ class KernelRegression:
     """(1 + D, M): a constant, and what each input adds."""
 
     def __call__(self, x: Inputs) -> Float[np.ndarray, "rows outputs"]:
-        """At inputs (R, D)."""
+        """Evaluates the regression at inputs (R, D)."""
         out = self.kernel(x, self.inputs) @ self.weights
         return out if self.trend is None else self.trend[0] + x @ self.trend[1:] + out
 

@@ -14,11 +14,11 @@ from odeform.types import Floats
 __all__ = ["ORDERS", "Ridge", "search_ridge"]
 
 ORDERS = (2, 6)
-"""Of the kernels to choose from: contacts make motions rough in the parameters, without them they are smooth."""
+"""Orders of the kernels to choose from: contacts make motions rough in the parameters, without them they are smooth."""
 
 STARTS = (0.5, 2.0, 8.0)  # length scales that the search starts from; the trained range is 2 long
 RIDGE = 1e-6  # where it starts, relative to the kernel's value at distance 0
-SMOOTHER = 0.85  # share of the error of the first order that another may have at most: a rough kernel risks less
+SMOOTHER = 0.85  # fraction of the error of the first order that another may have at most: a rough kernel risks less
 EVALUATIONS = 150  # of the error, from each start
 BOUNDS = ((np.log(0.05), np.log(200.0)), (np.log(1e-12), 0.0))  # of length scales and ridge, in logarithms
 
@@ -52,8 +52,8 @@ class Ridge:
         """RMS error, over sequences, of outputs (S, M) at `x` (S, D), each predicted from all the others, and of those
         `expected` (A, M) at `asked` (A, D)."""
         left_out, regression = self.leave_one_out(x, outputs)
-        missed = regression(asked) - expected
-        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(missed)) / np.sqrt(len(x) + len(asked)))
+        residual = regression(asked) - expected
+        return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(residual)) / np.sqrt(len(x) + len(asked)))
 
     def _factor(self, x: Inputs) -> tuple[Floats, bool]:
         return cho_factor(self.kernel(x, x) + self.ridge * np.eye(len(x)), lower=True)

@@ -49,17 +49,18 @@ def _mlp(layers: Layers, x: Floats, activation: Callable[[Floats], Floats]) -> F
     return x @ matrix.T + bias
 
 
-def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, shares: Floats) -> list[Floats]:
-    """Features of a shape for each branch: points (N, 3) in units of the radius of gyration, shares (N,) of its area.
+def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, areas: Floats) -> list[Floats]:
+    """Features of a shape for each branch: points (N, 3) in units of the radius of gyration, areas (N,) as fractions of
+    the whole.
 
     They stay zero where no feature counts, as in a model trained on one shape: a million points take seconds.
     """
 
     def pooled(branch: str) -> Floats:
-        gain = weights[f"{branch}_encoder.pooled_gain"]
-        if not gain.any():
-            return np.zeros(len(gain))
-        return shares @ _mlp(read_layers(weights, f"{branch}_encoder.points", np.float64), points, _silu)
+        scale = weights[f"{branch}_encoder.pooled_gain"]
+        if not scale.any():
+            return np.zeros(len(scale))
+        return areas @ _mlp(read_layers(weights, f"{branch}_encoder.points", np.float64), points, _silu)
 
     return [pooled(branch) for branch in config.branches]
 
@@ -72,8 +73,8 @@ def make_encoder(weights: Arrays, config: ModelConfig) -> Encoder:
 
     def encode(pooled: list[Floats], theta: Floats, dtype: type) -> Floats:
         parts = [
-            _mlp(head, np.concatenate([(features - mean) * gain, theta], axis=-1), _silu)
-            for head, features, (mean, gain) in zip(heads, pooled, statistics, strict=True)
+            _mlp(head, np.concatenate([(features - mean) * scale, theta], axis=-1), _silu)
+            for head, features, (mean, scale) in zip(heads, pooled, statistics, strict=True)
         ]
         return np.concatenate(parts, axis=-1).astype(dtype)
 
@@ -103,7 +104,7 @@ def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[F
 
 def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Decoder]:
     """theta (P,) -> the decoder of both branches, in double precision. With (T, P), each of T states has its own."""
-    gains = weights["gains"].astype(float)
+    output_scales = weights["gains"].astype(float)
     branches = branch_decoders(weights, config)
 
     def fold(theta: Floats) -> Decoder:
@@ -121,7 +122,7 @@ def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Dec
                 out.append(features @ branch.readout.T)
             if not config.rigid:
                 out.insert(0, np.zeros((len(states), POSE)))
-            return np.concatenate(out, axis=1) * gains
+            return np.concatenate(out, axis=1) * output_scales
 
         return decode
 

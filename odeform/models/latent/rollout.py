@@ -14,7 +14,7 @@ from torch.autograd.function import once_differentiable
 __all__ = ["Branch", "roll_out"]
 
 STAGES = ((1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 / 3.0, 1.0), (1.0 / 6.0, 0.0))
-"""For each stage of RK4, its weight in the step and the share of the step to the next stage."""
+"""Weight of each stage of RK4 in the step, and the fraction of the step to the next stage."""
 
 
 class Branch(NamedTuple):
@@ -49,13 +49,13 @@ class _RollOut(torch.autograd.Function):
         states[0] = start
         for i, step in enumerate(steps):
             carry, after = 0.0, states[i + 1].copy_(states[i])
-            for j, (share, ahead) in enumerate(STAGES):
+            for j, (fraction, ahead) in enumerate(STAGES):
                 x = torch.add(states[i], slope, alpha=carry, out=stages[i, j]) if j else stages[i, j].copy_(states[i])
                 for (inputs, out), (w1, b1, w2, b2, w3, b3), (h1, h2) in zip(places, nets, hidden, strict=True):
                     first = torch.addmm(b1, x[:, :inputs], w1.T, out=h1[i, j]).tanh_()
                     second = torch.addmm(b2, first, w2.T, out=h2[i, j]).tanh_()
                     slope[:, out] = torch.addmm(b3, second, w3.T)
-                after.add_(slope, alpha=step * share)
+                after.add_(slope, alpha=step * fraction)
                 carry = step * ahead
         ctx.steps, ctx.places, ctx.nets, ctx.stages, ctx.hidden = steps, places, nets, stages, hidden
         return states
@@ -72,8 +72,8 @@ class _RollOut(torch.autograd.Function):
         for i in range(len(ctx.steps) - 1, -1, -1):
             step, total, pulled = ctx.steps[i], grad.clone(), torch.zeros_like(grad)
             for j in (3, 2, 1, 0):
-                share, ahead = STAGES[j]
-                of_slope = torch.mul(grad, step * share, out=of_slopes[i, j]).add_(pulled, alpha=step * ahead)
+                fraction, ahead = STAGES[j]
+                of_slope = torch.mul(grad, step * fraction, out=of_slopes[i, j]).add_(pulled, alpha=step * ahead)
                 pulled = torch.zeros_like(grad)
                 for (inputs, out), net, (d1, d2), (e1, e2) in zip(places, nets, bends, errors, strict=True):
                     second = torch.mm(of_slope[:, out], net[4], out=e2[i, j]).mul_(d2[i, j])

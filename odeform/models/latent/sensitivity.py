@@ -95,8 +95,8 @@ def _make_encoder(weights: Arrays, config: ModelConfig) -> Callable[[list[Floats
 
     def encode(pooled: list[Floats], theta: Floats) -> Floats:
         parts = [
-            _mlp(head, np.concatenate([_constant((features - mean) * gain, theta), theta], axis=1))
-            for head, features, (mean, gain) in zip(heads, pooled, scales, strict=True)
+            _mlp(head, np.concatenate([_constant((features - mean) * scale, theta), theta], axis=1))
+            for head, features, (mean, scale) in zip(heads, pooled, scales, strict=True)
         ]
         return np.concatenate(parts, axis=1)
 
@@ -106,7 +106,7 @@ def _make_encoder(weights: Arrays, config: ModelConfig) -> Callable[[list[Floats
 def _make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats, Times, Floats], Floats]:
     """(jet of theta, (T,) seconds, jet of states (1 + P, T, state)) -> jet (1 + P, T, 6 + K), not yet relative."""
     branches = branch_decoders(weights, config)
-    gains = weights["gains"].astype(float)
+    output_scales = weights["gains"].astype(float)
 
     def decode(theta: Floats, times: Times, states: Floats) -> Floats:
         clock = _constant((2.0 * times / (times + config.clock) - 1.0)[:, None], theta)
@@ -118,7 +118,7 @@ def _make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats, Tim
                 inputs = np.concatenate([features, conditions], axis=2)
                 features = np.concatenate([features, _silu(_mlp(network, inputs, smooth=index == 0))], axis=2)
             out.append(features @ branch.readout.T)
-        return np.concatenate(out, axis=2) * gains
+        return np.concatenate(out, axis=2) * output_scales
 
     return decode
 

@@ -37,9 +37,9 @@ def _shapes(config: ModelConfig) -> dict[str, tuple[int, ...]]:
 
 
 def encoder_statistics(weights: Arrays, config: ModelConfig) -> list[tuple[Floats, Floats]]:
-    """Mean (C,) and gain (C,) of the pooled shape features of each branch, in double precision."""
+    """Mean (C,) and scale (C,) of the pooled shape features of each branch, in double precision."""
     names = [(f"{branch}_encoder.pooled_mean", f"{branch}_encoder.pooled_gain") for branch in config.branches]
-    return [(weights[mean].astype(float), weights[gain].astype(float)) for mean, gain in names]
+    return [(weights[mean].astype(float), weights[scale].astype(float)) for mean, scale in names]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class FieldLayers:
 
 
 def field_layers(weights: Arrays, config: ModelConfig) -> FieldLayers:
-    """In double precision, with time in seconds."""
+    """Reads the weights in double precision, with time in seconds."""
     rate = 1.0 / float(weights["time_scale"])
     branches = [read_layers(weights, f"{branch}_field", np.float64) for branch in config.branches]
     # each branch depends on the state up to the end of its own part
@@ -84,7 +84,7 @@ class BranchDecoder:
 
 
 def branch_decoders(weights: Arrays, config: ModelConfig) -> list[BranchDecoder]:
-    """For each branch; of its networks the second, for random features, may be missing."""
+    """Networks of each branch; the second, for random features, may be missing."""
     out = []
     for branch, state in zip(config.branches, config.states, strict=True):
         networks = [read_layers(weights, f"{branch}_decoder.{part}", np.float64) for part in ("hidden", "random")]

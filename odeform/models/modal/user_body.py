@@ -54,7 +54,7 @@ def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) ->
     Raises:
         InputError: for a shape that encloses no volume, holds several bodies, or does not come to rest on the floor.
     """
-    from odeform.simulation.objects.foreign import placed_object  # looking at trained bodies needs no simulator
+    from odeform.simulation.objects.from_mesh import placed_object  # looking at trained bodies needs no simulator
 
     try:
         placed = placed_object(_surface(geometry), name, up=up or geometry.up or None)

@@ -28,7 +28,7 @@ class NodeGraph:
 
     @cached_property
     def edges(self) -> Int[np.ndarray, "2 edges"]:
-        """From each node's nearest neighbours to the node."""
+        """Edges that lead from each node's nearest neighbours to the node."""
         count = min(NEIGHBOURS, len(self.nodes) - 1)
         near = np.asarray(KDTree(self.nodes).query(self.nodes, count + 1)[1])[:, 1:]
         return np.stack([near.ravel(), np.repeat(np.arange(len(self.nodes)), count)])

@@ -51,7 +51,7 @@ class Interval(NamedTuple):
 
     @classmethod
     def of(cls, columns: Any) -> "Interval":
-        """From columns (..., 13), as `conditioning` joins them."""
+        """Splits columns (..., 13), as `conditioning` joins them."""
         begins = np.cumsum([0, *WIDTHS])
         return cls(*(columns[..., begin:end] for begin, end in itertools.pairwise(begins)))
 
@@ -83,10 +83,10 @@ class OccupancyFlowNet(PointNet):
         end = interval.start + interval.length * interval.velocity
         forward = self._flow(net, batch, interval.start, batch.times)
         backward = self._flow(net, batch, end, 1.0 - batch.times)
-        share = batch.times[..., None]
+        fraction = batch.times[..., None]
         # the backward flow passed the times in the opposite order
         flipped = net.stack(backward[::-1])
-        return [(1.0 - share) * net.stack(forward) + share * flipped]
+        return [(1.0 - fraction) * net.stack(forward) + fraction * flipped]
 
     def _flow(self, net: Net, batch: PointBatch, moved: Any, times: Any) -> list[Any]:
         """F displacements (B, 3) from `moved` on, at `times` (F, B) in the interval, which may decrease."""

@@ -6,21 +6,19 @@ their own; here the contact and its force stand for the probe, as these scenes g
 """
 
 import time
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
-from odeform.models.base import Predictor, check_finite
 from odeform.models.points.node_graph import NodeGraph
-from odeform.models.points.point_model import PREFIX, frame_from_json
+from odeform.models.points.point_model import PREFIX, PointPredictor, frame_from_json
 from odeform.motion.base import SolveStats
-from odeform.motion.point_motion import MeanMotion, PointMotion, evaluate_probes
-from odeform.motion.reduced_space import to_canonical
+from odeform.motion.point_motion import MeanMotion
 from odeform.schema import Parameters, Window
-from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Frames, GaussianSplats, Geometry, MotionSequence, Points, Times
+from odeform.types import Floats, Frames, MotionSequence, Times
 
 if TYPE_CHECKING:
     from odeform.models.points.graph_network import GraphNetwork
@@ -55,7 +53,7 @@ class FinalState:
         return self._moved * (times > self._window.start).astype(np.float32)[:, None, None]
 
 
-class PeGnn(Predictor):
+class PeGnn(PointPredictor):
     """Predicts where a body is at the end of the window. At any other time that state is shown, and said to be it."""
 
     model = "pe-gnn"
@@ -72,7 +70,8 @@ class PeGnn(Predictor):
         import torch
 
         config, arrays = checkpoint.config, checkpoint.arrays
-        self._graph = NodeGraph(arrays["nodes"], frame_from_json(config["frame"]))
+        self.frame = frame_from_json(config["frame"])
+        self._graph = NodeGraph(arrays["nodes"], self.frame)
         features = self._graph.features(self.schema, np.zeros((1, len(self.schema.learned)))).shape[2]
         self._network = new_network(features, config["width"], config["layers"])
         weights = {k.removeprefix(PREFIX): torch.tensor(v) for k, v in arrays.items() if k.startswith(PREFIX)}
@@ -80,9 +79,7 @@ class PeGnn(Predictor):
             raise ValueError("weights: expected finite numbers")
         self._network.load_state_dict(weights)
         self._network.eval()
-        self._probes = evaluate_probes(self.rest, np.array(self._graph.frame.anchor))
-        stop = self.schema.window.stop
-        self._mean = MeanMotion(np.array([0.0, stop]), np.zeros((2, 3)))
+        self.mean = MeanMotion(np.array([0.0, self.schema.window.stop]), np.zeros((2, 3)))
 
     def _nodes_moved(self, parameters: Parameters) -> Floats:
         """(M, 3) metres, canonical."""
@@ -92,30 +89,13 @@ class PeGnn(Predictor):
         features = graph.features(self.schema, np.asarray(self.schema.inputs(parameters))[None])[0]
         with torch.no_grad():
             moved = self._network(*(torch.from_numpy(a) for a in (features, graph.edges, graph.along)))
-        return moved.numpy().astype(float) * graph.frame.scale
+        return moved.numpy().astype(float) * self.frame.scale
 
-    def _solve(
-        self,
-        geometry: Geometry,
-        parameters: Parameters,
-        settings: SolverSettings | None,
-        until: float,
-        observed: MotionSequence | None,
-    ) -> PointMotion:
-        check_finite(geometry)
-        if isinstance(geometry, GaussianSplats):
-            raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
-        begin, frame = time.perf_counter(), self._graph.frame
+    def _trajectories(
+        self, bodies: Sequence[Floats], parameters: Parameters, observed: MotionSequence | None
+    ) -> Iterator[FinalState]:
+        begin = time.perf_counter()
         moved = self._nodes_moved(parameters)
-        wall_ms = 1e3 * (time.perf_counter() - begin)
-
-        def final(points: Points) -> FinalState:
-            return FinalState(self._graph.interpolated(moved, frame.inputs(points)), self.schema.window, wall_ms)
-
-        rest = to_canonical(geometry.points, np.array(frame.anchor), self.schema.azimuth(parameters))
-        shape, body = final(rest), final(self._probes.points)
-        motion = PointMotion(
-            self.schema, parameters, geometry, frame, self._mean, self._probes, shape, body, self.trust
-        )
-        motion.only_at = self.schema.window.stop
-        return motion
+        wall_ms, window = 1e3 * (time.perf_counter() - begin), self.schema.window
+        inputs = (self.frame.inputs(points) for points in bodies)
+        return (FinalState(self._graph.interpolated(moved, body), window, wall_ms) for body in inputs)

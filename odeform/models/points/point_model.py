@@ -1,7 +1,9 @@
-"""What all models that move each point by itself share: how they are stored and read, and how they solve."""
+"""Stores, reads and solves all models that move each point by itself."""
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,22 +15,57 @@ from odeform.models.layers import layer_shapes
 from odeform.models.points.arithmetic import Net, Numpy
 from odeform.models.points.point_network import PointNet
 from odeform.models.points.point_trajectories import FramedPoints, MomentaryPoints
-from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, PointTrajectory, evaluate_probes
+from odeform.motion.point_motion import MeanMotion, PointFrame, PointMotion, PointTrajectory, Probes, evaluate_probes
 from odeform.motion.reduced_space import to_canonical
 from odeform.schema import Parameters, Schema
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Arrays, GaussianSplats, Geometry, MotionSequence, Points
+from odeform.types import Arrays, Floats, GaussianSplats, Geometry, MotionSequence, Points
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
-__all__ = ["PREFIX", "PointModel", "frame_from_json", "frame_to_json", "point_checkpoint"]
+__all__ = ["PREFIX", "PointModel", "PointPredictor", "frame_from_json", "frame_to_json", "point_checkpoint"]
 
 PREFIX = "net."
 
 
-class PointModel(Predictor):
-    """A predictor of where each point goes.
+class PointPredictor(Predictor):
+    """Predicts where each point of a mesh or a cloud goes, by itself."""
+
+    frame: PointFrame
+    mean: MeanMotion
+
+    @cached_property
+    def _probes(self) -> Probes:
+        return evaluate_probes(self.rest, np.array(self.frame.anchor))
+
+    @abstractmethod
+    def _trajectories(
+        self, bodies: Sequence[Floats], parameters: Parameters, observed: MotionSequence | None
+    ) -> Iterator[PointTrajectory]:
+        """The trajectories of each of `bodies`: points (N, 3) in metres about the anchor, canonical."""
+
+    def _solve(
+        self,
+        geometry: Geometry,
+        parameters: Parameters,
+        settings: SolverSettings | None,
+        until: float,
+        observed: MotionSequence | None,
+    ) -> PointMotion:
+        check_finite(geometry)
+        if isinstance(geometry, GaussianSplats):
+            raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
+        rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
+        moved, body = self._trajectories((rest, self._probes.points), parameters, observed)
+        frame, mean, probes = self.frame, self.mean, self._probes
+        motion = PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.trust)
+        motion.only_at = self.schema.window.stop if self.final_only else None
+        return motion
+
+
+class PointModel(PointPredictor):
+    """A network that moves each point.
 
     A subclass sets `model`, its `network`, which `odeform train` trains, and the `trajectory` that evaluates it.
     """
@@ -52,28 +89,16 @@ class PointModel(Predictor):
                 raise ValueError(f"{name}: expected finite numbers of shape {shape}, got {weights[name].shape}")
         self.net = Net(weights, Numpy())
         self.mean = MeanMotion(checkpoint.arrays["mean.times"], checkpoint.arrays["mean.shifts"])
-        self._probes = evaluate_probes(self.rest, np.array(self.frame.anchor))
 
     def _trajectory(self, rest: Points, parameters: Parameters, observed: MotionSequence | None) -> PointTrajectory:
         """The trajectory of points (N, 3) in metres about the anchor, canonical."""
         inputs, theta = self.frame.inputs(rest), self.schema.inputs(parameters)
         return self.trajectory(self.net, self.network, self.frame, self.schema.window, inputs, theta)
 
-    def _solve(
-        self,
-        geometry: Geometry,
-        parameters: Parameters,
-        settings: SolverSettings | None,
-        until: float,
-        observed: MotionSequence | None,
-    ) -> PointMotion:
-        check_finite(geometry)
-        if isinstance(geometry, GaussianSplats):
-            raise InputError(f"{self.model}: cannot deform splats; expected a mesh or points")
-        rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
-        moved, body = (self._trajectory(x, parameters, observed) for x in (rest, self._probes.points))
-        frame, mean, probes = self.frame, self.mean, self._probes
-        return PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.trust)
+    def _trajectories(
+        self, bodies: Sequence[Floats], parameters: Parameters, observed: MotionSequence | None
+    ) -> Iterator[PointTrajectory]:
+        return (self._trajectory(points, parameters, observed) for points in bodies)
 
 
 def frame_to_json(frame: PointFrame) -> dict[str, Any]:

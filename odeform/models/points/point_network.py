@@ -1,4 +1,4 @@
-"""What a network that moves each point by itself is: layer sizes, a forward pass, and how it is trained.
+"""Defines a network that moves each point by itself: layer sizes, a forward pass, and how it is trained.
 
 The network is a function of a rest point x, parameters theta and time, and knows nothing of other points. It can
 therefore move any shape, and a point moves the same in every shape.

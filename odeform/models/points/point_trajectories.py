@@ -105,28 +105,28 @@ class FramedPoints:
         # a time on a frame gives that frame bit-exactly
         phase = np.where(np.abs(phase - near) < 1e-6, near, phase)
         index = np.minimum(phase.astype(int), last - 1)
-        share = (phase - index).astype(np.float32)[:, None, None]
+        fraction = (phase - index).astype(np.float32)[:, None, None]
         here, there = frames[index], frames[index + 1]
         if self.between == "linear":
-            return here + share * (there - here)
+            return here + fraction * (there - here)
         before, after = frames[np.maximum(index - 1, 0)], frames[np.minimum(index + 2, last)]
-        return catmull_rom(before, here, there, after, share)
+        return catmull_rom(before, here, there, after, fraction)
 
     def _roll_out(self, grid: Times) -> Frames:
         out = np.empty((len(grid), len(self._x), 3), dtype=np.float32)
         scaled = in_windows(grid, self._window)[:, None]
 
-        def fill(begin: int) -> None:
+        def compute(begin: int) -> None:
             x = self._x[begin : begin + TRAJECTORIES]
             batch = point_batch(x, self._theta, np.broadcast_to(scaled, (len(grid), len(x))), self._frame)
             out[:, begin : begin + TRAJECTORIES] = sum_of(self._network.predict(self._net, batch))
 
-        thread_map(fill, range(0, len(self._x), TRAJECTORIES))
+        thread_map(compute, range(0, len(self._x), TRAJECTORIES))
         return out * np.float32(self._frame.scale)
 
     def _error_mm(self) -> float | None:
-        """By step doubling: the largest RMS change over the points with steps of twice the length, halved, as these
-        motions bend within a step at contacts."""
+        """Estimates by step doubling: the largest RMS change over the points with steps of twice the length, halved, as
+        these motions bend within a step at contacts."""
         if not self.doubled:
             return None
         grid = self._grid(LATER)

@@ -6,9 +6,7 @@ from typing import TypeGuard
 import numpy as np
 
 from odeform.checkpoint import Checkpoint
-from odeform.dataset.index import Dataset
-from odeform.dataset.training_data import TrainingData, prepare
-from odeform.errors import InputError
+from odeform.dataset.training_data import TrainingData
 from odeform.models.base import Predictor
 from odeform.models.continuation import (
     LATER_ERRORS,
@@ -20,7 +18,6 @@ from odeform.models.continuation import (
 from odeform.models.kernels.functions import gaussian
 from odeform.models.kernels.regression import KernelRegression
 from odeform.models.reduced_model import ReducedModel
-from odeform.models.registry import load_model
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.types import Floats
@@ -30,13 +27,13 @@ __all__ = ["HELD_OUT", "fit_dynamics", "predicted_errors", "with_continuation"]
 # chosen on validation sequences: of `mass-elastic`, after 40 to 90 frames; of `kick`, up to twice its window
 CENTERS = 300
 RIDGE = 1e-7  # on the mean square over states
-PARAMETERS = 0.3  # gain of parameters, in halves of their range; depths and velocities have 1
-SIDE = 2.0  # gain of the side that is down, a unit vector
+PARAMETERS = 0.3  # inverse length scale of parameters, in halves of their range; depths and velocities have 1
+SIDE = 2.0  # inverse length scale of the side that is down, a unit vector
 WIDTH = 0.05  # of the largest depth
-FREE = 0.01  # share of the largest acceleration besides gravity, below which there is no contact
+FREE = 0.01  # fraction of the largest acceleration besides gravity, below which there is no contact
 CANDIDATES = 12_000  # states among which centres are chosen
 HELD_OUT = 1.0 / 3.0
-"""Of the window, over which a continuation is validated."""
+"""Fraction of the window over which a continuation is validated."""
 FEWEST = 3  # frames that it can be fitted to
 TINY = 1e-9  # metres; against division by zero
 
@@ -46,7 +43,7 @@ def _largest(vectors: Floats) -> float:
 
 
 def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, float]:
-    """Gravity in metres per frame squared, the height of first touch, and the largest depth below it, in metres.
+    """Gravity in metres per frame squared, the height of first contact, and the largest depth below it, in metres.
 
     Bodies in the upper half of their heights are assumed to fly.
     """
@@ -55,8 +52,8 @@ def _ground(before: Floats, now: Floats, after: Floats) -> tuple[Floats, float, 
     gravity = np.median(acceleration[height >= 0.5 * (height.min() + height.max())], axis=0)
     pushed = np.linalg.norm(acceleration - gravity, axis=1)
     lowest = np.minimum(height, 2.0 * height - before[:, 2] + gravity[2])
-    touch = float(np.quantile(lowest[pushed >= FREE * pushed.max()], 0.99))
-    return gravity, touch, max(touch - float(lowest.min()), TINY)
+    contact_height = float(np.quantile(lowest[pushed >= FREE * pushed.max()], 0.99))
+    return gravity, contact_height, max(contact_height - float(lowest.min()), TINY)
 
 
 def _spread(features: Floats, count: int) -> Floats:
@@ -77,7 +74,7 @@ def _spread(features: Floats, count: int) -> Floats:
 
 
 def _regression(features: Floats, near: Floats, outputs: Floats, rng: np.random.Generator) -> KernelRegression:
-    """What fits outputs (S, O) best as `near` (S, 1) times a sum of kernels of features (S, F)."""
+    """Fits outputs (S, O) as `near` (S, 1) times a sum of kernels of features (S, F)."""
     touching = rng.permutation(np.flatnonzero(near[:, 0]))[:CANDIDATES]
     centers = _spread(features[touching], CENTERS)
     values = near * gaussian(features, centers)
@@ -91,18 +88,18 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     ground drives."""
     before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
     conditions = np.repeat(theta, reduced.shape[1] - 2, axis=0)
-    gravity, touch, depth = _ground(before, now, after)
+    gravity, contact_height, depth = _ground(before, now, after)
     speed = _largest((now - before)[:, :3])
     sizes = [(1.0 / depth, 2), (1.0 / speed, 3), (gyration_radius / speed, 3), (PARAMETERS, theta.shape[1]), (SIDE, 3)]
-    gains = np.concatenate([np.full(count, gain) for gain, count in sizes])
+    inverse_lengths = np.concatenate([np.full(count, inverse) for inverse, count in sizes])
     empty = spread_regression(np.zeros((0, 0)), np.zeros((0, 0)))
-    dynamics = Dynamics(gravity, touch, WIDTH * depth, gains, empty, empty)
+    dynamics = Dynamics(gravity, contact_height, WIDTH * depth, inverse_lengths, empty, empty)
     features, near = dynamics.features(before, now, conditions)
-    missed, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
+    residual, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
     return replace(
         dynamics,
-        pose=_regression(without_side(features), near, missed[:, :POSE], rng),
-        deformation=_regression(features, near, missed[:, POSE:], rng),
+        pose=_regression(without_side(features), near, residual[:, :POSE], rng),
+        deformation=_regression(features, near, residual[:, POSE:], rng),
     )
 
 
@@ -129,8 +126,9 @@ def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
         moving.append(continued(motion, dynamics, theta, window).reduced(later))
         stopped.append(motion.reduced(np.full(len(later), window.stop)))
     truth, gyration_radius = data.reduced["val"][:, kept:], data.space.gyration_radius
-    moved, held = (small_motion(np.stack(guess) - truth, gyration_radius) / np.sqrt(3.0) for guess in (moving, stopped))
-    return 1e3 * moved if np.square(moved).mean() < np.square(held).mean() else None
+    guesses = (np.stack(guess) - truth for guess in (moving, stopped))
+    moved, stayed = (small_motion(residual, gyration_radius) / np.sqrt(3.0) for residual in guesses)
+    return 1e3 * moved if np.square(moved).mean() < np.square(stayed).mean() else None
 
 
 def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
@@ -150,16 +148,3 @@ def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
 def is_continued(model: Predictor) -> TypeGuard[ReducedModel]:
     """Whether motions of this model go on beyond its window by these dynamics, where they predict well enough."""
     return isinstance(model, ReducedModel) and not model.schema.objects and not model.continues_itself
-
-
-def refitted(checkpoint: Checkpoint, dataset: Dataset) -> Checkpoint:
-    """The checkpoint of a model that was trained on all frames of `dataset`, with a continuation of today's version.
-
-    Within the trained window, its motions stay bit-identical. `InputError` for a model that is never continued.
-    """
-    model = load_model(checkpoint)
-    if not is_continued(model):
-        raise InputError(f"{checkpoint.model}: expected a model of reduced coordinates of one body, which is continued")
-    data, space = prepare(dataset, model.space.basis), model.space
-    reduced = {split: np.stack([space.with_patterns(y) for y in motions]) for split, motions in data.reduced.items()}
-    return with_continuation(model, replace(data, space=space, reduced=reduced))

@@ -1,4 +1,4 @@
-"""What descents minimise, unless a program brings a loss of its own, and the device on which they do."""
+"""Defines what descents minimise, unless a program brings another loss, and the device on which they do."""
 
 from collections.abc import Callable
 

@@ -1,7 +1,6 @@
 """The training of a vector field that is a module of PyTorch: Adam on roll-outs, best on validation, resumable."""
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +11,7 @@ from torch import nn
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import FILLED_WEIGHT, TrainingData
 from odeform.models.neural_model import NeuralModel, network_arrays
-from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.loss import Loss, mean_square, torch_device
 from odeform.models.training.part import read_part, write_part
 from odeform.models.training.qualities import Validation, with_qualities
@@ -24,8 +23,7 @@ from odeform.types import Floats
 __all__ = ["train_neural"]
 
 LONGEST = 0.01  # s of a step of a roll-out; longer frames are integrated in several
-HORIZON = (0.25, 0.33)  # share of a motion that is rolled out at first, and share of the training in which it grows
-VALIDATIONS = 25  # over the training
+HORIZON = (0.25, 0.33)  # of a motion: what is rolled out at first; of the training: in which that grows
 FEW = 8  # validation motions on which solver settings are chosen
 SEEN = 64  # validation motions that choose the weights
 CANDIDATES = [
@@ -99,10 +97,10 @@ class _Learner:
         truth, weights = self.truth[split][: frames + 1, rows], self.weights[split][: frames + 1, rows]
         return loss(self.metres * predicted[1:], self.metres * truth[1:], weights[1:])
 
-    def advance(self, share: float) -> float:
+    def advance(self, fraction: float) -> float:
         frames, (start, grown) = len(self.times) - 1, HORIZON
-        frames = max(min(frames, round(frames * (start + (1.0 - start) * share / grown))), 2)
-        self.optimiser.param_groups[0]["lr"] = self.model.rate * cosine_decay(share)
+        frames = max(min(frames, round(frames * (start + (1.0 - start) * fraction / grown))), 2)
+        self.optimiser.param_groups[0]["lr"] = self.model.rate * cosine_decay(fraction)
         rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.model.batch]
         self.optimiser.zero_grad()
         loss = self.error("train", rows.to(self.device), frames, self.loss)
@@ -127,23 +125,10 @@ class _Learner:
         if request.resume and part is not None:
             self.restore()
             self.run.report(f"continues after {self.elapsed / 60.0:.1f} min, step {self.done}")
-        begin, validated, share = time.process_time() - self.elapsed, self.spent(), self.spent()
+        budget = Budget(60.0 * request.minutes, request.steps)
         with small_batches():
-            while share < 1.0:
-                loss = self.advance(share)
-                self.elapsed = time.process_time() - begin
-                share = self.spent()
-                if share >= 1.0 or share >= validated + 1.0 / VALIDATIONS:
-                    validated, error = share, self.validate()
-                    self.run.report(f"{100 * share:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
-                    if part is not None:
-                        self.save()
+            descend(self, budget, self.run.report, self.save if part is not None else lambda: None)
         return {"val_rmse_mm": self.best[0], "steps": self.done, "seconds": self.elapsed}
-
-    def spent(self) -> float:
-        """The share of the budget that is spent."""
-        request = self.run.request
-        return self.done / request.steps if request.steps else self.elapsed / (60.0 * request.minutes)
 
     def save(self) -> None:
         best = {name: torch.from_numpy(value) for name, value in self.best[1].items()}

@@ -20,8 +20,8 @@ FINE = SolverSettings("dopri5", tolerance=1e-6, dtype="float64")
 WORSE = 1.01
 """Factor by which dropping modes may increase the error of large deformations."""
 LARGE = 0.1
-"""Share of the peak from which a deformation is large, as in `deformation_relative`: errors long after a contact would
-hide others."""
+"""Fraction of the peak from which a deformation is large, as in `deformation_relative`: errors long after a contact
+would hide others."""
 
 
 def needed_modes(model: LatentModel, data: TrainingData) -> int:
@@ -31,10 +31,10 @@ def needed_modes(model: LatentModel, data: TrainingData) -> int:
     truth = data.reduced["val"][..., POSE:]
     size = np.linalg.norm(truth, axis=2)
     weights = data.observed["val"] * (size > LARGE * size.max(axis=1, keepdims=True))
-    off = np.stack(motions)[..., POSE:] - truth
-    missed, still = (np.einsum("st,stk->k", weights, x**2) for x in (off, truth))
+    residual = np.stack(motions)[..., POSE:] - truth
+    wrong, still = (np.einsum("st,stk->k", weights, x**2) for x in (residual, truth))
     # the error of a dropped mode is the whole mode
-    errors = [missed[:count].sum() + still[count:].sum() for count in range(1, len(missed) + 1)]
+    errors = [wrong[:count].sum() + still[count:].sum() for count in range(1, len(wrong) + 1)]
     return 1 + int(np.argmax(np.array(errors) <= WORSE**2 * errors[-1]))
 
 

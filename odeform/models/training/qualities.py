@@ -19,9 +19,9 @@ from odeform.types import Bools, Floats, Times
 
 __all__ = ["USELESS", "Validation", "choose_qualities", "measure_frontier", "with_qualities"]
 
-SHARES = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
-"""Solver error that a quality may add, as a share of the model's own error: in total, and of the deformation alone. A
-tenth adds half a per cent to the total error, three tenths add four per cent to that of the deformation."""
+FRACTIONS = {"draft": (1.0, 1.0), "balanced": (0.1, 0.3)}
+"""Solver error that a quality may add, as a fraction of the model's own error: in total, and of the deformation alone.
+A tenth adds half a per cent to the total error, three tenths add four per cent to that of the deformation."""
 
 DIGITS = 9  # of errors in mm: what is less is round-off
 USELESS = 10.0
@@ -43,7 +43,7 @@ class Validation:
 
     @classmethod
     def of(cls, data: TrainingData) -> "Validation":
-        """That of the data of a reduced model."""
+        """Takes the validation motions from the data of a reduced model."""
         return cls(data.theta["val"], data.times, data.reduced["val"], data.observed["val"])
 
 
@@ -92,24 +92,26 @@ def measure_frontier(
     for quality in _candidates(float(known.times[1] - known.times[0])) if candidates is None else candidates:
         reduced, evaluations = motions(quality)
         points.append(FrontierPoint(quality, evaluations, *errors_mm(reduced, truth)))
-    own = errors_mm(truth if alone == model.trajectory else motions(reference, model.trajectory)[0], known.reduced)
-    useful = [point for point in points if point.solver_error_mm <= USELESS * own[0]]
-    return non_dominated(useful or points), own
+    whole = truth if alone == model.trajectory else motions(reference, model.trajectory)[0]
+    model_errors = errors_mm(whole, known.reduced)
+    useful = [point for point in points if point.solver_error_mm <= USELESS * model_errors[0]]
+    return non_dominated(useful or points), model_errors
 
 
 def choose_qualities(
     frontier: Sequence[FrontierPoint],
     model_errors_mm: tuple[float, float],
-    shares: Mapping[str, tuple[float, float]] = SHARES,
+    fractions: Mapping[str, tuple[float, float]] = FRACTIONS,
     finest: SolverSettings | None = None,
 ) -> dict[str, Any]:
-    """Settings of each quality: the cheapest within its shares of the model's errors; `reference` is the finest point.
+    """Settings of each quality: the cheapest within its fractions of the model's errors; `reference` is the finest
+    point.
 
     Where no settings have an error, the cheapest is the only point: `reference` is then `finest`, if it is given. So it
     is where nothing moves yet after a few steps of training, and where a regression alone makes the motion.
     """
     chosen = {
-        name: cheapest_within_error(frontier, *np.multiply(share, model_errors_mm)) for name, share in shares.items()
+        name: cheapest_within_error(frontier, *np.multiply(of, model_errors_mm)) for name, of in fractions.items()
     }
     last = frontier[-1]
     reference = finest if finest is not None and last.solver_error_mm == 0.0 else last.quality
@@ -121,7 +123,7 @@ def with_qualities(
     known: Validation,
     reference: SolverSettings = EXACT,
     candidates: Sequence[SolverSettings] | None = None,
-    shares: Mapping[str, tuple[float, float]] = SHARES,
+    fractions: Mapping[str, tuple[float, float]] = FRACTIONS,
 ) -> Checkpoint:
     """The checkpoint of a trained model with its frontier, as `measure_frontier` finds it, and the qualities that are
     chosen on it by `choose_qualities`; the last of the candidates is the finest."""
@@ -129,6 +131,6 @@ def with_qualities(
     assert isinstance(model, ReducedModel)
     tried = _candidates(float(known.times[1] - known.times[0])) if candidates is None else candidates
     frontier, errors_mm = measure_frontier(model, known, reference, tried)
-    qualities = choose_qualities(frontier, errors_mm, shares, tried[-1])
+    qualities = choose_qualities(frontier, errors_mm, fractions, tried[-1])
     settings = {"qualities": qualities, "frontier": [point.to_json() for point in frontier]}
     return replace(checkpoint, config={**checkpoint.config, **settings})

@@ -1,4 +1,4 @@
-"""What a training is asked for, and the command that repeats it."""
+"""Describes what a training is asked for, and the command that repeats it."""
 
 import math
 from dataclasses import dataclass

@@ -18,8 +18,8 @@ from odeform.types import Floats
 __all__ = ["with_residual"]
 
 LEFT_OUT = 1e-3
-CHANCE = 0.05  # most that the probability may be that a share of the ODE gains on validation by chance
-EXPLAINED = 0.05  # share of a part's mean square residual on validation, from which on it is corrected
+CHANCE = 0.05  # most that the probability may be that a weight of the ODE pays on validation by chance
+EXPLAINED = 0.05  # fraction of a part's mean square residual on validation, from which on it has a residual
 
 
 def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int, int] | None = None) -> Checkpoint:
@@ -35,13 +35,13 @@ def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int,
     assert isinstance(model, ReducedModel)
     times = data.times if fading is None else data.times[: fading[1] + 1]
     evaluated, stop = model.evaluate_basis(model.rest, 0.0), float(times[-1])
-    own = {
+    motions = {
         split: np.stack([model.trajectory(one, evaluated, FINE, stop).reduced(times) for one in data.theta[split]])
         for split in data.theta
     }
     for name, columns in PARTS.items():
         truth, motion = (
-            {split: _flat(of[split][:, : len(times)], columns) for split in of} for of in (data.reduced, own)
+            {split: _flat(of[split][:, : len(times)], columns) for split in of} for of in (data.reduced, motions)
         )
         if not truth["train"].any() and not motion["train"].any():
             continue
@@ -63,10 +63,10 @@ def with_residual(checkpoint: Checkpoint, data: TrainingData, fading: tuple[int,
 
 
 def _left(fading: tuple[int, int]) -> Floats:
-    """What is left of a residual, in the frames up to the last of `fading`."""
+    """Fades a residual out: the weight that is left of it in the frames up to the last of `fading`."""
     begin, end = fading
-    share = np.clip((np.arange(end + 1) - begin) / (end - begin), 0.0, 1.0)
-    return 1.0 - share**2 * (3.0 - 2.0 * share)
+    faded = np.clip((np.arange(end + 1) - begin) / (end - begin), 0.0, 1.0)
+    return 1.0 - faded**2 * (3.0 - 2.0 * faded)
 
 
 def _flat(reduced: Floats, columns: slice) -> Floats:
@@ -80,15 +80,16 @@ def _fitted(
     searched: int,
     given: float | None,
 ) -> tuple[RegressedPart, float]:
-    """A part's kernel and share, from flat trajectories (S, entries) by split; and what it explains on validation.
+    """A part's kernel and the weight of the ODE, from flat trajectories (S, entries) by split; and what it explains on
+    validation.
 
     Length scales, ridge and order are those of the first `searched` entries of the motions themselves: residuals on
-    training do not tell how smooth those of other parameters are. Unless `given`, the share has the smallest error on
-    validation, relative in each sequence: in small sets one hard sequence would decide. It is zero where that gain may
-    be chance, as with few validation motions it often is.
+    training do not tell how smooth those of other parameters are. Unless `given`, the weight has the smallest error on
+    validation, relative in each sequence: in small sets one hard sequence would decide. It is zero where that
+    improvement may be chance, as with few validation motions it often is.
     """
     known, asked = theta["train"], theta["val"]
-    mean, own = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
+    mean, motion_mean = truth["train"].mean(axis=0), motion["train"].mean(axis=0)
     # inner products are all that the search needs: coordinates in place of entries
     both = (np.concatenate([truth["train"], truth["val"]]) - mean)[:, :searched]
     u, sizes, _ = np.linalg.svd(both, full_matrices=False)
@@ -97,26 +98,26 @@ def _fitted(
     ridge = search_ridge(known, outputs, orders=ORDERS)[0]
 
     alone = mean + ridge.fit(known, truth["train"] - mean)(asked) - truth["val"]
-    added = motion["val"] - own - ridge.fit(known, motion["train"] - own)(asked)
+    added = motion["val"] - motion_mean - ridge.fit(known, motion["train"] - motion_mean)(asked)
     left = motion["val"] - truth["val"]
     weights = 1.0 / np.maximum(_norms(alone) * _norms(left), 1e-30)
-    share = given
-    if share is None:
-        share = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
-        share = float(np.clip(share, 0.0, 1.0))
-        gained = np.log(np.maximum(_norms(alone), 1e-30) / np.maximum(_norms(alone + share * added), 1e-30))
+    ode_weight = given
+    if ode_weight is None:
+        ode_weight = -(weights @ (alone * added).sum(axis=1)) / max(weights @ np.square(added).sum(axis=1), 1e-30)
+        ode_weight = float(np.clip(ode_weight, 0.0, 1.0))
+        gained = np.log(np.maximum(_norms(alone), 1e-30) / np.maximum(_norms(alone + ode_weight * added), 1e-30))
         if _chance(gained) > CHANCE:
-            share = 0.0
-    missed = alone + share * added
-    explained = 1.0 - (weights @ np.square(missed).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
+            ode_weight = 0.0
+    residual = alone + ode_weight * added
+    explained = 1.0 - (weights @ np.square(residual).sum(axis=1)) / max(weights @ np.square(left).sum(axis=1), 1e-30)
 
     ridge = search_ridge(known, outputs, (asked, expected), ridge)[0]
-    rest = truth["train"] - share * motion["train"]
+    rest = truth["train"] - ode_weight * motion["train"]
     u, sizes, modes = np.linalg.svd(rest - rest.mean(axis=0), full_matrices=False)
     dropped = np.cumsum(sizes[::-1] ** 2)[::-1] / len(known)  # by the modes from each one on
-    count = int((dropped > LEFT_OUT * np.square(missed).sum(axis=1).mean()).sum())
+    count = int((dropped > LEFT_OUT * np.square(residual).sum(axis=1).mean()).sum())
     regression = ridge.fit(known, (u * sizes)[:, :count])
-    return RegressedPart(regression, modes[:count], rest.mean(axis=0), share), float(explained)
+    return RegressedPart(regression, modes[:count], rest.mean(axis=0), ode_weight), float(explained)
 
 
 def _chance(gained: Floats) -> float:

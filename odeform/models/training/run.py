@@ -37,9 +37,9 @@ class Run:
     """The file that keeps the state of the training; None: it cannot be continued."""
     report: Callable[[str], None]
     loss: "Loss | None" = None
-    """What a descent minimises, in place of the model's own."""
+    """Replaces the model's own loss in a descent."""
     device: str | None = None
-    """Where a descent runs, as PyTorch names it; None: on a GPU if there is one."""
+    """Device of a descent, as PyTorch names it; None: a GPU if there is one."""
 
     def __post_init__(self) -> None:
         model = model_class(self.request.model)
@@ -86,13 +86,14 @@ def train_model(run: Run) -> Checkpoint:
 
 
 def _train_each(run: Run) -> Checkpoint:
-    """A model for each object, with an equal share of the budget. Its parameters are normalised by their own ranges."""
+    """A model for each object, with an equal fraction of the budget. Its parameters are normalised by their own
+    ranges."""
     objects, request = run.dataset.objects, run.request
     steps = None if request.steps is None else max(request.steps // len(objects), 1)
     request = replace(request, minutes=request.minutes / len(objects), steps=steps)
     parts = {}
     for name in objects:
-        dataset = _with_own_ranges(run.dataset.of(name))
+        dataset = _with_ranges_of_data(run.dataset.of(name))
 
         def report(line: str, name: str = name) -> None:
             run.report(f"{name}: {line}")
@@ -102,7 +103,7 @@ def _train_each(run: Run) -> Checkpoint:
     return joined(run.dataset.schema, parts)
 
 
-def _with_own_ranges(dataset: Dataset) -> Dataset:
+def _with_ranges_of_data(dataset: Dataset) -> Dataset:
     """Data whose schema has the ranges of its training sequences: contacts differ with the body, and so do forces."""
     rows = [entry.parameters for entry in dataset.select("train")]
     if not rows:
@@ -112,6 +113,6 @@ def _with_own_ranges(dataset: Dataset) -> Dataset:
         values = [float(row[p.name]) for row in rows]
         slack = NARROW * (p.high - p.low) if p.scale == "linear" else 0.0
         low, high = min(values) - slack, max(values) + slack
-        own = replace(p, low=low, high=high, default=min(max(p.default, low), high)) if low < high else p
-        ranges.append(p if p.role == "azimuth" else own)
+        narrowed = replace(p, low=low, high=high, default=min(max(p.default, low), high)) if low < high else p
+        ranges.append(p if p.role == "azimuth" else narrowed)
     return replace(dataset, schema=replace(dataset.schema, parameters=tuple(ranges)))

@@ -40,7 +40,7 @@ class SoftBody(FlexBody):
         """
         # MuJoCo would give every node the same mass
         masses = nodal_masses(points, elements, material)
-        total, shares = float(masses.sum()), masses / masses.sum()
+        total, mass_fractions = float(masses.sum()), masses / masses.sum()
         elasticity = f'young="{material.young}" poisson="{material.poisson}" damping="{_damping(material, step)}"'
         solver = f'solver="CG" tolerance="{TOLERANCE}"'
         if elements.shape[1] == 3:
@@ -49,7 +49,7 @@ class SoftBody(FlexBody):
             solver = 'solver="Newton"'
         contact = contact_of(material)
         xml = flex_xml(points, elements, total, elasticity, contact, step, gravity, floor, others, solver)
-        super().__init__(xml, points, shares)
+        super().__init__(xml, points, mass_fractions)
         self._material = material
 
     def set_timestep(self, step: float) -> None:

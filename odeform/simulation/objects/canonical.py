@@ -1,4 +1,4 @@
-"""Which of the seven objects a shape is most like, and how it is turned to lie as that one does."""
+"""Finds which of the seven objects a shape is most like, and how it is turned to lie as that one does."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ __all__ = ["SOLIDS", "distances_to", "most_like", "plausible_scale"]
 
 SOLIDS = tuple(name for name in OBJECTS if name != "chip")
 """The classes that a closed mesh can be: a chip is a shell."""
-HEADINGS = 12
+AZIMUTHS = 12
 SAMPLES = 400  # points of each shape that are compared
 SMALLEST, LARGEST = 0.04, 0.7  # m, extent of a body on which a sphere of 20 mm leaves a dent
 UNITS = (1.0, 1e-3, 1e-2)  # m: metres, millimetres, centimetres
@@ -37,9 +37,9 @@ def most_like(points: Points, like: str | None, up: str) -> tuple[str, Rotations
     for name in SOLIDS if like is None else (like,):
         body = _normalised(np.asarray(get_object(name).rest_mesh().points, dtype=float))
         tree = KDTree(body)
-        for heading in range(HEADINGS):
-            rotation = rotation_z(2.0 * math.pi * heading / HEADINGS) @ UPRIGHT[up]
-            distance = _apart(shape @ rotation.T, body, tree)
+        for azimuth in range(AZIMUTHS):
+            rotation = rotation_z(2.0 * math.pi * azimuth / AZIMUTHS) @ UPRIGHT[up]
+            distance = _distance(shape @ rotation.T, body, tree)
             best = min(best, (distance, name, rotation), key=lambda found: found[0])
     return best[1], best[2]
 
@@ -48,10 +48,10 @@ def distances_to(points: Points, names: Sequence[str]) -> dict[str, float]:
     """The mean distance of a surface (N, 3), as it lies, from that of each named object, all scaled to one size."""
     shape = _normalised(np.asarray(points, dtype=float))
     bodies = {name: _normalised(np.asarray(get_object(name).rest_mesh().points, dtype=float)) for name in names}
-    return {name: 0.5 * _apart(shape, body, KDTree(body)) for name, body in bodies.items()}
+    return {name: 0.5 * _distance(shape, body, KDTree(body)) for name, body in bodies.items()}
 
 
-def _apart(shape: Floats, body: Floats, tree: KDTree) -> float:
+def _distance(shape: Floats, body: Floats, tree: KDTree) -> float:
     """The mean distances of each from the other, added; `tree` is that of the body."""
     return float(tree.query(shape)[0].mean() + KDTree(shape).query(body)[0].mean())
 

@@ -16,7 +16,7 @@ SIZE = 0.4  # m to which the points are scaled meanwhile: `surface_of` works in 
 CELLS = 56  # along the longest side, at most
 SPACING = 1.5  # width of a cell, in median distances between neighbouring points
 GROWTH = (1, 2, 3, 4)  # cells by which points are thickened until they enclose something
-DEEP, SHARE = 2, 0.25  # share of the cells that are deeper than that many cells: less, and nothing is enclosed
+DEEP, FRACTION = 2, 0.25  # fraction of the cells that are deeper than that many cells: less, and nothing is enclosed
 SMOOTHING = 1.0  # cells
 LEVEL = 0.69  # of the smoothed cells: the surface passes through the points, half a cell within the cells' outline
 EDGE = 1.2  # cells, of the surface
@@ -56,6 +56,6 @@ def _solid(points: Floats, cell: float) -> tuple[np.ndarray, Floats]:
     for growth in GROWTH:
         filled = np.asarray(ndimage.binary_fill_holes(ndimage.binary_dilation(outline, iterations=growth)))
         solid = np.asarray(ndimage.binary_erosion(filled, iterations=growth))
-        if np.asarray(ndimage.binary_erosion(solid, iterations=DEEP)).sum() > SHARE * solid.sum():
+        if np.asarray(ndimage.binary_erosion(solid, iterations=DEEP)).sum() > FRACTION * solid.sum():
             return solid, origin
     raise InputError("the points enclose no volume: their outline is open or flat")

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.io import atomic_open
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
 
-__all__ = ["arrays_of", "object_of", "read_object", "write_object"]
+__all__ = ["arrays_of", "object_of", "read_object"]
 
 
 def arrays_of(item: SoftObject) -> dict[str, Any]:
@@ -42,14 +41,8 @@ def object_of(arrays: Mapping[str, Any]) -> SoftObject:
     )
 
 
-def write_object(item: SoftObject, path: Path) -> None:
-    """Write `path`, of `arrays_of`."""
-    with atomic_open(path) as file:
-        np.savez_compressed(file, **arrays_of(item))
-
-
 def read_object(path: Path) -> SoftObject:
-    """Read a file that `write_object` has written. Raises `InputError` if it cannot be read."""
+    """Read a file of `arrays_of`. Raises `InputError` if it cannot be read."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return object_of(file)

@@ -9,7 +9,7 @@ from odeform.types import Floats, Ints, Mesh, Perpoint, Points
 
 __all__ = ["surface_of"]
 
-REACH = 0.4  # m; a solid lies within this distance of the origin along each axis
+HALF_WIDTH = 0.4  # m; a solid lies within this distance of the origin along each axis
 COARSE = 0.012  # m, spacing of the grid that finds its extent
 
 
@@ -39,8 +39,8 @@ def surface_of(distance: Callable[[Points], Perpoint], edge: float) -> Mesh:
 
 def _extent(distance: Callable[[Points], Perpoint], margin: float) -> tuple[Floats, Floats]:
     """Corners (3,) m of a box around the solid."""
-    low = np.full(3, -REACH)
-    points = _grid(low, COARSE, np.full(3, int(2.0 * REACH / COARSE) + 1))
+    low = np.full(3, -HALF_WIDTH)
+    points = _grid(low, COARSE, np.full(3, int(2.0 * HALF_WIDTH / COARSE) + 1))
     near = points[distance(points) < COARSE]
     return near.min(axis=0) - COARSE - margin, near.max(axis=0) + COARSE + margin
 

@@ -20,9 +20,9 @@ from odeform.types import Floats, Ints, Mesh, Points
 __all__ = ["even_surface", "repaired"]
 
 SPECK = 0.02  # extent of a part, relative to the whole, below which it is dropped
-PART = 0.1  # share of the volume of a second body that is not dropped any more
+PART = 0.1  # fraction of the volume of a second body that is not dropped any more
 OPEN = 0.7  # sum of the area vectors, relative to the area: 0 if closed, 0.5 for half of a sphere, 1 for a flat sheet
-HOLLOW = 0.01  # share of the convex hull's volume below which a mesh encloses nothing
+HOLLOW = 0.01  # fraction of the convex hull's volume below which a mesh encloses nothing
 ATTEMPTS = 6  # at a closed surface, where thin parts make that hard
 FINE = 9000  # vertices before remeshing
 

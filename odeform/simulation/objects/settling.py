@@ -12,7 +12,7 @@ __all__ = ["REST_SPEED", "STEP", "settle"]
 
 STEP, COARSE = 5e-4, 2e-3  # s
 REST_SPEED = 1e-3  # m/s, RMS over the mass; a body counts as settled at a fifth of it
-CALM, LIMIT, WATCHED = 20, 3000, 100  # steps that slow before it counts; steps at most; undamped steps at the end
+CALM, LIMIT, UNDAMPED = 20, 3000, 100  # steps that slow before it counts; steps at most; undamped steps at the end
 
 
 def settle(points: Points, elements: Ints, material: SoftMaterial) -> Points:
@@ -26,7 +26,7 @@ def settle(points: Points, elements: Ints, material: SoftMaterial) -> Points:
     for step in (COARSE, STEP):
         positions = _calmed(_body(points, elements, material, step, positions))
     body = _body(points, elements, material, STEP, positions)
-    for _ in range(WATCHED):
+    for _ in range(UNDAMPED):
         body.step()
     body.check()
     speed = np.sqrt(_energy(body))

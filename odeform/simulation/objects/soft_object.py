@@ -26,7 +26,7 @@ class SoftMaterial:
     friction: float
     """Coulomb coefficient against the floor and the projectile."""
     source: str
-    """Where the figures come from, in one line."""
+    """Source of the figures, in one line."""
     thickness: float = 0.0
     """Thickness of a shell in metres; 0 for a solid."""
 
@@ -67,7 +67,7 @@ class SoftObject:
 
     @cached_property
     def weights(self) -> Perpoint:
-        """(S,) share of the mass at each surface vertex, summing to 1. Inner nodes count for the nearest one."""
+        """(S,) mass fraction at each surface vertex, summing to 1. Inner nodes count for the nearest one."""
         count = self.surface_count
         nearest = np.arange(len(self.points))
         if count < len(self.points):
@@ -97,14 +97,14 @@ def _changed(item: SoftObject, mass: float, young: float) -> SoftObject:
 
 
 def nodal_masses(points: Points, elements: Ints, material: SoftMaterial) -> Floats:
-    """(N,) kg: every element gives an equal share of its mass to each of its nodes."""
+    """(N,) kg: every element gives an equal part of its mass to each of its nodes."""
     corners = np.asarray(points, dtype=float)[elements]
     sides = corners[:, 1:] - corners[:, :1]
     if elements.shape[1] == 4:
         sizes = np.abs(np.linalg.det(sides)) / 6.0
     else:
         sizes = 0.5 * material.thickness * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    share = material.density * sizes / elements.shape[1]
+    part = material.density * sizes / elements.shape[1]
     masses = np.zeros(len(points))
-    np.add.at(masses, elements, share[:, None])
+    np.add.at(masses, elements, part[:, None])
     return masses

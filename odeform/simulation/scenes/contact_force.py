@@ -98,10 +98,10 @@ def simulate_object(
     """One motion of the surface of any soft object to `until` seconds (default: over the scene's window), with frames
     at `rate` Hz. Beyond the window it ends where the body rests.
 
-    `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the share done. Frame 0
-    is the body settled under the parameters `mass` and `young`, if there are any; the contact is a place on `item` and
-    moves with its surface. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError` for
-    a contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and
+    `step` in seconds is that of the first 50 ms; later steps are twice as long. `report` gets the fraction done. Frame
+    0 is the body settled under the parameters `mass` and `young`, if there are any; the contact is a place on `item`
+    and moves with its surface. A contact up to 5 mm off the surface is moved to its nearest point. Raises `InputError`
+    for a contact or a force that the scene does not have (`odeform.geometry.contact.checked_contact`), and
     `SimulationError`.
     """
     # here, so that looking at the scene and training on its data need no simulator
@@ -121,13 +121,13 @@ def simulate_object(
     body.positions = item.settled
     struck = StruckBody(body, force, PULSE)
 
-    def share(now: float) -> None:
+    def report_pulse(now: float) -> None:
         report(now / until)
 
-    times, nodes = run(struck, COARSE_FROM, rate, report=share)
+    times, nodes = run(struck, COARSE_FROM, rate, report=report_pulse)
     body.set_timestep(2.0 * step)
     rest = REST if until > window.stop else None
-    later, more = run(struck, until, rate, begin=COARSE_FROM, rest=rest, report=share)
+    later, more = run(struck, until, rate, begin=COARSE_FROM, rest=rest, report=report_pulse)
     new = later > times[-1] + 0.5 / rate
     _check_orientation(item, more[-1])
     vertices = np.concatenate([nodes, more[new]])[:, : item.surface_count]

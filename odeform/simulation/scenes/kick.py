@@ -39,7 +39,7 @@ SCHEMA = Schema(
         mass(0.4, 1.5, 0.7),
         bending(3.0),
         Parameter("force", "N", 10.0, 160.0, 120.0, description="peak of the pulse F sin^2(pi t / 20 ms)"),
-        Parameter("azimuth", "rad", -math.pi, math.pi, 0.0, role="azimuth", description="heading of the pulse"),
+        Parameter("azimuth", "rad", -math.pi, math.pi, 0.0, role="azimuth", description="direction of the pulse"),
         Parameter("elevation", "rad", 0.0, 1.2, 0.6, description="rise of the pulse above the floor"),
     ),
     window=Window(0.0, 1.0, 120.0),
@@ -48,12 +48,12 @@ SCHEMA = Schema(
 
 
 def pulse_direction(elevation: float) -> Floats:
-    """Unit vector of the pulse in its own frame (x is the heading, z is up)."""
+    """Unit vector of the pulse in its own frame (x is the azimuth, z is up)."""
     return np.array([math.cos(elevation), 0.0, math.sin(elevation)])
 
 
 def pulse_weights(rest: Floats, elevation: float) -> Floats:
-    """(N,) share of the pulse at each vertex, exp(-(angle / 25 deg)^2) around the struck point, summing to 1."""
+    """(N,) fraction of the pulse at each vertex, exp(-(angle / 25 deg)^2) around the struck point, summing to 1."""
     outward = rest / np.linalg.norm(rest, axis=1, keepdims=True)
     angle = np.arccos(np.clip(-outward @ pulse_direction(elevation), -1.0, 1.0))
     weights = np.exp(-((angle / SPREAD) ** 2))
@@ -70,8 +70,8 @@ def simulate(
 ) -> MotionSequence:
     """One motion up to `until` seconds, with frames at `rate` Hz (default: the window's).
 
-    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the share done. The mesh is
-    oriented with the pulse: the heading is a symmetry of the scene, and a mesh that turns with it keeps this symmetry
+    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the fraction done. The mesh is
+    oriented with the pulse: the azimuth is a symmetry of the scene, and a mesh that turns with it keeps this symmetry
     exact. Raises `SimulationError`.
     """
     body, rest, mesh = stress_free(parameters, step, resolution)

@@ -52,8 +52,8 @@ def simulate(
 ) -> MotionSequence:
     """One drop until the ball rests, with frames at `rate` Hz (default: the window's).
 
-    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the share done. A stress-free ball
-    falls as a point does; the simulator takes over shortly before it lands. Raises `SimulationError`.
+    `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the fraction done. A stress-free
+    ball falls as a point does; the simulator takes over shortly before it lands. Raises `SimulationError`.
     """
     rate = rate or SCHEMA.window.rate
     body, rest, mesh = stress_free(parameters, step, resolution)

@@ -7,7 +7,7 @@ from odeform.schema import Schema
 from odeform.simulation.scene import Scene
 from odeform.surroundings import Surroundings
 
-__all__ = ["SCENES", "find_scene", "get_scene", "known_scenes", "surroundings_of"]
+__all__ = ["SCENES", "find_scene", "get_scene", "surroundings_of"]
 
 SCENES: dict[str, str] = {
     "mass-elastic": "odeform.simulation.scenes.mass_elastic:SCENE",
@@ -15,11 +15,6 @@ SCENES: dict[str, str] = {
     "contact-force": "odeform.simulation.scenes.contact_force:SCENE",
 }
 """Scene name to "module:attribute", imported when the scene is first asked for."""
-
-
-def known_scenes() -> tuple[str, ...]:
-    """Names of all scenes."""
-    return tuple(SCENES)
 
 
 def find_scene(name: str) -> Scene | None:
@@ -45,9 +40,9 @@ def get_scene(name: str) -> Scene:
 
 
 def surroundings_of(schema: Schema) -> Surroundings | None:
-    """What is around the bodies of a schema; None where it is not known, as for imported data.
+    """Returns what is around the bodies of a schema; None where it is not known, as for imported data.
 
-    Files of before schemas had surroundings have those of the scene of their name.
+    Files from before schemas had surroundings get those of the scene that they name.
     """
     if schema.surroundings is not None:
         return schema.surroundings

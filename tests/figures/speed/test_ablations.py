@@ -22,7 +22,7 @@ def test_removed_modes_are_what_is_missing(predictors: dict[str, Predictor], kep
     y = motion.trajectory.reduced(TIMES)
     values = motion.evaluated.values[kept:].reshape(-1, len(motion.evaluated.points), 3)
     left_out = np.einsum("tk,kni->tni", y[:, 6 + kept :], values)
-    turned = left_out @ motion.pose(TIMES)[:, :3, :3].swapaxes(1, 2)  # the default heading is along x
+    turned = left_out @ motion.pose(TIMES)[:, :3, :3].swapaxes(1, 2)  # the default azimuth is along x
     missing = motion.vertices(TIMES) - with_modes(motion, kept).vertices(TIMES)
     assert np.abs(missing).max() > 1e-5
     assert np.abs(missing - turned).max() < 1e-6

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from point_models import POINT_MODELS
 
 from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
@@ -22,7 +23,7 @@ from odeform.models.points.point_trajectories import point_batch
 from odeform.models.points.training.fit import fit_points, initial_weights
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.torch_arithmetic import Torch
-from odeform.models.registry import load, models_of
+from odeform.models.registry import load
 from odeform.models.training.request import TrainRequest
 from odeform.models.training.run import Run
 from odeform.types import GaussianSplats, Mesh, PointCloud
@@ -31,7 +32,6 @@ SETTING = {"mass": 0.6, "force": 110.0, "azimuth": 0.7}
 TIMES = np.arange(0, 121, 8) / 120.0
 ROUNDING = 2e-6  # m; products over more rows round otherwise
 
-POINT_MODELS = models_of(PointModel)
 PARAMETRIC = [name for name, model in POINT_MODELS.items() if model.network.sampling != "between"]
 everywhere = pytest.mark.parametrize("model", PARAMETRIC)
 

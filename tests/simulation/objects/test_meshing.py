@@ -10,8 +10,8 @@ from odeform.errors import InputError
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.canonical import most_like, plausible_scale
 from odeform.simulation.objects.catalog import get_object
-from odeform.simulation.objects.files import read_object, write_object
-from odeform.simulation.objects.foreign import make_object
+from odeform.simulation.objects.files import arrays_of, read_object
+from odeform.simulation.objects.from_mesh import placed_object
 from odeform.simulation.objects.level_set import surface_of
 from odeform.simulation.objects.remesh import remesh
 from odeform.simulation.objects.repair import even_surface, repaired
@@ -72,7 +72,7 @@ def test_the_thickness_of_a_ball_is_its_diameter():
 
 def test_a_file_returns_what_was_written(tmp_path):
     item = get_object("donut")
-    write_object(item, tmp_path / "copy.npz")
+    np.savez_compressed(tmp_path / "copy.npz", **arrays_of(item))
     copy = read_object(tmp_path / "copy.npz")
     assert (copy.name, copy.material, copy.forces) == (item.name, item.material, item.forces)
     np.testing.assert_array_equal(copy.elements, item.elements)
@@ -174,9 +174,9 @@ def test_defects_are_repaired(shape, scale: float):
 
 
 @pytest.mark.slow
-def test_a_foreign_mesh_becomes_a_solid_of_its_size():
+def test_a_mesh_becomes_a_solid_of_its_size():
     shape = trimesh.creation.torus(60.0, 25.0)  # millimetres
-    item = make_object(mesh_of(shape), "ring")
+    item = placed_object(mesh_of(shape), "ring").item
     assert item.name == "ring"
     assert np.ptp(item.settled, axis=0) == pytest.approx([0.17, 0.17, 0.05], abs=0.004)
     assert shape_of(item.rest_mesh()).is_watertight
@@ -194,6 +194,6 @@ def test_a_body_that_cannot_rest_is_reported(monkeypatch):
 def test_a_body_whose_parts_collapse_under_its_weight_is_reported(monkeypatch):
     settling, item = "odeform.simulation.objects.settling", get_object("donut")
     monkeypatch.setattr(f"{settling}._calmed", lambda _: item.points * [1.0, 1.0, -1.0])
-    monkeypatch.setattr(f"{settling}.WATCHED", 0)
+    monkeypatch.setattr(f"{settling}.UNDAMPED", 0)
     with pytest.raises(SimulationError, match=r"collapse under its weight: (\d+) of \1 tetrahedra are inside out"):
         settle(item.points, item.elements, item.material)

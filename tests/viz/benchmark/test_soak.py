@@ -9,12 +9,12 @@ import pytest
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.types import MotionSequence
+from odeform_figures.viewer_benchmark.allocated import allocated_mb
 from odeform_figures.viewer_benchmark.soak import Soak, soak
 from odeform_viz.app import App
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.panels import truth
 from odeform_viz.runtime import jobs
-from odeform_viz.runtime.memory import allocated_mb
 
 FRAMES = 600  # of a stub of a simulation, over its whole window
 

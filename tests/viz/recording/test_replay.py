@@ -41,7 +41,7 @@ def test_the_same_frames_agree(kick: Predictor, path: Path, record: Record, caps
     record(path, [_column(kick)], np.linspace(0.0, 1.2, 12).tolist())
     (checked,) = check_recording(read_recording(path))
     assert checked.frames == 12
-    assert 0.0 <= checked.off <= 2e-6
+    assert 0.0 <= checked.error <= 2e-6
     assert main(["--replay", str(path)]) == 0
     assert "odeform: 12 frames" in capsys.readouterr().out
 
@@ -52,7 +52,7 @@ def test_columns_of_other_models_and_pinned_parameters_agree(kick: Predictor, pa
     record(path, [_column(kick), Column("pod-rbf", rival, rival.rest, origin=name), pinned])
     checked = check_recording(read_recording(path))
     assert [(c.label, c.frames) for c in checked] == [("odeform", 3), ("pod-rbf", 3), ("heavy one", 3)]
-    assert max(c.off for c in checked) <= 2e-6
+    assert max(c.error for c in checked) <= 2e-6
 
 
 def test_more_than_ten_columns_keep_their_names_and_parameters(kick: Predictor, path: Path, record: Record) -> None:
@@ -60,7 +60,7 @@ def test_more_than_ten_columns_keep_their_names_and_parameters(kick: Predictor, 
     record(path, [_column(kick, label=f"{m:.2f}", pinned=kick.schema.complete({"mass": m})) for m in masses], [0.03])
     checked = check_recording(read_recording(path))
     assert sorted(c.label for c in checked) == [f"{m:.2f}" for m in masses]
-    assert max(c.off for c in checked) <= 2e-6
+    assert max(c.error for c in checked) <= 2e-6
 
 
 def test_splats_are_checked_by_their_centres(kick: Predictor, path: Path, record: Record) -> None:
@@ -71,7 +71,7 @@ def test_splats_are_checked_by_their_centres(kick: Predictor, path: Path, record
     record(path, [_column(kick, geometry=fit.geometry, fit=fit)])
     (checked,) = check_recording(read_recording(path))
     assert checked.frames == 3
-    assert checked.off <= 2e-6
+    assert checked.error <= 2e-6
 
 
 @pytest.mark.parametrize("moved", ["vertex", "pose", "nan"])
@@ -93,7 +93,7 @@ def test_a_changed_vertex_or_pose_is_found(
     (checked,) = check_recording(read_recording(path))
     assert checked.frame == 1
     if moved != "nan":
-        assert checked.off == pytest.approx(3e-5, abs=1e-6)
+        assert checked.error == pytest.approx(3e-5, abs=1e-6)
     if moved != "pose":
         assert checked.vertex == 7
     assert main(["--replay", str(path)]) == 1
@@ -129,7 +129,7 @@ def test_a_truth_is_loaded_again_and_a_simulated_one_is_skipped(
     record(path, [own, truth], [0.0, 0.31, 0.5], dict(truth.truth.parameters))
     checked = check_recording(read_recording(path))
     assert [(c.label, c.frames) for c in checked] == [("odeform", 3), ("truth", 3)]
-    assert max(c.off for c in checked) <= 2e-6
+    assert max(c.error for c in checked) <= 2e-6
     record(path, [own, replace(truth, origin="")], [0.31])
     assert main(["--replay", str(path)]) == 0
     assert "truth: skipped, it is not from a data set" in capsys.readouterr().out

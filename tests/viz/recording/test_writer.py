@@ -102,7 +102,7 @@ def test_a_minute_of_playback_stays_small(kick: Predictor, path: Path) -> None:
     assert sizes[1] - sizes[0] < 150 * 11_000  # bytes per frame, for 20 MB in 60 s at 30 Hz
     (checked,) = check_recording(read_recording(path))
     assert checked.frames == 300
-    assert checked.off < 1e-6
+    assert checked.error < 1e-6
 
 
 def test_requests_and_shapes_read_back_exactly(kick: Predictor, path: Path, record: Record) -> None:

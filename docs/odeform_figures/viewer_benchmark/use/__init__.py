@@ -1,4 +1,4 @@
-"""What people do with the page, as scripts: `SCRIPTS` by the control that each needs. `Missed` if one fails."""
+"""Scripts what people do with the page: `SCRIPTS` by the control that each needs. `Missed` if one fails."""
 
 from collections.abc import Callable
 

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 
 from odeform_figures.viewer_benchmark.visitors import Visitors
-from odeform_viz.own_shapes import takes_user_bodies
+from odeform_viz.user_bodies import takes_user_bodies
 
 __all__ = ["load_shapes"]
 

@@ -24,7 +24,8 @@ class TrainConfig:
     rate: float = 5e-3
     """Initial learning rate; it decays to zero as a cosine."""
     horizon: tuple[float, float] = (0.25, 0.33)
-    """Share of the motion that is rolled out at first, and share of the training in which it grows to the whole."""
+    """Fraction of the motion that is rolled out at first, and fraction of the training in which it grows to the
+    whole."""
     ridge: float = 1e-6
     """Ridge of the readout's least squares during descent, relative to the mean square of a feature."""
     random_features: int = 1500
@@ -34,7 +35,7 @@ class TrainConfig:
     ridges: tuple[float, ...] = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)
     """Candidates for the ridge of the final solve; validation chooses for each decoder."""
     widening: float = 0.33
-    """Share of the minutes for the final solve; where it does not suffice, there are fewer random features."""
+    """Fraction of the minutes for the final solve; where it does not suffice, there are fewer random features."""
     between: float = 0.1
     """Weight in the final solve, relative to a frame, of the spline through the truth halfway between frames."""
     deformed: float = 4.0

@@ -28,13 +28,13 @@ def _descend(trainer: Trainer, config: TrainConfig, report: Callable[[str], None
     begin, printed = time.process_time() - trainer.elapsed, trainer.elapsed
 
     def spent() -> float:
-        """The share of the budget that is spent."""
+        """The fraction of the budget that is spent."""
         done, budget = (trainer.elapsed, seconds) if config.steps is None else (trainer.done, config.steps)
         return done / budget if budget else 1.0
 
     try:
-        while (share := spent()) < 1.0:
-            trainer.advance(share)
+        while (fraction := spent()) < 1.0:
+            trainer.advance(fraction)
             trainer.elapsed = time.process_time() - begin
             if trainer.elapsed - printed > config.report:
                 printed = trainer.elapsed

@@ -17,9 +17,9 @@ class Metric(nn.Module):
 
     scale: torch.Tensor
 
-    def __init__(self, gains: torch.Tensor, gyration_radius: float) -> None:
+    def __init__(self, output_scales: torch.Tensor, gyration_radius: float) -> None:
         super().__init__()
-        scale = 1e3 * gains.clone()
+        scale = 1e3 * output_scales.clone()
         scale[3:POSE] *= gyration_radius * (2.0 / 3.0) ** 0.5
         self.register_buffer("scale", scale)
 

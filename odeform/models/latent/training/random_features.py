@@ -93,8 +93,8 @@ def _solve(
     features, found = decoder.features(fit.states["val"], fit.conditions["val"]), []
     for ridge in ridges:
         decoder.readout.weight.data = equations.solve(ridge)
-        missed = (decoder.readout(features) - fit.truth["val"]) * fit.scale
-        error = float((fit.weights["val"][..., None] * missed**2).sum())
+        residual = (decoder.readout(features) - fit.truth["val"]) * fit.scale
+        error = float((fit.weights["val"][..., None] * residual**2).sum())
         found.append((error, copy.deepcopy(decoder.state_dict())))
     return min(found, key=lambda one: one[0])
 

@@ -1,4 +1,4 @@
-"""What is solved for, not descended in: the readout of a decoder, and random features that widen it.
+"""Solves for the readout of a decoder, which is not descended in, and draws random features that widen it.
 
 A readout is linear, so its best value for given features is a least-squares solve.
 """
@@ -7,9 +7,9 @@ import torch
 
 __all__ = ["NormalEquations", "random_layer"]
 
-STATE_GAINS = (0.1, 1.0)
-CLOCK_GAINS = (1.0, 10.0)
-PARAMETER_GAINS = (0.1, 1.0)
+STATE_SLOPES = (0.1, 1.0)
+CLOCK_SLOPES = (1.0, 10.0)
+PARAMETER_SLOPES = (0.1, 1.0)
 """Slopes of random features at sharpness 1: per standard deviation of the principal components together, per unit of
 the clock, and of parameters. Each feature draws its own between these, uniformly on a logarithmic scale: contacts are
 short, and the motion after a bounce depends on the parameters more finely than the motion before.
@@ -66,17 +66,17 @@ def random_layer(
     values, vectors = torch.linalg.eigh(spread)
     values, vectors = values.flip(0)[:components], vectors.flip(1)[:, :components]
     # directions without motion carry nothing but rounding
-    gains = torch.where(values > 1e-10 * values[0], values.clamp_min(1e-300).rsqrt(), 0.0)
+    scales = torch.where(values > 1e-10 * values[0], values.clamp_min(1e-300).rsqrt(), 0.0)
     squeeze = torch.zeros(components + conditions, split + conditions, dtype=torch.float64)
-    squeeze[:components, :split] = gains[:, None] * vectors.T
+    squeeze[:components, :split] = scales[:, None] * vectors.T
     squeeze[components:, split:] = torch.eye(conditions, dtype=torch.float64)
     offset = torch.cat([-squeeze[:components, :split] @ mean, torch.zeros(conditions, dtype=torch.float64)])
     draw = {"generator": generator, "dtype": torch.float64, "device": generator.device}
-    directions, reach = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
-    for width, (low, high) in ((components, STATE_GAINS), (1, CLOCK_GAINS), (parameters, PARAMETER_GAINS)):
-        gains = sharpness * low * (high / low) ** torch.rand(count, **draw)
-        directions.append(gains[:, None] / width**0.5 * torch.randn(count, width, **draw))
-        reach += gains**2
-    biases = reach.sqrt() * (2.0 * torch.rand(count, **draw) - 1.0)
+    directions, squared = [], torch.zeros(count, dtype=torch.float64, device=generator.device)
+    for width, (low, high) in ((components, STATE_SLOPES), (1, CLOCK_SLOPES), (parameters, PARAMETER_SLOPES)):
+        slopes = sharpness * low * (high / low) ** torch.rand(count, **draw)
+        directions.append(slopes[:, None] / width**0.5 * torch.randn(count, width, **draw))
+        squared += slopes**2
+    biases = squared.sqrt() * (2.0 * torch.rand(count, **draw) - 1.0)
     layers = {"0.weight": squeeze, "0.bias": offset, "2.weight": torch.cat(directions, dim=1), "2.bias": biases}
     return {name: value.float() for name, value in layers.items()}

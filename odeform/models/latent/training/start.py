@@ -11,10 +11,7 @@ from odeform.motion.reduced_space import POSE
 
 __all__ = ["build_network", "training_shape"]
 
-CLOCK_GAINS = (
-    3.0,
-    30.0,
-)  # initial slopes of features of the clock: contacts are short, and descent sharpens slowly
+CLOCK_SLOPES = (3.0, 30.0)  # of features of the clock, at first: contacts are short, and descent sharpens slowly
 
 
 def build_network(data: TrainingData, seed: int) -> ODeformNet:
@@ -24,13 +21,13 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
     config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE)
     net = ODeformNet(config)
     spread = np.sqrt((train**2).mean(axis=(0, 1)))
-    gains = np.concatenate(
+    scales = np.concatenate(
         [np.full(3, np.linalg.norm(spread[:3])), np.full(3, np.linalg.norm(spread[3:6])), spread[6:]]
     )
     # what does not move, such as the rotation of a ball that falls straight, is not scaled up to one
-    floor = 1e-3 * gains[:3].max() / np.repeat([1.0, data.space.gyration_radius, 1.0], [3, 3, len(gains) - POSE])
+    floor = 1e-3 * scales[:3].max() / np.repeat([1.0, data.space.gyration_radius, 1.0], [3, 3, len(scales) - POSE])
     floor[POSE:] = 1e-9
-    net.gains.copy_(torch.as_tensor(np.maximum(gains, floor)))
+    net.gains.copy_(torch.as_tensor(np.maximum(scales, floor)))
     # a field of order one should cross the latent space in a few frames, not in a second
     net.time_scale.fill_(0.05)
     for decoder in net.decoders:
@@ -41,7 +38,7 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
                 nn.init.uniform_(layer.bias, -1.0, 1.0)
         first = decoder.hidden[0]
         assert isinstance(first, nn.Linear)
-        (low, high), count = CLOCK_GAINS, first.out_features
+        (low, high), count = CLOCK_SLOPES, first.out_features
         sharp = low * (high / low) ** torch.rand(count) * torch.randn(count)
         first.weight.data[:, -1 - config.parameters] = sharp
         first.bias.data -= sharp * (2.0 * torch.rand(count) - 1.0)

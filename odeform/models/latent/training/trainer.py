@@ -21,7 +21,7 @@ from odeform.models.latent.training.config import FREE, TrainConfig
 from odeform.models.latent.training.losses import Metric, balanced
 from odeform.models.latent.training.readout import NormalEquations
 from odeform.models.latent.training.start import training_shape
-from odeform.models.latent.training.tree import fill, strip
+from odeform.models.latent.training.tree import flatten, unflatten
 from odeform.models.training.descent import cosine_decay
 from odeform.models.training.loss import Loss
 from odeform.motion.reduced_space import POSE
@@ -45,12 +45,12 @@ class Trainer:
     def __init__(
         self, net: ODeformNet, data: TrainingData, config: TrainConfig, device: torch.device, loss: Loss | None = None
     ) -> None:
-        self.net, self.config, self.device, self.own_loss = net.to(device), config, device, loss
+        self.net, self.config, self.device, self.given_loss = net.to(device), config, device, loss
         self.metric = Metric(net.gains, data.space.gyration_radius)
-        gains = net.gains.cpu().double().numpy()
+        scales = net.gains.cpu().double().numpy()
         # frames first, as roll-outs have them
         self.truth = {
-            k: torch.as_tensor(v / gains).float().transpose(0, 1).contiguous().to(device)
+            k: torch.as_tensor(v / scales).float().transpose(0, 1).contiguous().to(device)
             for k, v in data.reduced.items()
         }
         train, val = (torch.as_tensor(data.observed[split]).T.contiguous().to(device) for split in ("train", "val"))
@@ -68,8 +68,8 @@ class Trainer:
         frame = float(data.times[1] - data.times[0])
         self.frame, self.substeps = frame, max(1, math.ceil(frame / config.longest - 1e-9))
         self.identity = data.identity
-        points, shares = training_shape(data)
-        self.shape = points.to(device), shares.to(device)
+        points, areas = training_shape(data)
+        self.shape = points.to(device), areas.to(device)
         self.frames = len(self.truth["train"]) - 1
         self.generator = torch.Generator().manual_seed(config.seed)
         for decoder in net.decoders:
@@ -113,18 +113,18 @@ class Trainer:
             decoder.readout.weight.data = readout.solve(self.config.ridge).to(features.dtype)
             predicted.append(decoder.readout(features))
         compared = torch.cat(predicted, dim=-1)[1:], truth[1:], weights[1:]
-        if self.own_loss is not None:
+        if self.given_loss is not None:
             guessed, known = (1e-3 * self.metric.scale * y for y in compared[:2])
-            return self.own_loss(guessed, known, compared[2])
+            return self.given_loss(guessed, known, compared[2])
         return balanced(*self.metric(*compared)[-len(self.outputs) :])
 
-    def advance(self, share: float) -> None:
-        """One step of descent, at this share of the training."""
+    def advance(self, fraction: float) -> None:
+        """One step of descent, at this fraction of the training."""
         config = self.config
         start, grown = config.horizon
-        frames = min(self.frames, round(self.frames * (start + (1.0 - start) * share / grown)))
+        frames = min(self.frames, round(self.frames * (start + (1.0 - start) * fraction / grown)))
         warm = min(1.0, (self.done + 1) / 20.0)
-        self.optimiser.param_groups[0]["lr"] = warm * config.rate * cosine_decay(share)
+        self.optimiser.param_groups[0]["lr"] = warm * config.rate * cosine_decay(fraction)
         rows = torch.randperm(len(self.theta["train"]), generator=self.generator)[: self.batch]
         self.optimiser.zero_grad()
         self.loss(rows.to(self.device), max(frames, 2)).backward()
@@ -157,8 +157,8 @@ class Trainer:
     def errors_mm(self, split: str) -> tuple[float, float]:
         """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         predicted = self.net.decode(self.paths(split)[::2], self.times, self.theta[split])
-        missed = self.metric(predicted[1:], self.truth[split][1:], self.observed[split][1:])
-        rigid, local = (torch.stack(missed) / 3.0).sqrt().tolist()
+        residual = self.metric(predicted[1:], self.truth[split][1:], self.observed[split][1:])
+        rigid, local = (torch.stack(residual) / 3.0).sqrt().tolist()
         return rigid, local
 
     def double(self) -> None:
@@ -172,7 +172,7 @@ class Trainer:
         self.times = self.times.double()
 
     def _fingerprint(self) -> dict[str, Any]:
-        """What must be the same for a training to be resumed."""
+        """Lists what must be the same for a training to be resumed."""
         config = {k: v for k, v in asdict(self.config).items() if k not in FREE}
         network = {k: v for k, v in asdict(self.net.config).items() if k not in FREE}
         return {"data": self.identity, "network": network, "config": config}
@@ -180,7 +180,7 @@ class Trainer:
     def save(self, path: Path) -> None:
         """Write the state, from which `restore` continues bit-exactly."""
         tensors = {f"net.{name}": value for name, value in self.net.state_dict().items()}
-        optimiser = strip(self.optimiser.state_dict(), tensors, "optimiser")
+        optimiser = flatten(self.optimiser.state_dict(), tensors, "optimiser")
         tensors["generator"] = self.generator.get_state()
         meta = {**self._fingerprint(), "done": self.done, "elapsed": self.elapsed, "optimiser": optimiser}
         tensors = {name: value.contiguous() for name, value in tensors.items()}
@@ -202,7 +202,7 @@ class Trainer:
                     )
             weights = {k.removeprefix("net."): v for k, v in tensors.items() if k.startswith("net.")}
             self.net.load_state_dict(weights)
-            optimiser = fill(meta["optimiser"], tensors)
+            optimiser = unflatten(meta["optimiser"], tensors)
             optimiser["state"] = {int(index): state for index, state in optimiser["state"].items()}
             self.optimiser.load_state_dict(optimiser)
             self.generator.set_state(tensors["generator"])

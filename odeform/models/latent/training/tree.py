@@ -4,29 +4,29 @@ from typing import Any
 
 import torch
 
-__all__ = ["fill", "strip"]
+__all__ = ["flatten", "unflatten"]
 
 MARK = "tensor:"
 
 
-def strip(tree: Any, tensors: dict[str, torch.Tensor], name: str) -> Any:
+def flatten(tree: Any, tensors: dict[str, torch.Tensor], name: str) -> Any:
     """The tree for JSON, with names in place of its tensors, which are put into `tensors`. Names begin with `name`."""
     if isinstance(tree, torch.Tensor):
         tensors[name] = tree
         return MARK + name
     if isinstance(tree, dict):
-        return {key: strip(value, tensors, f"{name}.{key}") for key, value in tree.items()}
+        return {key: flatten(value, tensors, f"{name}.{key}") for key, value in tree.items()}
     if isinstance(tree, list | tuple):
-        return [strip(value, tensors, f"{name}.{index}") for index, value in enumerate(tree)]
+        return [flatten(value, tensors, f"{name}.{index}") for index, value in enumerate(tree)]
     return tree
 
 
-def fill(tree: Any, tensors: dict[str, torch.Tensor]) -> Any:
-    """The inverse of `strip`; tuples come back as lists. `KeyError` where a tensor is missing."""
+def unflatten(tree: Any, tensors: dict[str, torch.Tensor]) -> Any:
+    """The inverse of `flatten`; tuples come back as lists. `KeyError` where a tensor is missing."""
     if isinstance(tree, str) and tree.startswith(MARK):
         return tensors[tree.removeprefix(MARK)]
     if isinstance(tree, dict):
-        return {key: fill(value, tensors) for key, value in tree.items()}
+        return {key: unflatten(value, tensors) for key, value in tree.items()}
     if isinstance(tree, list):
-        return [fill(value, tensors) for value in tree]
+        return [unflatten(value, tensors) for value in tree]
     return tree

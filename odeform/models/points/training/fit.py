@@ -7,8 +7,7 @@ each a fifth as long as the final training.
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -24,33 +23,20 @@ from odeform.models.points.point_network import PointNet, Trial, sum_of
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.samplers import SAMPLERS
 from odeform.models.points.training.torch_arithmetic import Torch
-from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.loss import Loss, torch_device
 from odeform.models.training.part import read_part, write_part
 from odeform.models.training.run import Run
 from odeform.types import Arrays
 
-__all__ = ["Budget", "fit_points", "initial_weights", "train_points"]
+__all__ = ["fit_points", "initial_weights", "train_points"]
 
-SHARE = 0.2  # length of a trial, relative to the final training
-WARM = 0.03  # share of the length in which the learning rate rises
+FRACTION = 0.2  # length of a trial, relative to the final training
+WARM = 0.03  # fraction of the length in which the learning rate rises
 CLIP = 1.0  # norm of the gradient
-VALIDATIONS = 25  # over the length
-APART = 20  # steps between two validations, at least
+BETWEEN = 20  # steps between two validations, at least
 AHEAD = 1.0  # windows beyond the trained one, each of which takes as long as that
-WATCHED = 256  # validation motions of a point
-
-
-@dataclass(frozen=True)
-class Budget:
-    """Training budget including trials: processor time in seconds, or a number of steps where one is given."""
-
-    seconds: float
-    steps: int | None = None
-
-    def part(self, share: float) -> "Budget":
-        """A share in (0, 1] of this budget, at least one step."""
-        return Budget(share * self.seconds, None if self.steps is None else max(round(share * self.steps), 1))
+VALIDATED = 256  # validation motions of a point
 
 
 def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dict[str, torch.Tensor]:
@@ -69,7 +55,7 @@ class _Learner:
     def __init__(
         self, network: PointNet, data: PointData, trial: Trial, seed: int, device: torch.device, loss: Loss | None
     ) -> None:
-        self.network, self.trial, self.scale_mm, self.own_loss = network, trial, 1e3 * data.frame.scale, loss
+        self.network, self.trial, self.scale_mm, self.given_loss = network, trial, 1e3 * data.frame.scale, loss
         sampler = SAMPLERS[network.sampling]
         self.train_split, self.val_split = (sampler(network, data, split, device) for split in ("train", "val"))
         shapes = list(layer_shapes(network.sizes(data.theta["train"].shape[1], trial.width)))
@@ -77,28 +63,28 @@ class _Learner:
         self.net = Net(self.weights, Torch())
         self.optimiser = torch.optim.Adam(self.weights.values(), lr=trial.rate)
         self.generator = torch.Generator().manual_seed(seed + 1)
-        self.watched = self._draw_watched()
+        self.validated_on = self._draw_validated()
         self.best = (math.inf, self._snapshot())
         self.done, self.elapsed = 0, 0.0
 
     def _snapshot(self) -> Arrays:
         return {name: weight.detach().cpu().numpy().copy() for name, weight in self.weights.items()}
 
-    def _draw_watched(self) -> tuple[torch.Tensor, torch.Tensor]:
+    def _draw_validated(self) -> tuple[torch.Tensor, torch.Tensor]:
         """Validation sequences in turn, and a point of each: the same in every trial."""
         sequences, _, points, _ = self.val_split.moved.shape
         generator = torch.Generator().manual_seed(0)
-        return torch.arange(WATCHED) % sequences, torch.randint(0, points, (WATCHED,), generator=generator)
+        return torch.arange(VALIDATED) % sequences, torch.randint(0, points, (VALIDATED,), generator=generator)
 
-    def _loss(self, share: float) -> torch.Tensor:
+    def _loss(self, fraction: float) -> torch.Tensor:
         train = self.train_split
-        sample = train.draw(share, self.generator)
+        sample = train.draw(fraction, self.generator)
         batch, truth, centre = train.batch(sample)
         weights = train.weights(sample)
         parts = self.network.predict(self.net, batch)
-        if self.own_loss is not None:
+        if self.given_loss is not None:
             guessed, known = (1e-3 * self.scale_mm * y for y in (sum_of(parts), truth))
-            return self.own_loss(guessed, known, weights.expand_as(truth)[..., 0])
+            return self.given_loss(guessed, known, weights.expand_as(truth)[..., 0])
         # of several parts the first is the motion of the whole body: each has a target of its own
         targets = [truth] if len(parts) == 1 else [centre, truth - centre]
         sizes = [1.0] if len(parts) == 1 else [1.0, train.finer]
@@ -107,12 +93,12 @@ class _Learner:
         ]
         return torch.stack([part.mean() for part in squares]).sum()
 
-    def advance(self, share: float) -> float:
-        """One step of descent at this share of the length; returns its loss."""
-        warm_up = min(1.0, (share + 1e-3) / WARM)
-        self.optimiser.param_groups[0]["lr"] = self.trial.rate * warm_up * cosine_decay(share)
+    def advance(self, fraction: float) -> float:
+        """One step of descent at this fraction of the length; returns its loss."""
+        warm_up = min(1.0, (fraction + 1e-3) / WARM)
+        self.optimiser.param_groups[0]["lr"] = self.trial.rate * warm_up * cosine_decay(fraction)
         self.optimiser.zero_grad()
-        loss = self._loss(share)
+        loss = self._loss(fraction)
         loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(self.weights.values(), CLIP)
         if torch.isfinite(norm):
@@ -123,31 +109,13 @@ class _Learner:
     @torch.no_grad()
     def validate(self) -> float:
         """Pooled RMSE in mm on validation; keeps the weights if they are the best so far."""
-        sample = self.val_split.all_frames(*self.watched)
+        sample = self.val_split.all_frames(*self.validated_on)
         batch, truth, _ = self.val_split.batch(sample)
         squares = (sum_of(self.network.predict(self.net, batch)) - truth).square()
         error = self.scale_mm * float((self.val_split.weights(sample) * squares).mean().sqrt())
         if error < self.best[0]:
             self.best = (error, self._snapshot())
         return error
-
-    def train(self, budget: Budget, report: Callable[[str], None], keep: Callable[[dict[str, Any]], None]) -> None:
-        """Take steps until the budget is spent; hand the state to `keep` after each validation."""
-        begin, validated = time.process_time() - self.elapsed, self.done
-        share = self._spent(budget)
-        validations = int(share * VALIDATIONS)
-        while share < 1.0:
-            loss = self.advance(share)
-            self.elapsed = time.process_time() - begin
-            share = self._spent(budget)
-            if share >= 1.0 or (share * VALIDATIONS >= validations + 1 and self.done >= validated + APART):
-                validations, validated = int(share * VALIDATIONS), self.done
-                error = self.validate()
-                report(f"{100 * share:.0f} %, step {self.done}: loss {loss:.3g}, {error:.3f} mm (val)")
-                keep(self.state())
-
-    def _spent(self, budget: Budget) -> float:
-        return self.done / budget.steps if budget.steps is not None else self.elapsed / budget.seconds
 
     def state(self) -> dict[str, Any]:
         """All that `restore` needs to go on bit-exactly."""
@@ -173,7 +141,7 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
     The state is kept in `run.part` after each validation; a resumed training continues from there bit-exactly.
     """
     request, device = run.request, torch_device(run.device)
-    budget, whole = Budget(60.0 * request.minutes, request.steps), 1.0 / (1.0 + SHARE * len(network.trials))
+    budget, whole = Budget(60.0 * request.minutes, request.steps), 1.0 / (1.0 + FRACTION * len(network.trials))
     sizes = [asdict(trial) for trial in network.trials]
     training = {"model": request.model, "data": data.identity, "given": data.given, "seed": request.seed, "of": sizes}
     known: dict[str, Any] = {"trials": [], "seconds": 0.0, "learner": {}}
@@ -192,13 +160,13 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
         if known["learner"]:
             learner.restore(known["learner"])
             known["learner"] = {}
-        learner.train(budget, lambda line: run.report(f"{title}: {line}"), keep)
+        descend(learner, budget, lambda line: run.report(f"{title}: {line}"), lambda: keep(learner.state()), BETWEEN)
         return learner
 
     with small_batches():
         for trial in network.trials[len(trials) :]:
             title = f"trial of rate {trial.rate:g}, width {trial.width}"
-            learner = learn(trial, budget.part(SHARE * whole), title)
+            learner = learn(trial, budget.part(FRACTION * whole), title)
             trials.append({**asdict(trial), "steps": learner.done, "val": learner.best[0]})
             keep({})
         best = network.trials[int(np.argmin([trial["val"] for trial in trials]))]

@@ -1,10 +1,8 @@
 """Training of the graph network that predicts final states."""
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -15,12 +13,12 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.models.points.node_graph import NodeGraph
 from odeform.models.points.pe_gnn import PeGnn, new_network
 from odeform.models.points.point_model import PREFIX, frame_to_json
-from odeform.models.points.training.fit import CLIP, VALIDATIONS, Budget
+from odeform.models.points.training.fit import CLIP
 from odeform.models.points.training.point_data import PointData, prepare_points
-from odeform.models.training.descent import cosine_decay, small_batches
+from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.run import Run
 from odeform.motion.point_motion import evaluate_probes
-from odeform.types import Floats, Mesh
+from odeform.types import Arrays, Floats, Mesh
 
 __all__ = ["GraphConfig", "fit_graphs", "train_graphs"]
 
@@ -48,11 +46,15 @@ class _Split:
 class _Learner:
     """The network, its graph repeated for a batch, and its optimiser."""
 
-    def __init__(self, graph: NodeGraph, features: int, config: GraphConfig, seed: int) -> None:
+    def __init__(self, graph: NodeGraph, splits: dict[str, _Split], config: GraphConfig, seed: int) -> None:
         torch.manual_seed(seed)
         # not within `small_batches`: k-d trees need denormal numbers
         self._edges, self._along = torch.from_numpy(graph.edges), torch.from_numpy(graph.along)
-        self.network = new_network(features, config.width, config.layers)
+        self.config, self.splits, self.scale_mm = config, splits, 1e3 * graph.frame.scale
+        self.network = new_network(splits["train"].features.shape[2], config.width, config.layers)
+        self.generator = torch.Generator().manual_seed(seed + 1)
+        self.best: tuple[float, Arrays] = (math.inf, {})
+        self.done, self.elapsed = 0, 0.0
         self.optimiser = torch.optim.Adam(self.network.parameters(), lr=config.rate)
 
     def predict(self, features: torch.Tensor) -> torch.Tensor:
@@ -63,48 +65,41 @@ class _Learner:
         along = self._along.repeat(bodies, 1)
         return self.network(features.flatten(0, 1), edges, along).reshape(bodies, nodes, 3)
 
-    def step(self, data: _Split, chosen: torch.Tensor) -> float:
-        """One step of descent on the sequences `chosen`; returns the loss."""
+    def advance(self, fraction: float) -> float:
+        """One step of descent at this fraction of the length; returns the loss."""
+        self.optimiser.param_groups[0]["lr"] = self.config.rate * cosine_decay(fraction)
+        data = self.splits["train"]
+        chosen = torch.randint(0, len(data.moved), (self.config.batch,), generator=self.generator)
         self.optimiser.zero_grad()
         loss = (self.predict(data.features[chosen]) - data.moved[chosen]).square().mean()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), CLIP)
         self.optimiser.step()
+        self.done += 1
         return float(loss.detach())
 
     @torch.no_grad()
-    def error(self, data: _Split, batch: int) -> float:
-        """RMSE in units of the frame's scale."""
-        parts = zip(data.features.split(batch), data.moved.split(batch), strict=True)
+    def validate(self) -> float:
+        """RMSE in mm on validation; keeps the weights if they are the best so far."""
+        val, batch = self.splits["val"], self.config.batch
+        parts = zip(val.features.split(batch), val.moved.split(batch), strict=True)
         squares = [(self.predict(features) - moved).square().mean(dim=(1, 2)) for features, moved in parts]
-        return float(torch.cat(squares).mean().sqrt())
+        error = self.scale_mm * float(torch.cat(squares).mean().sqrt())
+        if error < self.best[0]:
+            self.best = error, {name: weight.numpy().copy() for name, weight in self.network.state_dict().items()}
+        return error
 
 
 def fit_graphs(data: PointData, rest: Mesh, budget: Budget, seed: int, report: Callable[[str], None]) -> Checkpoint:
     """The checkpoint of `pe-gnn`, without the body that viewers show. `rest` is the body of the data, N vertices."""
     config = GraphConfig()
     graph, splits = _prepared(data, rest, config.nodes)
-    learner = _Learner(graph, splits["train"].features.shape[2], config, seed)
-    generator = torch.Generator().manual_seed(seed + 1)
-    begin, done, share, validated = time.process_time(), 0, 0.0, 0
-    best: tuple[float, dict[str, Any]] = (math.inf, {})
+    learner = _Learner(graph, splits, config, seed)
     with small_batches():
-        while share < 1.0:
-            learner.optimiser.param_groups[0]["lr"] = config.rate * cosine_decay(share)
-            chosen = torch.randint(0, len(splits["train"].moved), (config.batch,), generator=generator)
-            loss = learner.step(splits["train"], chosen)
-            done += 1
-            spent = time.process_time() - begin
-            share = done / budget.steps if budget.steps is not None else spent / budget.seconds
-            if share >= 1.0 or share * VALIDATIONS >= validated + 1:
-                validated = int(share * VALIDATIONS)
-                error = 1e3 * graph.frame.scale * learner.error(splits["val"], config.batch)
-                report(f"{100 * share:.0f} %, step {done}: loss {loss:.3g}, {error:.3f} mm (val)")
-                if error < best[0]:
-                    best = error, {k: v.numpy().copy() for k, v in learner.network.state_dict().items()}
+        descend(learner, budget, report)
     settings = {"width": config.width, "layers": config.layers, "frame": frame_to_json(graph.frame)}
-    val = {"val_rmse_mm": best[0], "steps": done, "seconds": time.process_time() - begin}
-    arrays = {"nodes": graph.nodes, **{PREFIX + name: weight for name, weight in best[1].items()}}
+    val = {"val_rmse_mm": learner.best[0], "steps": learner.done, "seconds": learner.elapsed}
+    arrays = {"nodes": graph.nodes, **{PREFIX + name: weight for name, weight in learner.best[1].items()}}
     return Checkpoint(PeGnn.model, data.schema, {**settings, "val": val}, arrays)
 
 

@@ -1,4 +1,4 @@
-"""What models of points are trained on: the displacements of all vertices of all sequences."""
+"""Prepares what models of points are trained on: the displacements of all vertices of all sequences."""
 
 from dataclasses import dataclass, replace
 
@@ -21,14 +21,15 @@ class PointData:
     """Parameters and displacements of the splits train and val."""
 
     schema: Schema
-    """With the window of the training; its rate is that of the observed frames, for models that are given some."""
+    """Schema with the window of the training; its rate is that of the observed frames, for models that are given
+    some."""
     frame: PointFrame
     mean: MeanMotion
     """The mean motion of the training sequences."""
     x: Floats
     """(N, 3) rest points, float32, as inputs of networks."""
     weights: Floats
-    """(N,) share of the mass at each vertex."""
+    """(N,) fraction of the mass at each vertex."""
     theta: dict[str, Floats]
     """(S, P) parameters in [-1, 1] by split."""
     moved: dict[str, Floats]
@@ -94,7 +95,7 @@ def _displacements(
 
 
 def _frame(rest: Floats, weights: Floats, anchor: Vector, moved: Floats, largest: float) -> PointFrame:
-    """From rest points (N, 3) and training displacements (S, T, N, 3) from the mean motion, metres."""
+    """Fits the frame to rest points (N, 3) and training displacements (S, T, N, 3) from the mean motion, metres."""
     squares = within = 0.0
     for motion in moved.astype(float):
         squares += (motion**2).mean() / len(moved)

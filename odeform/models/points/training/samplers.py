@@ -1,4 +1,4 @@
-"""Which points, sequences and frames a point network is trained and validated on: one sampler for each kind."""
+"""Draws the points, sequences and frames that a point network is trained and validated on: a sampler for each kind."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from odeform.models.points.training.torch_arithmetic import Torch
 __all__ = ["SAMPLERS", "Sample", "Sampler"]
 
 SEGMENT = 8  # frames of the first roll-outs
-GROWN = 0.6  # share of training after which roll-outs span the whole window
+GROWN = 0.6  # fraction of training after which roll-outs span the whole window
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,16 @@ class Sampler(ABC):
         self.last = self.moved.shape[1] - 1
 
     @abstractmethod
-    def draw_frames(self, share: float, generator: torch.Generator) -> torch.Tensor:
-        """(F, B) random frames for a training step at this share of the training."""
+    def draw_frames(self, fraction: float, generator: torch.Generator) -> torch.Tensor:
+        """(F, B) random frames for a training step at this fraction of the training."""
 
     @abstractmethod
     def all_frames(self, sequence: torch.Tensor, point: torch.Tensor) -> Sample:
         """Every frame of the motions of points (B,) of sequences (B,), for validation."""
 
-    def draw(self, share: float, generator: torch.Generator) -> Sample:
-        """A random training step at this share of the training."""
-        frames = self.draw_frames(share, generator)
+    def draw(self, fraction: float, generator: torch.Generator) -> Sample:
+        """A random training step at this fraction of the training."""
+        frames = self.draw_frames(fraction, generator)
         sequences, _, points, _ = self.moved.shape
         batch = frames.shape[1]
         sequence = _below(sequences, generator, batch)
@@ -88,7 +88,7 @@ class Sampler(ABC):
 class Moments(Sampler):
     """Single frames."""
 
-    def draw_frames(self, share: float, generator: torch.Generator) -> torch.Tensor:
+    def draw_frames(self, fraction: float, generator: torch.Generator) -> torch.Tensor:
         return 1 + _below(self.last, generator, 1, self.network.work)
 
     def to_visible(self, sequence: torch.Tensor, frames: torch.Tensor) -> torch.Tensor:
@@ -104,21 +104,21 @@ class Moments(Sampler):
 class Segments(Sampler):
     """Motions from a true state at any frame; they grow to the whole window in the course of training."""
 
-    def draw_frames(self, share: float, generator: torch.Generator) -> torch.Tensor:
-        length = self._length(share)
-        ahead = self._ahead(share, length, generator)
+    def draw_frames(self, fraction: float, generator: torch.Generator) -> torch.Tensor:
+        length = self._length(fraction)
+        ahead = self._ahead(fraction, length, generator)
         batch = max(self.network.work // len(ahead), 16)
         return ahead[:, None] + _below(self.last - length + 1, generator, 1, batch)
 
     def all_frames(self, sequence: torch.Tensor, point: torch.Tensor) -> Sample:
         return Sample(sequence, point, torch.arange(self.last + 1)[:, None].expand(-1, len(sequence)))
 
-    def _length(self, share: float) -> int:
-        return round(min(self.last, SEGMENT + (self.last - SEGMENT) * share / GROWN))
+    def _length(self, fraction: float) -> int:
+        return round(min(self.last, SEGMENT + (self.last - SEGMENT) * fraction / GROWN))
 
-    def _ahead(self, share: float, length: int, generator: torch.Generator) -> torch.Tensor:
+    def _ahead(self, fraction: float, length: int, generator: torch.Generator) -> torch.Tensor:
         strides = self.network.strides
-        stride = strides[min(int(share * len(strides)), len(strides) - 1)]
+        stride = strides[min(int(fraction * len(strides)), len(strides) - 1)]
         if stride == 1:
             return torch.arange(length + 1)
         # rest, the frame after it, and every stride-th frame from a random one on
@@ -129,15 +129,15 @@ class Segments(Sampler):
 class WholeMotions(Segments):
     """Motions from rest; they grow to the whole window in the course of training."""
 
-    def draw_frames(self, share: float, generator: torch.Generator) -> torch.Tensor:
-        ahead = self._ahead(share, self._length(share), generator)
+    def draw_frames(self, fraction: float, generator: torch.Generator) -> torch.Tensor:
+        ahead = self._ahead(fraction, self._length(fraction), generator)
         return ahead[:, None].expand(-1, max(self.network.work // len(ahead), 16))
 
 
 class BetweenFrames(Sampler):
     """Motions between two neighbouring observed frames, which are the first and the last of a sample."""
 
-    def draw_frames(self, share: float, generator: torch.Generator) -> torch.Tensor:
+    def draw_frames(self, fraction: float, generator: torch.Generator) -> torch.Tensor:
         batch = self.network.work // self.given
         return torch.arange(self.given + 1)[:, None] + _below(self.last - self.given + 1, generator, 1, batch)
 
@@ -162,7 +162,7 @@ SAMPLERS: dict[str, type[Sampler]] = {
     "whole": WholeMotions,
     "between": BetweenFrames,
 }
-"""By `PointNet.sampling`."""
+"""Samplers by `PointNet.sampling`."""
 
 
 def _below(limit: int, generator: torch.Generator, *shape: int) -> torch.Tensor:

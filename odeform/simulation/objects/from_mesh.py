@@ -18,22 +18,10 @@ from odeform.simulation.objects.tetrahedra import small_solid
 from odeform.simulation.objects.thickness import median_thickness
 from odeform.types import Faces, Ints, Mesh, Points
 
-__all__ = ["PlacedObject", "make_object", "placed_object"]
+__all__ = ["PlacedObject", "placed_object"]
 
 COUNTS = (1100, 800, 550)  # surface vertices to try: shapes with thin walls need more nodes than smooth ones
 FACTORS = (2.0, 3.0)  # see `small_solid`
-
-
-def make_object(
-    mesh: Mesh,
-    name: str = "object",
-    like: str | None = None,
-    material: SoftMaterial | None = None,
-    up: str | None = None,
-    unit: float | None = None,
-) -> SoftObject:
-    """The solid of `placed_object`, without its place."""
-    return placed_object(mesh, name, like, material, up, unit).item
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +31,7 @@ class PlacedObject:
     item: SoftObject
     """Its nodes are in metres, at most 1,500 of them."""
     transform: Similarity
-    """From the mesh to the nodes of `item` without stress."""
+    """Maps the mesh to the nodes of `item` without stress."""
     like: str
     """The object whose orientation, material and forces it has."""
 
@@ -90,7 +78,7 @@ def placed_object(
 
 
 def _solid(fine: Mesh) -> tuple[Points, Ints, Faces]:
-    """As many surface vertices as a small solid can have."""
+    """Makes a solid with as many surface vertices as a small one can have."""
     for count in COUNTS[:-1]:
         with contextlib.suppress(SimulationError):
             return small_solid(even_surface(fine, count), FACTORS)

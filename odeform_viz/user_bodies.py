@@ -14,52 +14,52 @@ from odeform_viz.fitting import readable_shape
 __all__ = [
     "UserBody",
     "UserBodyPredictor",
-    "describe_own_body",
-    "own_of",
-    "read_own_body",
+    "describe_user_body",
+    "read_user_body",
     "takes_user_bodies",
-    "with_own_body",
-    "without_own_body",
+    "user_body_of",
+    "with_user_body",
+    "without_user_body",
 ]
 
 
-def read_own_body(name: str | Path) -> UserBody:
+def read_user_body(name: str | Path) -> UserBody:
     """The body of a file; see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
     geometry, _ = readable_shape(name)
-    own = user_body(geometry, Path(name).name)
-    return replace(own, fit=replace(own.fit, origin=str(name)))
+    body = user_body(geometry, Path(name).name)
+    return replace(body, fit=replace(body.fit, origin=str(name)))
 
 
-def describe_own_body(own: UserBody) -> str:
+def describe_user_body(body: UserBody) -> str:
     """One line: points, size and material."""
-    size = 1e3 * float(np.ptp(own.item.settled, axis=0).max())
-    points = len(own.fit.geometry.points)
+    size = 1e3 * float(np.ptp(body.item.settled, axis=0).max())
+    points = len(body.fit.geometry.points)
     return (
-        f"{own.item.name}: {points:,} points move with a soft body of {own.item.surface_count:,} surface vertices, "
-        f"{size:.0f} mm long, of the {own.like}'s material"
+        f"{body.item.name}: {points:,} points move with a soft body of {body.item.surface_count:,} surface vertices, "
+        f"{size:.0f} mm long, of the {body.like}'s material"
     )
 
 
-def own_of(predictor: Predictor | None) -> UserBody | None:
+def user_body_of(predictor: Predictor | None) -> UserBody | None:
     """The user's own body that a model moves; None for trained bodies."""
     return predictor.own if isinstance(predictor, UserBodyPredictor) else None
 
 
-def with_own_body(columns: Sequence[Column], own: UserBody) -> list[Column]:
+def with_user_body(columns: Sequence[Column], body: UserBody) -> list[Column]:
     """The columns with another body: those of models that know only trained bodies are hidden, as are truths."""
-    return [_moved(column, own) for column in columns]
+    return [_moved(column, body) for column in columns]
 
 
-def _moved(column: Column, own: UserBody) -> Column:
+def _moved(column: Column, body: UserBody) -> Column:
     predictor = column.predictor
     if predictor is None or column.pinned is not None:
         return replace(column, visible=column.visible and predictor is not None)
     if not takes_user_bodies(predictor):
         return replace(column, visible=False)
-    return replace(column, source=UserBodyPredictor(predictor, own), geometry=own.fit.geometry, fit=own.fit)
+    return replace(column, source=UserBodyPredictor(predictor, body), geometry=body.fit.geometry, fit=body.fit)
 
 
-def without_own_body(columns: Sequence[Column]) -> list[Column]:
+def without_user_body(columns: Sequence[Column]) -> list[Column]:
     """The columns with trained bodies again; truths are hidden."""
     return [_trained(column) for column in columns]
 

@@ -7,27 +7,27 @@ import viser
 
 from odeform.errors import InputError
 from odeform_viz.fitting import MOST_POINTS, readable_shape
-from odeform_viz.own_shapes import (
-    UserBody,
-    describe_own_body,
-    own_of,
-    takes_user_bodies,
-    with_own_body,
-    without_own_body,
-)
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import LOCK, serialized
 from odeform_viz.panels.uploads import path_of, take_upload
-from odeform_viz.runtime.jobs import Job, own_body_of
+from odeform_viz.runtime.jobs import Job, make_user_body
 from odeform_viz.state import PageState
+from odeform_viz.user_bodies import (
+    UserBody,
+    describe_user_body,
+    takes_user_bodies,
+    user_body_of,
+    with_user_body,
+    without_user_body,
+)
 
-__all__ = ["OwnShapePanel"]
+__all__ = ["UserBodyPanel"]
 
 TRAINED = "The trained bodies. A closed mesh, or points or splats of a solid, can be pushed as well."
 WORKING = "**{}** is being repaired, filled with tetrahedra and laid on the floor. This takes up to a minute."
 
 
-class OwnShapePanel(Panel):
+class UserBodyPanel(Panel):
     """Loads a shape, and goes back to the trained bodies."""
 
     def __init__(self, page: Page) -> None:
@@ -63,7 +63,7 @@ class OwnShapePanel(Panel):
         geometry, _ = readable_shape(path)
         with LOCK:
             self.close()
-            self._job = Job(own_body_of, (geometry, name), lambda own: self._made(own, origin), self._failed)
+            self._job = Job(make_user_body, (geometry, name), lambda body: self._made(body, origin), self._failed)
             self._working(WORKING.format(name))
             self._job.start()
 
@@ -74,10 +74,10 @@ class OwnShapePanel(Panel):
         except (InputError, OSError) as error:
             self._failed(str(error))
 
-    def _made(self, own: UserBody, origin: str) -> None:
+    def _made(self, body: UserBody, origin: str) -> None:
         with LOCK:
-            made = replace(own, fit=replace(own.fit, origin=origin))
-            self._page.columns.change(lambda columns: with_own_body(columns, made))
+            made = replace(body, fit=replace(body.fit, origin=origin))
+            self._page.columns.change(lambda columns: with_user_body(columns, made))
             self._show()
         self._page.clock.seek(self._page.schema.window.start)
         self._page.columns_changed()
@@ -92,7 +92,7 @@ class OwnShapePanel(Panel):
         self._show()
 
     def _go_back(self) -> None:
-        self._page.columns.change(without_own_body)
+        self._page.columns.change(without_user_body)
         self._show()
         self._page.columns_changed()
 
@@ -100,6 +100,6 @@ class OwnShapePanel(Panel):
         self._text.content, self._cancel.visible, self._load.visible = text, True, False
 
     def _show(self) -> None:
-        own = own_of(self._page.model.predictor)
-        self._text.content = TRAINED if own is None else describe_own_body(own)
-        self._back.visible, self._cancel.visible, self._load.visible = own is not None, False, True
+        body = user_body_of(self._page.model.predictor)
+        self._text.content = TRAINED if body is None else describe_user_body(body)
+        self._back.visible, self._cancel.visible, self._load.visible = body is not None, False, True

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from odeform_figures.motions.registry import KINDS
-from odeform_figures.tables import own_data
-from odeform_figures.tables.own_data import MODELS, main, summary
+from odeform_figures.tables import user_data
+from odeform_figures.tables.user_data import MODELS, main, summary
 
 
-def scores(*errors: float) -> own_data.Scores:
+def scores(*errors: float) -> user_data.Scores:
     return {model: {"rmse_pooled_mm": error} for model, error in zip(MODELS, errors, strict=True)}
 
 

@@ -1,6 +1,6 @@
 """Small data sets of several kinds, trained with default settings.
 
-Run `python -m odeform_figures.tables.own_data --keep DIR`.
+Run `python -m odeform_figures.tables.user_data --keep DIR`.
 """
 
 import argparse
@@ -37,8 +37,8 @@ def measure(dataset: Path, keep: Path, minutes: float) -> Scores:
             checkpoint = predictor.checkpoint
             scores = {name: checkpoint.scores[name] for name in SCORES}
             taken = {"seconds": checkpoint.provenance["training_seconds"], "command": checkpoint.provenance["command"]}
-            share = {"correction": checkpoint.config.get("correction")}
-            atomic_write(out, json.dumps({**scores, **taken, **share}, indent=1).encode())
+            weights = {"correction": checkpoint.config.get("correction")}
+            atomic_write(out, json.dumps({**scores, **taken, **weights}, indent=1).encode())
         found[model] = json.loads(out.read_text())
     return found
 
@@ -77,7 +77,7 @@ def _made(name: str, seed: int, keep: Path) -> Path:
 
 def main(argv: list[str] | None = None) -> None:
     """Make, import, train and score; finished trainings are not repeated."""
-    parser = argparse.ArgumentParser("python -m odeform_figures.tables.own_data", description=__doc__)
+    parser = argparse.ArgumentParser("python -m odeform_figures.tables.user_data", description=__doc__)
     parser.add_argument("--keep", type=Path, required=True, metavar="DIR", help="data, checkpoints and scores")
     parser.add_argument("--kinds", default=",".join(KINDS), metavar="NAME,...", help="default: all")
     parser.add_argument(

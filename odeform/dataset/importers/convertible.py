@@ -30,6 +30,6 @@ ADVICE = {
 
 
 def convertible(endings: Iterable[str]) -> str:
-    """What to do with files of the first of `endings` that is known but not read, as a clause; or nothing."""
+    """Says in a clause how to convert files of the first of `endings` that is known but not read; empty for others."""
     advice = {ending: text for known, text in ADVICE.items() for ending in known}
     return next((f": {ending} is not read: {advice[ending]}" for ending in endings if ending in advice), "")
