@@ -36,4 +36,4 @@ def test_a_band_that_is_fitted_to_errors_covers_them(tmp_path: Path) -> None:
     found = summary(compared(again, TEST, 1, tmp_path)[0.25])
     assert found["covered_frames"] > 0.7
     assert found["sides_mm"] > 0.0
-    assert found["rmse_mm"].keys() == found["band_mm"].keys()
+    assert len(found["motions"]) == 8
