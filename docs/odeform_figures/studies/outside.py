@@ -10,6 +10,7 @@ import itertools
 import os
 from dataclasses import replace
 from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -148,16 +149,18 @@ def main() -> None:
     parser.add_argument("--fit", type=Path, metavar="FILE", help="fit the band first, and write the checkpoint")
     parser.add_argument("--json", metavar="FILE", help="write the result to this file instead of printing it")
     args = parser.parse_args()
+    command = f"python -m odeform_figures.studies.outside {args.checkpoint}"
     try:
         model = load(args.checkpoint)
         if args.fit is not None:
             found = compared(model, FIT, args.workers, args.keep)
             model = fitted(model, [motion for motions in found.values() for motion in motions])
-            write_checkpoint(args.fit, model.checkpoint)
+            how = {"outside": {"command": f"{command} --fit FILE", "versions": {"odeform": version("odeform")}}}
+            known = {**model.checkpoint.provenance, **how}
+            write_checkpoint(args.fit, replace(model.checkpoint, provenance=known))
         test = compared(model, TEST, args.workers, args.keep)
     except InputError as error:
         parser.error(str(error))
-    command = f"python -m odeform_figures.studies.outside {args.checkpoint}"
     write_or_print(
         {"command": command, **{f"{share:g}": summary(motions) for share, motions in test.items()}}, args.json
     )

@@ -121,16 +121,17 @@ class RollingModel(Model):
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """The state (8,) begins when the push is over; the push itself is a cubic to there.
 
-        Angle and spin of states are the way and the speed of the rim (`units_of`).
+        Angle and spin of states are the way and the speed of the rim (`units_of`). States are in double precision
+        whatever is asked for: at landings on corners, rounding in single precision grows to tenths of a millimetre.
         """
         start, readout = self._begun(theta)
-        return Problem(self._field(theta), start.astype(dtype), readout, self.begin)
+        return Problem(self._field(theta), start, readout, self.begin)
 
     def batch_problem(
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
     ) -> Callable[[], BatchProblem]:
         start, readout = self._begun(theta)
-        return lambda: BatchProblem(self._together(theta), start.astype(dtype), readout, self.begin)
+        return lambda: BatchProblem(self._together(theta), start, readout, self.begin)
 
     def _field(self, theta: Floats) -> Field:
         return make_field(self.law, self._support, self._radius, theta[self._materials])
@@ -218,8 +219,8 @@ class RollingModel(Model):
         solved = corrected.own
         assert isinstance(solved, SolvedTrajectory)
         start, readout = self._resumed(theta, solved, corrected, stop)
-        problem = Problem(self._field(theta), start.astype(settings.dtype), readout, stop)
-        return self._solved(problem, lambda: problem._replace(start=problem.start.astype(float)), settings, until)
+        problem = Problem(self._field(theta), start, readout, stop)
+        return self._solved(problem, lambda: problem, settings, until)
 
     def _restarted_batch(
         self, theta: Floats, corrected: AdjustedBatch, settings: SolverSettings, stop: float, until: float
@@ -227,7 +228,7 @@ class RollingModel(Model):
         solved = corrected.own
         assert isinstance(solved, SolvedBatch)
         start, readout = self._resumed(theta, solved, corrected, stop)
-        problem = BatchProblem(self._together(theta), start.astype(settings.dtype), readout, stop)
+        problem = BatchProblem(self._together(theta), start, readout, stop)
         return SolvedBatch(lambda: problem, settings, until, 1.0 / self.schema.window.rate)
 
     def _resumed(
@@ -236,6 +237,8 @@ class RollingModel(Model):
         """States (..., 8) of the corrected motions at `stop` seconds, and the readout from then on."""
         decoded, times = self._decoder(theta), np.array([stop])
         start = solved.states(times)[..., 0, :] + self._units * self._added(solved, corrected, stop)
+        # alone and among others, it differs in the last bits, which later landings would amplify
+        start = start.astype(np.float32).astype(float)
         end, first = corrected.reduced(times), decoded(start[..., None, :] / self._units)
         # what the residual adds to the deformation gives way to what follows from the motion
         given_up = end - first

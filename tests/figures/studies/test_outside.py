@@ -1,0 +1,39 @@
+"""Motions outside of the trained ranges, beside simulations."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from odeform.models.error_band import OUTSIDE
+from odeform.models.registry import load
+from odeform_figures.studies.outside import FIT, TEST, compared, fitted, outside, summary
+
+SCHEMA = load("mass-elastic").schema
+
+
+def test_one_parameter_is_outside_at_sides_and_all_at_corners() -> None:
+    for seed in (FIT, TEST):
+        rows = outside(SCHEMA, 0.1, seed)
+        assert [len(SCHEMA.outside(parameters)) for _, parameters in rows] == [1, 1, 1, 1, 2, 2, 2, 2]
+    assert dict(rows)["mass -"]["mass"] == pytest.approx(0.9 * 0.2)
+    assert dict(rows)["corner +-"] == pytest.approx({"mass": 1.1, "bending": 0.27})
+    assert outside(SCHEMA, 0.1, TEST) == rows
+
+
+def test_a_band_that_is_fitted_to_errors_covers_them(tmp_path: Path) -> None:
+    """Truths that a model misses by more the farther they are outside, and the later."""
+    model, times = load("mass-elastic/nearest"), SCHEMA.window.times
+    for seed in (FIT, TEST):
+        for share in (0.1, 0.25):
+            for name, parameters in outside(SCHEMA, share, seed):
+                truth = model.solve(parameters=parameters).vertices(times) + 0.1 * share * times[:, None, None]
+                np.save(tmp_path / f"mass-elastic-{seed}-{share:g}-{name}.npy", truth)
+    before = compared(model, FIT, 1, tmp_path)
+    again = fitted(model, [motion for motions in before.values() for motion in motions])
+    assert again.checkpoint.arrays[OUTSIDE].shape == (2, 2)
+    assert (again.checkpoint.arrays[OUTSIDE] >= 0.0).all()
+    found = summary(compared(again, TEST, 1, tmp_path)[0.25])
+    assert found["covered_frames"] > 0.7
+    assert found["sides_mm"] > 0.0
+    assert len(found["motions"]) == 8
