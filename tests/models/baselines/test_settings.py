@@ -16,6 +16,8 @@ FRAME = {"anchor": [0.0, 0.0, 0.1], "arm": 0.1, "reach": 0.2, "largest": 1.0, "s
     ("model", "settings"),
     [
         ("gp", {"length_scales": [0.0, 1.0]}),
+        ("gp", {"length_scales": 1.0}),
+        ("gp", {"length_scales": [1.0, 1.0, 1.0]}),
         ("gp", {"order": 3}),
         ("gp", {"length_scales": [float("nan"), 1.0]}),
         ("pod-rbf", {"smoothing": float("nan")}),
