@@ -55,7 +55,10 @@ def read_off(path: Path, merge: bool) -> Mesh:
     vertices, faces = int(sizes[0]), int(sizes[1])
     lines = lines[used:]
     if len(lines) < vertices + faces:
-        raise InputError(f"{where}: expected {vertices} vertices and {faces} faces, got {len(lines)} lines: truncated?")
+        raise InputError(
+            f"{where}: expected {vertices} vertices and {faces} faces, one in each line, got {len(lines)} lines: "
+            "truncated?"
+        )
     table = _numbers(rows, lines[:vertices], where)
     points, painted = _vertices(table, counts[lines[:vertices]], found, lines[:vertices] + 1, where)
     if not faces:

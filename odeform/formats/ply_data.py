@@ -215,6 +215,9 @@ def _split_rows(values: NDArray[np.float64], counts: Ints, element: Element, pat
         found = values[np.repeat(place, length) + within]
         if np.dtype(entry.kind).kind in "iu":
             found = np.clip(np.nan_to_num(found), -(2.0**62), 2.0**62).astype(np.int64)
+            if not entry.count:  # colors are fractions of what their type can hold
+                limits = np.iinfo(entry.kind)
+                found = np.clip(found, limits.min, min(limits.max, 1 << 62)).astype(entry.kind)
         out[entry.name] = Lists(found, length) if entry.count else found
         place = place + length
     if element.lists and (place <= stop).all() and (place < stop).any():

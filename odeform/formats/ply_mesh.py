@@ -86,11 +86,11 @@ def _triangles(rows: dict[str, Rows], points: Floats, where: str) -> tuple[Ints,
                 raise InputError(f"{where}: expected faces with a list {CORNERS[0]}, got {', '.join(faces)[:100]}")
             return np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
         corners = _whole(strip.values, where)
-        _require_vertices(corners[corners != -1], len(points), where)
+        _require_vertices(corners, strip.counts, len(points), where, least=-1)
         triangles = _strips(corners, strip.counts)
         return corners, triangles, np.full(len(triangles), -1)
     corners = _whole(lists.values, where)
-    _require_vertices(corners, len(points), where)
+    _require_vertices(corners, lists.counts, len(points), where)
     triangles, polygon = triangulated(points, corners, lists.counts)
     return corners, triangles, polygon
 
@@ -105,10 +105,11 @@ def _whole(values: NDArray[Any], where: str) -> Ints:
     return values.astype(np.int64)
 
 
-def _require_vertices(corners: Ints, count: int, where: str) -> None:
-    if len(corners) and not 0 <= corners.min() <= corners.max() < count:
-        wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise InputError(f"{where}: a face refers to vertex {wrong}, of {count}")
+def _require_vertices(corners: Ints, counts: Ints, count: int, where: str, least: int = 0) -> None:
+    if len(corners) and not least <= corners.min() <= corners.max() < count:
+        wrong = int(np.argmax((corners < least) | (corners >= count)))
+        face = int(np.searchsorted(np.cumsum(counts), wrong, side="right")) + 1
+        raise InputError(f"{where}: face {face} refers to vertex {corners[wrong]}, of {count}")
 
 
 def _strips(corners: Ints, counts: Ints) -> Faces:

@@ -104,6 +104,20 @@ def test_colors_of_vertices_and_faces(tmp_path: Path) -> None:
     assert of_faces[:, 1].tolist() == [[255, 51, 51 * k] for k in range(4)]
 
 
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_colors_of_sixteen_bits(tmp_path: Path, form: str) -> None:
+    head = _head(COLORED.replace("uchar", "ushort"), form).encode()
+    if form == "ascii":
+        data = "".join(f"{row} 65535 0 32768\n" for row in ROWS.splitlines()).encode()
+    else:
+        data = b"".join(struct.pack("<3f3H", *row, 65535, 0, 32768) for row in XYZ)
+    (tmp_path / "a.ply").write_bytes(head + data)
+    cloud = read_geometry(tmp_path / "a.ply")
+    assert isinstance(cloud, PointCloud)
+    assert cloud.colors is not None
+    assert cloud.colors.tolist() == [[255, 0, 128]] * 4
+
+
 def test_a_missing_texture_is_noted_without_a_traceback(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -137,10 +151,12 @@ REFUSED = {
     _head(VERTEX + FACE) + ROWS + LISTS[:-9]: "expected 4 rows of face, got 3: truncated",
     _head(VERTEX + FACE) + ROWS + LISTS[:-3]: "line 17: expected a row of face .list vertex_indices., got 3 numbers",
     _head(VERTEX + FACE) + ROWS.replace("1 0 0", "1.#INF 0 0") + LISTS: "line 11: expected numbers, got '1.#INF'",
-    _head(VERTEX + FACE) + ROWS + LISTS.replace("3 0 2 1", "3 0 2 9"): "a face refers to vertex 9, of 4",
+    _head(VERTEX + FACE) + ROWS + LISTS.replace("3 0 2 1", "3 0 2 9"): "face 1 refers to vertex 9, of 4",
     _head(VERTEX.replace("float x", "quad x")) + ROWS: "line 4: expected a line of a PLY header, got 'property quad x'",
     _head(VERTEX.replace("float z", "float w")) + ROWS: "expected an element vertex with x, y and z, got x, y, w",
-    "ply\nformat ascii 1.0\nelement vertex 4\n": "expected a header",
+    "ply\nformat ascii 1.0\nelement vertex 4\n": "expected a header that ends in end_header, .*truncated",
+    "ply\nelement vertex 4\nend_header\n": "expected a header with a format of",
+    "a cloud of points\n": "expected ply in the first line, got b'a cloud of points",
     "PK\x03\x04 and so on": "got a zip archive",
 }
 

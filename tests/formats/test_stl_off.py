@@ -52,6 +52,10 @@ def test_stl(tmp_path: Path, habit: str) -> None:
 def test_what_follows_a_binary_stl_and_its_colors_are_noted(tmp_path: Path) -> None:
     assert _read(tmp_path / "a.stl", BINARY + b"trailer").notes == ("7 bytes after the last triangle left out",)
     colored = bytearray(BINARY)
+    colored[84 + 48 : 84 + 50] = b"\xff\x00"
+    assert _read(tmp_path / "a.stl", bytes(colored)).notes == ()  # no color without its bit
+    colored[84 + 48 : 84 + 50] = b"\xff\x80"
+    assert _read(tmp_path / "a.stl", bytes(colored)).notes == ("colors of triangles left out",)
     colored[:6] = b"COLOR="
     colored[84 + 48 : 84 + 50] = b"\xff\x80"
     assert _read(tmp_path / "a.stl", bytes(colored)).notes == ("colors of triangles left out",)
@@ -120,7 +124,7 @@ def test_off(tmp_path: Path, habit: str) -> None:
 
 
 OFF_REFUSED = {
-    "cut": (_off("OFF")[:-9], "expected 4 vertices and 4 faces, got 7 lines: truncated"),
+    "cut": (_off("OFF")[:-9], "expected 4 vertices and 4 faces, one in each line, got 7 lines: truncated"),
     "cut in a face": (_off("OFF")[:-3], "line 10: expected a face of 3 vertices, got 2 numbers: truncated"),
     "binary": ("OFF BINARY\n" + "\0" * 99, "expected text that starts with OFF"),
     "four dimensions": (_off("4OFF"), "expected text that starts with OFF"),
