@@ -58,9 +58,7 @@ def read_obj(path: Path, merge: bool) -> Geometry:
     if not is_vertex.any():
         raise InputError(f"{where}: expected lines of vertices, v x y z, got none: not an OBJ file?")
     vertices = _table(lines, is_vertex, b"v", 3, where)
-    points, painted = vertices.columns(0, 3), _painted(vertices)
-    if painted is None and (vertices.count >= 6).any():
-        notes.append("colors left out: some vertices have none")
+    points, painted = vertices.columns(0, 3), _painted(vertices, notes)
     corners = read_corners(lines, is_vertex, where)
     if corners.short:
         notes.append(f"{corners.short} faces of fewer than three corners left out")
@@ -92,11 +90,13 @@ def _table(lines: Lines, chosen: NDArray[np.bool_], word: bytes, least: int, whe
     return _Table(values, np.cumsum(counts) - counts, counts)
 
 
-def _painted(vertices: _Table) -> Floats | None:
+def _painted(vertices: _Table, notes: list[str]) -> Floats | None:
     """(N, 3) colors of the vertices, 0 to 255, which some programs write behind their positions."""
-    if not (vertices.count >= 6).all():
+    colors = vertices.columns(3, 6) if (vertices.count >= 6).all() else None
+    if colors is None or not np.isfinite(colors).all():
+        if (vertices.count >= 6).any():
+            notes.append("colors left out: some vertices have none")
         return None
-    colors = vertices.columns(3, 6)
     return np.clip(colors if colors.max(initial=0.0) > 1.0 else 255.0 * colors, 0.0, 255.0)
 
 

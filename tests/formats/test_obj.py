@@ -168,8 +168,10 @@ def test_colors_of_vertices(tmp_path: Path, scale: float) -> None:
     assert (colors == (255, 0, 51)).all()
 
 
-def test_colors_of_some_vertices_are_noted(tmp_path: Path) -> None:
-    mesh = _read(tmp_path / "a.obj", POINTS.replace("v 1 0 0", "v 1 0 0 1 0 0") + FACES)
+@pytest.mark.parametrize("others", ["", " nan nan nan"])
+def test_colors_of_some_vertices_are_noted(tmp_path: Path, others: str) -> None:
+    points = POINTS.replace("\n", f"{others}\n").replace(f"v 1 0 0{others}", "v 1 0 0 1 0 0")
+    mesh = _read(tmp_path / "a.obj", points + FACES)
     assert mesh.colors is None
     assert mesh.notes == ("colors left out: some vertices have none",)
 
