@@ -102,7 +102,7 @@ def _corner_lists(rows: Rows) -> Lists | None:
 def _whole(values: NDArray[Any], where: str) -> Ints:
     if values.dtype.kind == "f" and not (values == np.round(values)).all():
         raise InputError(f"{where}: expected faces of whole numbers")
-    return values.astype(np.int64)
+    return values.astype(np.int32 if values.dtype.kind == "i" and values.dtype.itemsize <= 4 else np.int64, copy=False)
 
 
 def _require_vertices(corners: Ints, counts: Ints, count: int, where: str, least: int = 0) -> None:

@@ -130,6 +130,7 @@ OFF_REFUSED = {
     "four dimensions": (_off("4OFF"), "expected text that starts with OFF"),
     "a word": (_off("OFF").replace("0 1 0", "0 one 0"), "line 5: expected numbers, got 'one'"),
     "beyond the vertices": (_off("OFF").replace("3 1 2 3", "3 1 2 4"), "line 10: refers to vertex 4, of 4"),
+    "a face of far too many": (_off("OFF").replace("3 1 2 3", "9" * 20 + " 1 2 3"), "line 10: expected a face of"),
     "two coordinates": (_off("OFF", [row[:3] for row in ROWS]), "line 3: expected 3 numbers of a vertex, got 2"),
 }
 
