@@ -57,7 +57,7 @@ def test_a_sparse_accessor_beyond_its_elements_is_refused(tmp_path: Path) -> Non
         "indices": {"bufferView": file.view(np.array([4], np.uint16).tobytes()), "componentType": 5123},
         "values": {"bufferView": file.view(bytes(12))},
     }
-    with pytest.raises(InputError, match="a sparse accessor refers beyond its 4 elements"):
+    with pytest.raises(InputError, match="a sparse accessor: expected whole numbers below 4"):
         read_geometry(file.glb(tmp_path / "a.glb"))
 
 
@@ -312,6 +312,17 @@ def test_indices_beyond_the_vertices_and_odd_corners(tmp_path: Path) -> None:
         read_geometry(Gltf(indices=np.array([0, 1, 9], np.uint16)).glb(tmp_path / "a.glb"))
     with pytest.raises(InputError, match="three corners for each triangle, got 11"):
         read_geometry(Gltf(indices=TETRAHEDRON[:-1]).glb(tmp_path / "a.glb"))
+
+
+def test_what_is_missing_in_the_json_is_named(tmp_path: Path) -> None:
+    narrow = Gltf()
+    narrow.tree["bufferViews"][0]["byteStride"] = 8
+    with pytest.raises(InputError, match="expected a byteStride of at least 12 bytes an element, got 8"):
+        read_geometry(narrow.glb(tmp_path / "a.glb"))
+    path = Gltf().gltf(tmp_path / "a.gltf", "a.bin", "a.bin")
+    path.write_text(path.read_text().replace(', "uri": "a.bin"', ""))
+    with pytest.raises(InputError, match="buffer 0: expected a URI, got none"):
+        read_geometry(path)
 
 
 def test_a_node_below_itself(tmp_path: Path) -> None:

@@ -85,6 +85,27 @@ COLORED = VERTEX + "".join(f"property uchar {name}\n" for name in ("red", "green
 PAINTED = "".join(f"{row} 255 10 20\n" for row in ROWS.splitlines())
 
 
+STRIP = "element tristrips 1\nproperty list int int vertex_indices\n"
+
+
+def test_strips_beside_no_faces_and_beside_faces(tmp_path: Path) -> None:
+    alone = _read(tmp_path / "a.ply", _head(VERTEX + FACE.replace("4", "0") + STRIP) + ROWS + "4 0 1 2 3\n")
+    assert alone.faces.tolist() == [[0, 1, 2], [1, 3, 2]]
+    assert alone.notes == ()
+    both = _read(tmp_path / "b.ply", _head(VERTEX + FACE + STRIP) + ROWS + LISTS + "4 0 1 2 3\n")
+    assert len(both.faces) == 4
+    assert both.notes == ("1 strips beside the faces left out",)
+
+
+def test_other_elements_are_noted(tmp_path: Path) -> None:
+    """As the scanners of Stanford wrote them: a grid of the points that were seen."""
+    grid = "element range_grid 2\nproperty list uchar int vertex_indices\n"
+    (tmp_path / "a.ply").write_text(_head(VERTEX + grid) + ROWS + "1 0\n0\n")
+    cloud = read_geometry(tmp_path / "a.ply")
+    assert isinstance(cloud, PointCloud)
+    assert cloud.notes == ("2 rows of range_grid left out",)
+
+
 def test_colors_of_points(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_text(_head(COLORED) + PAINTED)
     cloud = read_geometry(tmp_path / "a.ply")

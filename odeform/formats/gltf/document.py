@@ -129,7 +129,8 @@ class Document:
             if isinstance(uri, str):
                 data = self.read_beside(uri)
             if data is None:
-                raise InputError(f"{self.where}: buffer {index}: no such file {str(uri)[:100]!r} beside it")
+                what = f"no such file {uri[:100]!r} beside it" if isinstance(uri, str) else "expected a URI, got none"
+                raise InputError(f"{self.where}: buffer {index}: {what}")
             size = self.number(item, "byteLength")
             if len(data) < size:
                 raise InputError(
