@@ -246,6 +246,18 @@ def test_a_texture_is_clamped_and_transformed_as_its_sampler_says(tmp_path: Path
         assert (colors == value).all()
 
 
+def test_diffuse_colors_of_another_model_of_materials(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "red.png")
+    file = _textured(Gltf(), {"source": 0}, [{"uri": "red.png"}])
+    glossy = {"diffuseFactor": [1.0, 1.0, 0.0, 1.0]}
+    file.tree["materials"][0]["extensions"] = {"KHR_materials_pbrSpecularGlossiness": glossy}
+    for diffuse, color in (({}, [255, 255, 0]), ({"diffuseTexture": {"index": 0}}, [255, 0, 0])):
+        glossy |= diffuse
+        colors = _mesh(file.glb(tmp_path / "a.glb")).colors
+        assert colors is not None
+        assert (colors == color).all()
+
+
 SPLATS = "KHR_gaussian_splatting"
 
 

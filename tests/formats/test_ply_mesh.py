@@ -149,6 +149,11 @@ def test_a_missing_texture_is_noted_without_a_traceback(
     assert "".join(capfd.readouterr()) == caplog.text == ""
 
 
+def test_several_textures_are_noted(tmp_path: Path) -> None:
+    text = TEXT.replace("element vertex", "comment TextureFile a.png\ncomment TextureFile b.png\nelement vertex")
+    assert _read(tmp_path / "a.ply", text).notes == ("2 textures left out: one is read at most",)
+
+
 def test_a_texture_of_the_corners_of_faces(tmp_path: Path) -> None:
     Image.new("RGB", (4, 4), (10, 200, 30)).save(tmp_path / "my image.png")
     lists = "".join(f"{row} 6 0 0 1 0 0 1\n" for row in LISTS.splitlines())

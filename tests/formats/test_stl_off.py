@@ -128,6 +128,7 @@ OFF_REFUSED = {
     "cut in a face": (_off("OFF")[:-3], "line 10: expected a face of 3 vertices, got 2 numbers: truncated"),
     "binary": ("OFF BINARY\n" + "\0" * 99, "expected text that starts with OFF"),
     "four dimensions": (_off("4OFF"), "expected text that starts with OFF"),
+    "n dimensions": (_off("nOFF"), "expected text that starts with OFF"),
     "a word": (_off("OFF").replace("0 1 0", "0 one 0"), "line 5: expected numbers, got 'one'"),
     "beyond the vertices": (_off("OFF").replace("3 1 2 3", "3 1 2 4"), "line 10: refers to vertex 4, of 4"),
     "a face of far too many": (_off("OFF").replace("3 1 2 3", "9" * 20 + " 1 2 3"), "line 10: expected a face of"),

@@ -41,7 +41,9 @@ def shapes() -> dict[str, bytes]:
     faces = np.asarray(mesh.faces)
     files["text.vtk"] = legacy(mesh.vertices, faces)
     files["binary.vtk"] = legacy(mesh.vertices, faces, {"v": mesh.vertices}, binary=True)
-    files |= {f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "raw")}
+    files |= {
+        f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "lzma", "raw")
+    }
     files["cells.vtu"] = unstructured(mesh.vertices, faces, 5, form="raw")
     text = io.StringIO()
     np.savetxt(text, mesh.vertices)
