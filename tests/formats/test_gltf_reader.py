@@ -344,6 +344,12 @@ def test_a_node_below_itself(tmp_path: Path) -> None:
         read_geometry(file.glb(tmp_path / "a.glb"))
 
 
+def test_another_file_is_no_gltf(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(b"Kaydara FBX Binary")
+    with pytest.raises(InputError, match="expected glTF, binary or as JSON, got b'Kaydara FBX '"):
+        read_geometry(tmp_path / "a.glb")
+
+
 def test_json_with_a_byte_order_mark(tmp_path: Path) -> None:
     path = Gltf().gltf(tmp_path / "a.gltf", "a.bin", "a.bin")
     path.write_bytes(b"\xef\xbb\xbf" + json.dumps(json.loads(path.read_text())).encode())

@@ -209,6 +209,8 @@ def read_document(path: Path) -> Document:
     binary = None
     if data[:4] == b"glTF":
         data, binary = _chunks(data, where)
+    elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{" and b"\0" not in data[:8]:  # else JSON in UTF-16
+        raise InputError(f"{where}: expected glTF, binary or as JSON, got {data[:12]!r}")
     tree = parse_json(data.removeprefix(b"\xef\xbb\xbf"), where)
     if not isinstance(tree, dict):
         raise InputError(f"{where}: expected a JSON object of glTF")
