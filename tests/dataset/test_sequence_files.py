@@ -144,6 +144,9 @@ def test_fields_of_displacements_in_one_file(tmp_path: Path) -> None:
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {f"displacement{k}": CORNERS for k in (0, 1, 3)}))
     with pytest.raises(InputError, match=r"a.vtk: frame 2 is missing between displacement1 and displacement3"):
         imported(root)
+    (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON[:, :2], {f"displacement{k}": CORNERS for k in range(3)}))
+    dataset = import_dataset(root, tmp_path / "edges")
+    assert "expected cells of at least three corners, got none" in dataset.entries[0].status
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {"displacement0": CORNERS}))
     with pytest.raises(InputError, match=r"a: expected at least 2 frames, got 1"):
         imported(root)
