@@ -45,7 +45,8 @@ def read_image(paths: Sequence[Path], name: str, notes: list[str]) -> NDArray[np
 def pixels_of(file: Path | BytesIO) -> NDArray[np.uint8] | None:
     """An image as (H, W, 3) in sRGB; None where it cannot be read."""
     try:
-        return np.asarray(Image.open(file).convert("RGB"))
+        image = Image.open(file)
+        return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))
     except Exception:
         # Pillow raises anything on a broken file
         return None

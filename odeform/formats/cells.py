@@ -45,7 +45,7 @@ def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) ->
     """The surface of all solid cells, else all flat ones, else the points (N, 3).
 
     Raises:
-        InputError: For cells that refer to no vertex.
+        InputError: For cells that refer to no vertex, and faces of which none has three corners.
     """
     for group in cells:
         if len(group.corners) and not 0 <= group.corners.min() <= group.corners.max() < len(points):
@@ -70,6 +70,8 @@ def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) ->
     else:
         return PointCloud(points, None, tuple(notes))
     triangles, _ = triangulated(points, corners, counts)
+    if not len(triangles):
+        raise InputError(f"{where}: expected cells of at least three corners, got none")
     return Mesh(points, corners[triangles], None, tuple(notes))
 
 

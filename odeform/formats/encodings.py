@@ -2,11 +2,12 @@
 
 from odeform.errors import InputError
 
-__all__ = ["decoded"]
+__all__ = ["bare_utf16", "decoded"]
 
 NOT_TEXT = {
     b"PK\x03\x04": "an Excel or OpenDocument workbook, or another zip file: save the table as CSV",
     b"\xd0\xcf\x11\xe0": "an old Excel workbook: save the table as CSV",
+    b"\x1f\x8b": "a gzip archive: unpack it first",
     b"version https://git-lfs": "a pointer of Git LFS, not the file itself: run `git lfs pull`",
     b"<!DOCTYPE": "a web page, not the file itself",
     b"<html": "a web page, not the file itself",
@@ -22,7 +23,7 @@ def decoded(data: bytes, where: str) -> tuple[str, tuple[str, ...]]:
     for start, what in NOT_TEXT.items():
         if data[: len(start)].lower() == start.lower():
             raise InputError(f"{where}: expected text, got {what}")
-    encoding = UTF16.get(data[:2]) or _bare_utf16(data)
+    encoding = UTF16.get(data[:2]) or bare_utf16(data)
     notes: tuple[str, ...] = ()
     try:
         text = data.decode(encoding or "utf-8")
@@ -41,8 +42,9 @@ def decoded(data: bytes, where: str) -> tuple[str, tuple[str, ...]]:
     return text.removeprefix("\ufeff"), notes
 
 
-def _bare_utf16(data: bytes) -> str:
-    """The encoding of UTF-16 without a byte order mark, of mostly Latin letters: every other byte is zero."""
+def bare_utf16(data: bytes) -> str:
+    """The encoding of UTF-16 without a byte order mark, of mostly Latin letters: every other byte is zero. Empty for
+    anything else."""
     head = data[:512]
     zeros = head[0::2].count(0), head[1::2].count(0)
     if len(data) % 2 or 4 * max(zeros) < len(head):

@@ -9,12 +9,16 @@ UNREAD = {
     **dict.fromkeys((".fbx", ".dae", ".3ds", ".blend", ".abc", ".3mf", ".wrl", ".x3d", ".lwo", ".x", ".ctm"), MESH),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz", ".max", ".ma", ".mb", ".c4d", ".skp", ".3dm", ".drc"), MESH),
     **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep", ".sldprt", ".dxf", ".dwg", ".jt", ".3dxml"), MESH),
+    **dict.fromkeys((".zae", ".amf", ".ase", ".ac", ".ms3d", ".md2", ".b3d", ".xaml", ".ifc", ".gts"), MESH),
     **dict.fromkeys((".e57", ".ptx", ".bag", ".rcp", ".rcs", ".fls", ".zfs", ".bin"), POINTS),
     **dict.fromkeys((".lcc", ".splt", ".rad"), SPLATS),
     **dict.fromkeys((".vtm", ".vtr", ".vts", ".vti", ".pvd", ".xdmf", ".inp", ".bdf", ".med", ".mesh"), ".vtu or .vtk"),
     ".vrm": ".glb",
 }
 """Formats that are not read -> what to convert them to."""
+PACKED = (".zip", ".gz", ".tgz", ".tar", ".7z", ".rar", ".bz2", ".xz", ".zst")
+MOTIONS = (".npz", ".c3d", ".series")
+"""Formats that `odeform import` reads."""
 ARCHIVES = {b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"7z\xbc\xaf\x27\x1c": "7z", b"Rar!": "rar", b"BZh": "bzip2"}
 ARCHIVED = {".sog": "zip", ".spz": "gzip"}
 """Formats that are archives themselves."""
@@ -22,7 +26,11 @@ PAGES = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
 def unread(suffix: str) -> str:
-    """What to convert a format to that is known and not read; empty for others."""
+    """What to do with a format that is known and not read; empty for others."""
+    if suffix in PACKED:
+        return f"{suffix} is not read: unpack it first"
+    if suffix in MOTIONS:
+        return f"{suffix} holds a motion, not a shape: `odeform import` reads it"
     return f"{suffix} is not read: convert it to {UNREAD[suffix]}" if suffix in UNREAD else ""
 
 

@@ -18,6 +18,11 @@ __all__ = ["read_las"]
 POINT_BYTES = 120  # of memory while reading
 DEEP = 255  # colors above have 16 bits, as the format says; some programs write 8
 COMPRESSED = 0x80  # bit of the point format
+HEADER = 227  # bytes, of the shortest version
+LASZIP = 22204
+"""Record of how points are compressed; from byte `PARTS` on it has their number of parts, and kind, size and version of
+each."""
+PARTS = 32
 CHUNK = 20  # bytes: at least one point of each chunk is stored as it is
 PANIC = "PanicException"
 """Class of the errors by which the decompressor, which is written in Rust, says that it stopped."""
@@ -58,6 +63,11 @@ def _read(path: Path, where: str) -> Any:
         size = path.stat().st_size
         if count > size:  # the best compression leaves more than a byte of a point
             raise InputError(f"{where}: {size:,} bytes cannot hold {count:,} points: truncated?")
+        if file.header.are_points_compressed:
+            _require_whole_points(file.header, where)
+        present = (size - file.header.offset_to_point_data) // file.header.point_format.size
+        if present < count and not file.header.are_points_compressed:
+            raise InputError(f"{where}: expected {count:,} points, got {max(present, 0):,}: truncated?")
         require_memory(where, f"{count:,} points", count * POINT_BYTES)
         scan = file.read()
     if len(scan.points) != count:
@@ -65,13 +75,28 @@ def _read(path: Path, where: str) -> Any:
     return scan
 
 
+def _require_whole_points(header: Any, where: str) -> None:
+    """Raise `InputError` where the compressed parts of a point are not as long as a point: the decompressor would stop,
+    and print where."""
+    for record in header.vlrs:
+        if record.record_id == LASZIP:
+            parts = record.record_data[PARTS + 2 :]
+            count = int.from_bytes(record.record_data[PARTS : PARTS + 2], "little")
+            sizes = [size for _, size, _ in struct.iter_unpack("<HHH", parts[: min(6 * count, len(parts) // 6 * 6)])]
+            size = header.point_format.size
+            if sum(sizes) != size:
+                raise InputError(f"{where}: expected compressed points of {size} bytes, got {sum(sizes)}: damaged?")
+
+
 def _require_sound(path: Path, where: str) -> None:
     """Raise `InputError` for another file, and a table of compressed chunks that claims more than the file can hold."""
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(375)
-        if head[:4] != b"LASF" or len(head) < 227:
-            raise InputError(f"{where}: expected a header that starts with LASF, got {head[:4]!r}: truncated?")
+        if head[:4] != b"LASF":
+            raise InputError(f"{where}: expected a file that starts with LASF, got {head[:4]!r}: not a laser scan?")
+        if len(head) < HEADER:
+            raise InputError(f"{where}: expected a header of {HEADER} bytes, got {len(head)}: truncated?")
         start, records, kind = struct.unpack_from("<IIB", head, 96)
         if start > size or records > size:
             raise InputError(f"{where}: expected points from byte {start:,} on, got {size:,} bytes: truncated?")

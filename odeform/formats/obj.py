@@ -3,6 +3,7 @@
 http://www.martinreddy.net/gfx/3d/OBJ.spec (Wavefront Technologies, Advanced Visualizer, appendix B1).
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,8 @@ __all__ = ["read_obj"]
 
 BYTES_PER_BYTE = 16  # of memory while reading
 BASES = (b"curv", b"curv2", b"surf")
+CONTINUED = re.compile(rb"(?:[^\n]*\\\n)+[^\n]*")
+"""A line that goes on behind a backslash."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +51,14 @@ def read_obj(path: Path, merge: bool) -> Geometry:
     size = path.stat().st_size
     require_memory(where, f"{size:,} bytes of .obj", BYTES_PER_BYTE * size)
     text = read_text(path)
-    if b"\\\n" in text:  # a line goes on
-        text = text.replace(b"\\\n", b"  ")
+    if b"\\\n" in text:
+        text = CONTINUED.sub(_joined, text)
     lines, notes = Lines(text), []
     is_vertex = lines.starting(b"v")
     if not is_vertex.any():
         raise InputError(f"{where}: expected lines of vertices, v x y z, got none: not an OBJ file?")
     vertices = _table(lines, is_vertex, b"v", 3, where)
-    points, painted = vertices.columns(0, 3), _painted(vertices)
+    points, painted = vertices.columns(0, 3), _painted(vertices, notes)
     corners = read_corners(lines, is_vertex, where)
     if corners.short:
         notes.append(f"{corners.short} faces of fewer than three corners left out")
@@ -67,6 +70,11 @@ def read_obj(path: Path, merge: bool) -> Geometry:
     triangles, polygon = triangulated(points, corners.vertex, corners.counts)
     colors = _colors(path, lines, corners, triangles, polygon, painted, notes) if merge else None
     return Mesh(points, corners.vertex[triangles], colors, tuple(notes))
+
+
+def _joined(found: re.Match[bytes]) -> bytes:
+    """One line, and empty ones after it, so that those that follow keep their numbers."""
+    return found[0].replace(b"\\\n", b" ") + b"\n" * found[0].count(b"\n")
 
 
 def _table(lines: Lines, chosen: NDArray[np.bool_], word: bytes, least: int, where: str) -> _Table:
@@ -82,11 +90,13 @@ def _table(lines: Lines, chosen: NDArray[np.bool_], word: bytes, least: int, whe
     return _Table(values, np.cumsum(counts) - counts, counts)
 
 
-def _painted(vertices: _Table) -> Floats | None:
+def _painted(vertices: _Table, notes: list[str]) -> Floats | None:
     """(N, 3) colors of the vertices, 0 to 255, which some programs write behind their positions."""
-    if not (vertices.count >= 6).all():
+    colors = vertices.columns(3, 6) if (vertices.count >= 6).all() else None
+    if colors is None or not np.isfinite(colors).all():
+        if (vertices.count >= 6).any():
+            notes.append("colors left out: some vertices have none")
         return None
-    colors = vertices.columns(3, 6)
     return np.clip(colors if colors.max(initial=0.0) > 1.0 else 255.0 * colors, 0.0, 255.0)
 
 

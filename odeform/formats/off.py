@@ -55,17 +55,30 @@ def read_off(path: Path, merge: bool) -> Mesh:
     vertices, faces = int(sizes[0]), int(sizes[1])
     lines = lines[used:]
     if len(lines) < vertices + faces:
-        raise InputError(f"{where}: expected {vertices} vertices and {faces} faces, got {len(lines)} lines: truncated?")
+        raise InputError(
+            f"{where}: expected {vertices} vertices and {faces} faces, one in each line, got {len(lines)} lines: "
+            "truncated?"
+        )
     table = _numbers(rows, lines[:vertices], where)
     points, painted = _vertices(table, counts[lines[:vertices]], found, lines[:vertices] + 1, where)
     if not faces:
         raise InputError(f"{where}: a mesh without faces: convert points to .ply or .xyz")
     at = lines[vertices : vertices + faces]
-    return _mesh(points, painted, _numbers(rows, at, where), counts[at], at + 1, where)
+    return _mesh(points, painted, _face_numbers(rows, at, where), counts[at], at + 1, where)
 
 
-def _numbers(rows: list[bytes], lines: Ints, where: str) -> Floats:
-    return numbers_of(b"\n".join(rows[line] for line in lines) + b"\n", where, lines + 1)
+def _face_numbers(rows: list[bytes], lines: Ints, where: str) -> NDArray[Any]:
+    """As `_numbers`; whole numbers, of faces without colors of fractions, are read twenty times as fast."""
+    try:
+        return _numbers(rows, lines, where, np.int64)
+    except InputError:
+        return _numbers(rows, lines, where)
+
+
+def _numbers(rows: list[bytes], lines: Ints, where: str, dtype: Any = np.float64) -> NDArray[Any]:
+    """All numbers from the first to the last of `lines` (L,); those between hold nothing."""
+    first, last = (int(lines[0]), int(lines[-1])) if len(lines) else (0, -1)
+    return numbers_of(b"\n".join(rows[first : last + 1]) + b"\n", where, range(first + 1, last + 2), dtype)
 
 
 def _vertices(
@@ -92,9 +105,9 @@ def _scaled(colors: Floats) -> Floats:
     return np.round(np.clip(np.nan_to_num(255.0 * colors if fractions else colors), 0.0, 255.0))
 
 
-def _mesh(points: Floats, painted: Floats | None, values: Floats, counts: Ints, lines: Ints, where: str) -> Mesh:
+def _mesh(points: Floats, painted: Floats | None, values: NDArray[Any], counts: Ints, lines: Ints, where: str) -> Mesh:
     start = np.cumsum(counts) - counts
-    sizes = np.nan_to_num(values[start]).astype(np.int64)
+    sizes = np.clip(np.nan_to_num(values[start]), -1, 1 << 40).astype(np.int64)
     short = np.flatnonzero((sizes < 1) | (counts < 1 + sizes))
     if len(short):
         odd = short[0]
@@ -115,7 +128,7 @@ def _mesh(points: Floats, painted: Floats | None, values: Floats, counts: Ints, 
     if painted is not None:
         colors = painted[corners[triangles]].astype(np.uint8)
     elif len(after) and after.min() >= 3:
-        of_faces = _scaled(values[(start + 1 + sizes)[:, None] + np.arange(3)])
+        of_faces = _scaled(values[(start + 1 + sizes)[:, None] + np.arange(3)].astype(float))
         colors = np.repeat(of_faces[polygon][:, None], 3, axis=1).astype(np.uint8)
     elif after.max(initial=0) > 0:
         notes.append("colors of some faces left out")

@@ -22,7 +22,8 @@ __all__ = ["Element", "Header", "Property", "Table", "columns", "read_header"]
 Table = NDArray[Any]
 """(rows,) structured array with one named column per property."""
 
-MAX_HEADER = 1 << 20  # bytes
+USUAL_HEADER, MAX_HEADER = 1 << 13, 1 << 20  # bytes
+MOST_BLANKS = 80  # behind end_header
 BLOCK = 8192  # rows at a time: a wide table is then read from memory once, not once per column
 BOM = b"\xef\xbb\xbf"
 ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": "="}
@@ -77,8 +78,8 @@ class Header:
 
 def read_header(path: Path) -> Header:
     """The header of a file. Raises `InputError` where it is missing or damaged."""
-    lines, start = _header(path)
     where, order, textures, elements = f"geometry {path}", "", [], []
+    lines, start = _header(path, where)
     properties: list[Property] = []
     for number, line in enumerate(lines, 1):
         match line.split():
@@ -122,16 +123,20 @@ def columns(table: Table, names: Sequence[str], path: Path) -> Floats:
     return out
 
 
-def _header(path: Path) -> tuple[list[str], int]:
+def _header(path: Path, where: str) -> tuple[list[str], int]:
     """The lines of the header, and the offset of the data in bytes."""
     with path.open("rb") as file:
-        head = file.read(MAX_HEADER)
+        head = file.read(USUAL_HEADER)
+        if b"end_header" not in head[:-MOST_BLANKS]:
+            head += file.read(MAX_HEADER)
     bom = len(BOM) if head.startswith(BOM) else 0
     text, end, rest = head[bom:].partition(b"end_header")
-    if not text.startswith(b"ply") or not end:
-        return [], 0
+    if not text.startswith(b"ply"):
+        raise InputError(f"{where}: expected ply in the first line, got {text[:20]!r}: not a PLY file?")
+    if not end:
+        raise InputError(f"{where}: expected a header that ends in end_header, got {len(head):,} bytes: truncated?")
     # "\n" after a lone "\r" is data already
     alone = b"\r" in text and b"\n" not in text
-    newline = rest.find(b"\r" if alone else b"\n", 0, 80) + 1
+    newline = rest.find(b"\r" if alone else b"\n", 0, MOST_BLANKS) + 1
     start = bom + len(text) + len(end) + newline
     return [*text.decode("latin-1").splitlines(), "end_header"], start

@@ -43,10 +43,10 @@ def read_tables(path: Path, header: Header) -> dict[str, Table]:
             for name in layout.names or ():
                 tables[element.name][name] = rows[name]
         return tables
-    start = header.start
+    start, data = header.start, _mapped(path)
     for element in plain:
         layout = _layout(element, header.order)
-        tables[element.name] = _mapped(path, start, element, layout)
+        tables[element.name] = _table(data, start, element, layout, path)
         start += element.rows * layout.itemsize
     return tables
 
@@ -60,17 +60,16 @@ def read_rows(path: Path, header: Header, notes: list[str]) -> dict[str, Rows]:
         rows = _text_rows(path, header, header.elements, notes)
         return {element.name: found for element, found in zip(header.elements, rows, strict=True)}
     out: dict[str, Rows] = {}
-    start = header.start
+    start, data = header.start, _mapped(path)
     for element in header.elements:
         if not element.lists:
             layout = _layout(element, header.order)
-            table = _mapped(path, start, element, layout)
+            table = _table(data, start, element, layout, path)
             out[element.name] = {name: table[name] for name in layout.names or ()}
             start += element.rows * layout.itemsize
             continue
-        data = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.zeros(0, np.uint8)
         out[element.name], start = _binary_lists(data, start, element, header.order, path)
-    if (extra := path.stat().st_size - start) > 0:
+    if (extra := len(data) - start) > 0:
         notes.append(f"{extra:,} bytes after the last row left out")
     return out
 
@@ -83,13 +82,17 @@ def _short(path: Path, element: Element, got: int) -> InputError:
     return InputError(f"geometry {path}: expected {element.rows} rows of {element.name}, got {got}: truncated?")
 
 
-def _mapped(path: Path, start: int, element: Element, layout: np.dtype[Any]) -> Table:
-    present = min(element.rows, max(path.stat().st_size - start, 0) // max(layout.itemsize, 1))
+def _mapped(path: Path) -> NDArray[np.uint8]:
+    """The bytes of a file, which are read when they are used."""
+    # a plain view: slices of NumPy's class for such files are slow
+    return np.memmap(path, np.uint8, "r").view(np.ndarray)
+
+
+def _table(data: NDArray[np.uint8], start: int, element: Element, layout: np.dtype[Any], path: Path) -> Table:
+    present = min(element.rows, max(len(data) - start, 0) // max(layout.itemsize, 1))
     if present < element.rows:
         raise _short(path, element, present)
-    if not present:
-        return np.zeros(0, layout)
-    return np.memmap(path, dtype=layout, mode="r", offset=start, shape=(present,))
+    return np.ndarray(present, layout, data, start if present else 0)
 
 
 def _binary_lists(data: NDArray[np.uint8], start: int, element: Element, order: str, path: Path) -> tuple[Rows, int]:
@@ -215,6 +218,9 @@ def _split_rows(values: NDArray[np.float64], counts: Ints, element: Element, pat
         found = values[np.repeat(place, length) + within]
         if np.dtype(entry.kind).kind in "iu":
             found = np.clip(np.nan_to_num(found), -(2.0**62), 2.0**62).astype(np.int64)
+            if not entry.count:  # colors are fractions of what their type can hold
+                limits = np.iinfo(entry.kind)
+                found = np.clip(found, limits.min, min(limits.max, 1 << 62)).astype(entry.kind)
         out[entry.name] = Lists(found, length) if entry.count else found
         place = place + length
     if element.lists and (place <= stop).all() and (place < stop).any():

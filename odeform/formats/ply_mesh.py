@@ -18,6 +18,7 @@ from odeform.types import Faces, Floats, Geometry, Ints, Mesh, PointCloud
 __all__ = ["channels", "read_ply_mesh"]
 
 BYTES_PER_BYTE = 20  # of memory while reading
+READ = ("vertex", "face", "tristrips")
 CORNERS = ("vertex_indices", "vertex_index", "vertex_indexes")
 COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 COORDINATES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texcoord_u", "texcoord_v"))
@@ -41,11 +42,13 @@ def read_ply_mesh(path: Path, header: Header, merge: bool) -> Geometry:
     double = any(np.asarray(values).dtype.itemsize > 4 for values in xyz)
     points = np.stack([np.asarray(values, np.float64 if double else np.float32) for values in xyz], axis=1)
     notes += [
-        f"{element.rows} {element.name}s left out"
+        f"{element.rows} edges left out"
+        if element.name == "edge"
+        else f"{element.rows} rows of {element.name} left out"
         for element in header.elements
-        if element.name == "edge" and element.rows
+        if element.name not in READ and element.rows
     ]
-    corners, triangles, polygon = _triangles(rows, points, where)
+    corners, triangles, polygon = _triangles(rows, points, where, notes)
     if not len(triangles):
         if any(element.rows for element in header.elements if element.name in ("face", "tristrips")):
             raise InputError(f"{where}: expected faces of at least three corners, got none")
@@ -75,40 +78,44 @@ def _numbers(rows: Rows, name: str) -> NDArray[Any] | None:
     return None if isinstance(found, Lists) else found
 
 
-def _triangles(rows: dict[str, Rows], points: Floats, where: str) -> tuple[Ints, Faces, Ints]:
+def _triangles(rows: dict[str, Rows], points: Floats, where: str, notes: list[str]) -> tuple[Ints, Faces, Ints]:
     """Corners (C,), triangles (F, 3) of them, and the face (F,) of each; of strips, -1."""
-    faces, strips = rows.get("face", {}), rows.get("tristrips", {})
-    lists = _corner_lists(faces)
-    if lists is None:
-        strip = _corner_lists(strips)
-        if strip is None:
-            if any(isinstance(entry, Lists) and len(entry.counts) for entry in faces.values()):
-                raise InputError(f"{where}: expected faces with a list {CORNERS[0]}, got {', '.join(faces)[:100]}")
-            return np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
+    faces = rows.get("face", {})
+    lists, strip = _corner_lists(faces), _corner_lists(rows.get("tristrips", {}))
+    if lists is None and any(isinstance(entry, Lists) and len(entry.counts) for entry in faces.values()):
+        raise InputError(f"{where}: expected faces with a list {CORNERS[0]}, got {', '.join(faces)[:100]}")
+    if strip is not None and lists is not None:
+        notes.append(f"{len(strip.counts)} strips beside the faces left out")
+    if strip is not None and lists is None:
         corners = _whole(strip.values, where)
-        _require_vertices(corners[corners != -1], len(points), where)
+        _require_vertices(corners, strip.counts, len(points), where, least=-1)
         triangles = _strips(corners, strip.counts)
         return corners, triangles, np.full(len(triangles), -1)
+    if lists is None:
+        return np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
     corners = _whole(lists.values, where)
-    _require_vertices(corners, len(points), where)
+    _require_vertices(corners, lists.counts, len(points), where)
     triangles, polygon = triangulated(points, corners, lists.counts)
     return corners, triangles, polygon
 
 
 def _corner_lists(rows: Rows) -> Lists | None:
-    return next((found for name in CORNERS if isinstance(found := rows.get(name), Lists)), None)
+    """The corners of faces or strips; None without any."""
+    lists = (found for name in CORNERS if isinstance(found := rows.get(name), Lists))
+    return next((found for found in lists if len(found.counts)), None)
 
 
 def _whole(values: NDArray[Any], where: str) -> Ints:
     if values.dtype.kind == "f" and not (values == np.round(values)).all():
         raise InputError(f"{where}: expected faces of whole numbers")
-    return values.astype(np.int64)
+    return values.astype(np.int32 if values.dtype.kind == "i" and values.dtype.itemsize <= 4 else np.int64, copy=False)
 
 
-def _require_vertices(corners: Ints, count: int, where: str) -> None:
-    if len(corners) and not 0 <= corners.min() <= corners.max() < count:
-        wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise InputError(f"{where}: a face refers to vertex {wrong}, of {count}")
+def _require_vertices(corners: Ints, counts: Ints, count: int, where: str, least: int = 0) -> None:
+    if len(corners) and not least <= corners.min() <= corners.max() < count:
+        wrong = int(np.argmax((corners < least) | (corners >= count)))
+        face = int(np.searchsorted(np.cumsum(counts), wrong, side="right")) + 1
+        raise InputError(f"{where}: face {face} refers to vertex {corners[wrong]}, of {count}")
 
 
 def _strips(corners: Ints, counts: Ints) -> Faces:

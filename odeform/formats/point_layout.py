@@ -50,7 +50,7 @@ class Layout:
         kept, numbers = [], []
         for number, line in enumerate(text.split(b"\n"), 1):
             line = line.strip()
-            if number > self.header and line and not line.startswith(COMMENTS):
+            if number > self.header and line.strip(b' ,;"') and not line.startswith(COMMENTS):
                 kept.append(self.spaced(line))
                 numbers.append(number)
         return b"\n".join(kept) + b"\n", np.array(numbers, np.int64)
@@ -69,7 +69,7 @@ class Layout:
 def find_layout(text: bytes, where: str) -> Layout:
     """The layout of a text. Raises `InputError` without any line of numbers, and for columns without x, y and z."""
     names: tuple[bytes, tuple[bytes, ...]] | None = None
-    count, odd = None, b""
+    count, odd, at = None, b"", 0
     for index, raw in enumerate(text.split(b"\n", MOST_HEADER)[:MOST_HEADER]):
         line = raw.strip()
         bare = line.lstrip(b"#/%! ")
@@ -82,7 +82,9 @@ def find_layout(text: bytes, where: str) -> Layout:
             if {b"x", b"y", b"z"} <= {_name(word).encode() for word in words}:
                 names = separator, tuple(words)
             elif not line.startswith(COMMENTS):
-                odd = odd or line
+                odd, at = (odd, at) if odd else (line, index + 1)
+                if names and any(character in b"0123456789" for character in line):
+                    break
             continue
         if len(words) == 1 and count is None and words[0].isdigit() and len(words[0]) < 13:
             count = int(words[0])
@@ -90,11 +92,15 @@ def find_layout(text: bytes, where: str) -> Layout:
         if odd and names is None and count is None:
             break
         found = tuple(_name(word) for word in names[1]) if names else ()
+        comma = comma or (separator == b" " and _decimal_commas(text))
         return Layout(
             index, separator, comma, count, found if len(found) == len(words) else _first(found, words, where)
         )
     shown = (odd or text.strip()[:1])[:40].decode("utf-8", "replace")
-    raise InputError(f"{where}: expected lines of numbers x y z, got {shown!r}" if shown else f"{where}: an empty file")
+    line = f"line {at}: " if at else ""
+    raise InputError(
+        f"{where}: {line}expected lines of numbers x y z, got {shown!r}" if shown else f"{where}: an empty file"
+    )
 
 
 def _first(names: tuple[str, ...], words: list[bytes], where: str) -> tuple[str, ...]:
@@ -111,6 +117,12 @@ def _separator(line: bytes) -> tuple[bytes, bool]:
     if len(words) >= 2 and all(map(COMMA_NUMBER.fullmatch, words)) and any(b"," in word for word in words):
         return b" ", True
     return (b",", False) if b"," in line else (b" ", False)
+
+
+def _decimal_commas(text: bytes) -> bool:
+    """Whether the first line of numbers with a comma has it as a decimal sign. Those before may be whole numbers."""
+    with_comma = re.search(rb"(?m)^[ \d+.eE-]*,[ \d+,.eE-]*$", text)
+    return bool(with_comma) and _separator(with_comma[0].strip())[1]
 
 
 def _words(line: bytes, separator: bytes) -> list[bytes]:

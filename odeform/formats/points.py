@@ -41,7 +41,9 @@ def read_xyz(path: Path, merge: bool) -> PointCloud:
     values = numbers_of(rows, where, lines)
     if (counts != expected).any():
         odd = int(np.argmax(counts != expected))
-        cut = ": truncated?" if odd == len(counts) - 1 else ""
+        cut = ": truncated?" if odd == len(counts) - 1 and counts[odd] < expected else ""
+        if layout.separator == b"," and counts[odd] > expected:
+            cut = ": are there decimal commas? Separate columns by semicolons, or write decimal points"
         raise InputError(
             f"{where}: line {lines[odd]}: expected {expected} numbers as in line {lines[0]}, got {counts[odd]}{cut}"
         )

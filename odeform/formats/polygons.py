@@ -21,9 +21,9 @@ def triangulated(points: Floats, corners: Ints, counts: Ints) -> tuple[Faces, In
     Returns:
         (F, 3) triangles as indices into `corners`, and (F,) the polygon of each.
     """
-    first = np.cumsum(counts) - counts
     if len(counts) and (counts == 3).all():
-        return first[:, None] + np.arange(3), np.arange(len(counts))
+        return np.arange(3 * len(counts)).reshape(-1, 3), np.arange(len(counts))
+    first = np.cumsum(counts) - counts
     room = np.maximum(counts - 2, 0)
     out = np.full((int(room.sum()), 3), -1, np.int64)
     place = np.cumsum(room) - room

@@ -34,8 +34,8 @@ class _Archive:
         try:
             self._zip = zipfile.ZipFile(path)
             names = [name for name in self._zip.namelist() if name.rpartition("/")[2] == "meta.json"]
-        except (zipfile.BadZipFile, OSError, ValueError) as error:
-            raise InputError(f"{self.where}: expected a zip archive: {error}: truncated?") from None
+        except (zipfile.BadZipFile, OSError, ValueError):
+            raise InputError(f"{self.where}: expected a zip archive with a directory at its end: truncated?") from None
         if not names:
             raise InputError(f"{self.where}: expected a meta.json in the archive, got none")
         self._folder = names[0].removesuffix("meta.json")

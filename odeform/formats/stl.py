@@ -17,6 +17,8 @@ __all__ = ["read_stl"]
 
 HEADER = 84  # bytes before the first triangle of a binary file; the last four count them
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+COLORED = 1 << 15
+"""Bit of the attribute of a triangle that has a color, unless the header has a color for all."""
 BYTES_PER_BYTE = 14  # of memory while reading
 
 
@@ -57,7 +59,8 @@ def _binary_corners(data: bytes, count: int, where: str) -> tuple[Floats, list[s
     if extra:
         notes.append(f"{extra:,} bytes after the last triangle left out")
     facets = np.frombuffer(data, FACET, count, HEADER)
-    if b"COLOR=" in data[:80] and facets["attribute"].any():
+    marked = facets["attribute"] if b"COLOR=" in data[:80] else facets["attribute"] & COLORED
+    if marked.any():
         notes.append("colors of triangles left out")
     return facets["corners"], notes
 

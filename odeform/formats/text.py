@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from odeform.budget import MEMORY, read_limited
 from odeform.errors import InputError
+from odeform.formats.encodings import bare_utf16
 from odeform.types import Ints
 
 __all__ = ["Lines", "numbers_of", "plain_text", "read_text", "require_words", "words_per_line"]
@@ -29,6 +30,8 @@ def plain_text(data: bytes) -> bytes:
     """Text without a byte order mark, in UTF-8 where it was UTF-16, whose lines end in a line feed, spaces for tabs."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         data = data.decode("utf-16", "replace").encode()
+    elif b"\0" in data[:4] and (encoding := bare_utf16(data)):
+        data = data.decode(encoding, "replace").encode()
     data = data.removeprefix(b"\xef\xbb\xbf")
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")

@@ -25,8 +25,9 @@ def sampled(
     left, right, across = _between(u, pixels.shape[1])
     low, high, along = _between(1.0 - v, pixels.shape[0])
     across, along = across[:, None], along[:, None]
-    first = (1.0 - across) * pixels[low, left] + across * pixels[low, right]
-    second = (1.0 - across) * pixels[high, left] + across * pixels[high, right]
+    flat, low, high = pixels.reshape(-1, 3), low * pixels.shape[1], high * pixels.shape[1]
+    first = (1.0 - across) * flat[low + left] + across * flat[low + right]
+    second = (1.0 - across) * flat[high + left] + across * flat[high + right]
     return np.round((1.0 - along) * first + along * second)
 
 

@@ -80,6 +80,8 @@ def write_motion(
         >>> odeform.write_motion(motion, np.arange(0.0, 1.0, 0.02), "ball.glb")
     """
     path, times = Path(out), checked_times(np.asarray(times))
+    if not len(times):
+        raise InputError(f"{out}: times: expected at least one, in seconds, got none")
     files = motion_files(path, len(times), truth is not None)
     _require_finite(motion, times)
     writer = writers()[path.suffix.lower()]

@@ -91,7 +91,7 @@ def differentiable_points(
 
     def solve(at: Floats, moved: Geometry = shape) -> Motion:
         values = {p.name: p.denormalise(float(x)) for p, x in zip(model.schema.learned, at, strict=True)}
-        return model.solve(moved, {**known, **values}, model.accurate, until=float(clock.max()))
+        return model.solve(moved, {**known, **values}, model.accurate, until=float(clock.max(initial=0.0)))
 
     here = u.detach().numpy()
     motion = solve(here)

@@ -22,9 +22,9 @@ LATEST = 10.0
 
 
 def checked_times(t: float | Times) -> Times:
-    """Return `t`, a number or (T,) seconds, as (T,) seconds; `InputError` for no time at all, and for NaN."""
+    """Return `t`, a number or (T,) seconds, as (T,) seconds, of which there may be none; `InputError` for NaN."""
     times = np.atleast_1d(np.asarray(t, dtype=float))
-    if times.ndim != 1 or not len(times) or np.isnan(times).any():
+    if times.ndim != 1 or np.isnan(times).any():
         raise InputError(f"time: expected seconds, a number or (T,) of them, got {np.array2string(times, threshold=5)}")
     return times
 

@@ -52,6 +52,11 @@ class MeanMotion:
     times: Times
     shifts: Float[np.ndarray, "times 3"]
 
+    def __post_init__(self) -> None:
+        even = self.times.ndim == 1 and self.shifts.shape == (len(self.times), 3) and len(self.times) > 1
+        if not even or not (np.diff(self.times) > 0.0).all() or not np.isfinite(self.shifts).all():
+            raise ValueError("mean: expected times that increase, and as many finite shifts")
+
     def at(self, times: Times) -> Float[np.ndarray, "asked 3"]:
         """(T,) seconds -> (T, 3) metres; zero at the start."""
         return self._spline(np.clip(times, self.times[0], self.times[-1]))

@@ -62,6 +62,8 @@ class ReducedMotion(Motion):
 
     def _reduced(self, t: float | Times) -> Float[np.ndarray, "times y"]:
         times = self._clock(t)
+        if not len(times):
+            return self._reduced(0.0)[:0]
         return self.space.bounded(self.trajectory.reduced(times), self.schema.window.passed(times))
 
     def coordinates(self, t: float | Times) -> Float[np.ndarray, "times body_y"]:
@@ -128,7 +130,7 @@ class ReducedMotion(Motion):
 
     def _deformation(self, y: Floats) -> Frames:
         """(T, N, 3) canonical displacements, by one product for all times."""
-        return (y[:, 6:].astype(np.float32) @ self.evaluated.values).reshape(len(y), -1, 3)
+        return (y[:, 6:].astype(np.float32) @ self.evaluated.values).reshape(len(y), len(self.evaluated.points), 3)
 
     def _carried_axes(self, y: Floats, turn: Rotations) -> Axes:
         """The local frames under the deformation of `y` (1, 6 + K), rotated from canonical axes by `turn` (3, 3)."""
@@ -163,6 +165,8 @@ def placements(space: ReducedSpace, y: Floats, azimuth: float) -> tuple[Floats, 
 def moved_points(evaluated: EvaluatedBasis, y: Floats, weights: Floats, rotations: Rotations) -> Frames:
     """(T, N, 3) float32 metres: the points of a geometry under coordinates `y` (T, 6 + K), from their `placements`."""
     count = len(evaluated.points)
+    if not len(y):
+        return np.empty((0, count, 3), dtype=np.float32)
     out = np.empty((len(y), 3 * count), dtype=np.float32)
     size = max(BLOCK // len(y) // SEVERAL, 1) * SEVERAL
 

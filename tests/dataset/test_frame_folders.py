@@ -38,6 +38,15 @@ def test_times_in_names_are_doubted_aloud(tmp_path: Path, capsys: pytest.Capture
         imported(even)
 
 
+def test_what_frames_hold_beside_their_mesh_is_noted(tmp_path: Path) -> None:
+    def with_lines(path: Path, points: np.ndarray) -> None:
+        obj(path, points)
+        path.write_text(path.read_text() + "\nl 1 2\nl 2 3\n")
+
+    dataset, _ = imported(folder(tmp_path / "src", ["f_0.obj", "f_1.obj"], [0.0, 0.1], with_lines))
+    assert dataset.provenance["notes"] == ["a and 1 more: 2 lines left out"]
+
+
 def test_steps_in_the_numbers_are_said_and_the_same_in_all_sequences(tmp_path: Path) -> None:
     root = folder(tmp_path / "src", ["f_0.obj", "f_5.obj", "f_10.obj"], [0.0, 0.1, 0.2])
     dataset, sequence = imported(root)

@@ -46,6 +46,15 @@ ORDERED = {
 }
 
 
+def test_numbers_may_be_padded_by_spaces() -> None:
+    padded = [Path(f"f {number:3}.obj") for number in (8, 9, 10, 100)]
+    with pytest.raises(InputError, match="frames 11 to 99 are missing"):
+        numbered_frames(padded, "here")
+    assert numbered_frames(padded[2::-1], "here").files == tuple(padded[:3])
+    with pytest.raises(InputError, match="are both frame 8"):
+        numbered_frames([*padded[:3], Path("f 8.obj")], "here")
+
+
 @pytest.mark.parametrize("name", ORDERED)
 def test_frames_are_ordered_by_value(name: str) -> None:
     names = ORDERED[name].split()
@@ -59,6 +68,7 @@ REFUSED = {
     "an immense gap": ("f_0 f_1 f_2 f_1000000000000000000", "frames 3 to .* are missing"),
     "a gap in steps": ("f_0 f_10 f_20 f_40", "frame 30 is missing between f_20.obj and f_40.obj"),
     "a gap below zero": ("f_-3 f_-1 f_0 f_1", "frame -2 is missing"),
+    "a gap at zero": ("t_-0.2 t_-0.1 t_0.1 t_0.2", "frame 0 is missing between t_-0.1.obj and t_0.1.obj"),
     "a gap in decimals": ("m_0.0 m_0.1 m_0.2 m_0.4 m_0.5", "frame 0.3 is missing between m_0.2.obj and m_0.4.obj"),
     "a gap in rounded decimals": (
         "m_0.000 m_0.033 m_0.067 m_0.133 m_0.167",

@@ -1,6 +1,7 @@
 """Sequences in one file, in a list or in an archive: imported as they are meant, or refused in one line."""
 
 import json
+import struct
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -143,6 +144,9 @@ def test_fields_of_displacements_in_one_file(tmp_path: Path) -> None:
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {f"displacement{k}": CORNERS for k in (0, 1, 3)}))
     with pytest.raises(InputError, match=r"a.vtk: frame 2 is missing between displacement1 and displacement3"):
         imported(root)
+    (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON[:, :2], {f"displacement{k}": CORNERS for k in range(3)}))
+    dataset = import_dataset(root, tmp_path / "edges")
+    assert "expected cells of at least three corners, got none" in dataset.entries[0].status
     (root / "a.vtk").write_bytes(legacy(CORNERS, TETRAHEDRON, {"displacement0": CORNERS}))
     with pytest.raises(InputError, match=r"a: expected at least 2 frames, got 1"):
         imported(root)
@@ -270,6 +274,28 @@ def test_archives_are_unpacked_in_their_folder_only(
         for name in names:
             archive.writestr(name, content)
     with pytest.raises(InputError, match=f"x.zip: .*{message}"):
+        import_dataset(path, tmp_path / "out")
+
+
+def test_archives_with_a_password_or_too_many_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a/f_0.obj", b"x")
+    data = bytearray(path.read_bytes())
+    directory = data.index(b"PK\x01\x02")
+    for flags in (6, directory + 8):  # of the file itself, and of the directory
+        data[flags] |= 1
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=r"a/f_0.obj has a password: unpack it yourself"):
+        import_dataset(path, tmp_path / "out")
+    entry = bytes(data[directory : data.index(b"PK\x05\x06")])
+    count = 200_001
+    end = struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, 0xFFFF, 0xFFFF, 0xFFFFFFFF, 0xFFFFFFFF, 0)
+    start = directory + count * len(entry)
+    more = struct.pack("<IQHHIIQQQQ", 0x06064B50, 44, 45, 45, 0, 0, count, count, count * len(entry), directory)
+    locator = struct.pack("<IIQI", 0x07064B50, 0, start, 1)
+    path.write_bytes(bytes(data[:directory]) + entry * count + more + locator + end)
+    with pytest.raises(InputError, match=r"expected at most 200,000 files, got 200,001"):
         import_dataset(path, tmp_path / "out")
 
 

@@ -87,6 +87,7 @@ REFUSED = {
     "an open quotation mark": (b'sequence,mass\n"a,0.5\n', "line 2: .*quotation mark"),
     "a workbook": (b"PK\x03\x04rest", "an Excel or OpenDocument workbook.*save the table as CSV"),
     "an old workbook": (b"\xd0\xcf\x11\xe0rest", "an old Excel workbook"),
+    "a packed file": (b"\x1f\x8b\x08rest", "a gzip archive: unpack it first"),
     "a web page": (b"<!doctype html><title>404</title>", "got a web page"),
     "a pointer": (b"version https://git-lfs.github.com/spec/v1\n", "a pointer of Git LFS"),
     "no text": (b"sequence,mass\n\x81\x8d\n", "byte 14 is in none"),

@@ -42,6 +42,15 @@ def test_formats_that_are_not_read_say_what_to_convert_to(tmp_path: Path, suffix
     assert suffix not in READERS
 
 
+@pytest.mark.parametrize(
+    ("suffix", "said"), [(".zip", "unpack it first"), (".gz", "unpack it first"), (".npz", "`odeform import` reads it")]
+)
+def test_archives_and_motions_say_what_to_do(tmp_path: Path, suffix: str, said: str) -> None:
+    (tmp_path / f"a{suffix}").write_bytes(b"anything")
+    with pytest.raises(InputError, match=f"{suffix} .*{said}"):
+        read_geometry(tmp_path / f"a{suffix}")
+
+
 AWAY = np.array([500_000.0, 5_400_000.0, 120.0])
 
 

@@ -168,6 +168,14 @@ def test_colors_of_vertices(tmp_path: Path, scale: float) -> None:
     assert (colors == (255, 0, 51)).all()
 
 
+@pytest.mark.parametrize("others", ["", " nan nan nan"])
+def test_colors_of_some_vertices_are_noted(tmp_path: Path, others: str) -> None:
+    points = POINTS.replace("\n", f"{others}\n").replace(f"v 1 0 0{others}", "v 1 0 0 1 0 0")
+    mesh = _read(tmp_path / "a.obj", points + FACES)
+    assert mesh.colors is None
+    assert mesh.notes == ("colors left out: some vertices have none",)
+
+
 def test_vertices_alone_are_points(tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(POINTS.replace("\n", " 1 0 0\n"))
     cloud = read_geometry(tmp_path / "a.obj")
@@ -182,6 +190,7 @@ REFUSED = {
     POINTS.replace("1 0 0", "1,5 0 0") + FACES: "line 2: expected numbers, got '1,5'",
     POINTS + "v 1 2": "line 5: expected 3 numbers after v, got 2: truncated",
     POINTS + FACES + "f 1 9 2\n": "line 9: refers to vertex 9, of 4",
+    POINTS.replace("v 1 0", "v 1 \\\n 0") + FACES.replace("f 1", "f \\\n \\\n1") + "f 1 9 2\n": "line 16: refers to",
     POINTS + FACES + "f 1 0 2\n": "line 9: refers to vertex 0, of 4",
     POINTS + FACES + "f -5 1 2\n": "line 9: refers to vertex -5, of 4",
     POINTS + FACES + "f 1 x 2\n": "line 9: expected .*got 'x'",

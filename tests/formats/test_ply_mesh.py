@@ -85,6 +85,27 @@ COLORED = VERTEX + "".join(f"property uchar {name}\n" for name in ("red", "green
 PAINTED = "".join(f"{row} 255 10 20\n" for row in ROWS.splitlines())
 
 
+STRIP = "element tristrips 1\nproperty list int int vertex_indices\n"
+
+
+def test_strips_beside_no_faces_and_beside_faces(tmp_path: Path) -> None:
+    alone = _read(tmp_path / "a.ply", _head(VERTEX + FACE.replace("4", "0") + STRIP) + ROWS + "4 0 1 2 3\n")
+    assert alone.faces.tolist() == [[0, 1, 2], [1, 3, 2]]
+    assert alone.notes == ()
+    both = _read(tmp_path / "b.ply", _head(VERTEX + FACE + STRIP) + ROWS + LISTS + "4 0 1 2 3\n")
+    assert len(both.faces) == 4
+    assert both.notes == ("1 strips beside the faces left out",)
+
+
+def test_other_elements_are_noted(tmp_path: Path) -> None:
+    """As the scanners of Stanford wrote them: a grid of the points that were seen."""
+    grid = "element range_grid 2\nproperty list uchar int vertex_indices\n"
+    (tmp_path / "a.ply").write_text(_head(VERTEX + grid) + ROWS + "1 0\n0\n")
+    cloud = read_geometry(tmp_path / "a.ply")
+    assert isinstance(cloud, PointCloud)
+    assert cloud.notes == ("2 rows of range_grid left out",)
+
+
 def test_colors_of_points(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_text(_head(COLORED) + PAINTED)
     cloud = read_geometry(tmp_path / "a.ply")
@@ -104,6 +125,20 @@ def test_colors_of_vertices_and_faces(tmp_path: Path) -> None:
     assert of_faces[:, 1].tolist() == [[255, 51, 51 * k] for k in range(4)]
 
 
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian"])
+def test_colors_of_sixteen_bits(tmp_path: Path, form: str) -> None:
+    head = _head(COLORED.replace("uchar", "ushort"), form).encode()
+    if form == "ascii":
+        data = "".join(f"{row} 65535 0 32768\n" for row in ROWS.splitlines()).encode()
+    else:
+        data = b"".join(struct.pack("<3f3H", *row, 65535, 0, 32768) for row in XYZ)
+    (tmp_path / "a.ply").write_bytes(head + data)
+    cloud = read_geometry(tmp_path / "a.ply")
+    assert isinstance(cloud, PointCloud)
+    assert cloud.colors is not None
+    assert cloud.colors.tolist() == [[255, 0, 128]] * 4
+
+
 def test_a_missing_texture_is_noted_without_a_traceback(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -112,6 +147,11 @@ def test_a_missing_texture_is_noted_without_a_traceback(
     )
     assert _read(tmp_path / "a.ply", text).notes == ("the texture no such.png left out: no such file",)
     assert "".join(capfd.readouterr()) == caplog.text == ""
+
+
+def test_several_textures_are_noted(tmp_path: Path) -> None:
+    text = TEXT.replace("element vertex", "comment TextureFile a.png\ncomment TextureFile b.png\nelement vertex")
+    assert _read(tmp_path / "a.ply", text).notes == ("2 textures left out: one is read at most",)
 
 
 def test_a_texture_of_the_corners_of_faces(tmp_path: Path) -> None:
@@ -137,10 +177,12 @@ REFUSED = {
     _head(VERTEX + FACE) + ROWS + LISTS[:-9]: "expected 4 rows of face, got 3: truncated",
     _head(VERTEX + FACE) + ROWS + LISTS[:-3]: "line 17: expected a row of face .list vertex_indices., got 3 numbers",
     _head(VERTEX + FACE) + ROWS.replace("1 0 0", "1.#INF 0 0") + LISTS: "line 11: expected numbers, got '1.#INF'",
-    _head(VERTEX + FACE) + ROWS + LISTS.replace("3 0 2 1", "3 0 2 9"): "a face refers to vertex 9, of 4",
+    _head(VERTEX + FACE) + ROWS + LISTS.replace("3 0 2 1", "3 0 2 9"): "face 1 refers to vertex 9, of 4",
     _head(VERTEX.replace("float x", "quad x")) + ROWS: "line 4: expected a line of a PLY header, got 'property quad x'",
     _head(VERTEX.replace("float z", "float w")) + ROWS: "expected an element vertex with x, y and z, got x, y, w",
-    "ply\nformat ascii 1.0\nelement vertex 4\n": "expected a header",
+    "ply\nformat ascii 1.0\nelement vertex 4\n": "expected a header that ends in end_header, .*truncated",
+    "ply\nelement vertex 4\nend_header\n": "expected a header with a format of",
+    "a cloud of points\n": "expected ply in the first line, got b'a cloud of points",
     "PK\x03\x04 and so on": "got a zip archive",
 }
 

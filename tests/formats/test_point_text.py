@@ -28,6 +28,7 @@ HABITS = {
     "both line ends": (ROWS.replace("\n", "\r\n"), None),
     "carriage returns alone": (ROWS.replace("\n", "\r"), None),
     "byte order mark": ("\ufeff" + ROWS, None),
+    "empty rows of a table": (ROWS.replace(" ", ",") + ",,\n,,\n", None),
     "blank lines": (ROWS.replace("\n", "\n\n"), None),
     "commas": (ROWS.replace(" ", ", "), None),
     "commas at the end": (ROWS.replace(" ", ",").replace("\n", ",\n"), None),
@@ -69,10 +70,10 @@ def test_named_columns_in_any_order(tmp_path: Path) -> None:
     assert cloud.notes == ("1 further columns left out",)
 
 
-@pytest.mark.parametrize("coding", ["utf-16", "utf-16-le"])
-def test_sixteen_bits(tmp_path: Path, coding: str) -> None:
-    data = ROWS.encode(coding)
-    assert len(_read(tmp_path / "a.txt", b"\xff\xfe" + data if coding == "utf-16-le" else data).points) == 3
+@pytest.mark.parametrize("mark", ["\ufeff", ""], ids=["with a mark", "without"])
+@pytest.mark.parametrize("coding", ["utf-16-le", "utf-16-be"])
+def test_sixteen_bits(tmp_path: Path, coding: str, mark: str) -> None:
+    assert len(_read(tmp_path / "a.txt", (mark + ROWS).encode(coding)).points) == 3
 
 
 REFUSED = {
@@ -84,6 +85,8 @@ REFUSED = {
     ROWS.replace("1.6041", "1.#QNAN"): "line 2: expected numbers, got '1.#QNAN'",
     "C 0 0 0\nH 0 0 1\n": "expected lines of numbers x y z, got 'C 0 0 0'",
     "a,b,c\n1,2,3\n": "expected lines of numbers x y z, got 'a,b,c'",
+    "x;y;z\n1.234,5;2;3\n0;0;0\n1;1;1\n": "line 2: expected lines of numbers x y z, got '1.234,5;2;3'",
+    "0,0,0\n1,5,0,0\n0,0,1,5\n": "line 2: expected 3 numbers as in line 1, got 4: are there decimal commas",
     "": "an empty file",
     "<!DOCTYPE html><html>": "got a page of HTML",
 }
@@ -95,6 +98,7 @@ def test_refused_with_its_line(tmp_path: Path, text: str) -> None:
         _read(tmp_path / "a.xyz", text)
 
 
-def test_whole_numbers_before_decimal_commas(tmp_path: Path) -> None:
-    cloud = _read(tmp_path / "a.csv", "0;0;0\n1,5;2;3\n1e2;0;,5\n")
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_whole_numbers_before_decimal_commas(tmp_path: Path, separator: str) -> None:
+    cloud = _read(tmp_path / "a.csv", "0;0;0\n1,5;2;3\n1e2;0;,5\n".replace(";", separator))
     np.testing.assert_array_equal(cloud.points, np.array([[0, 0, 0], [1.5, 2, 3], [100, 0, 0.5]], np.float32))

@@ -1,5 +1,6 @@
 """Scans in the formats of programs: .pcd, .las and .laz."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -100,9 +101,26 @@ def test_laser_scans_on_a_map(tmp_path: Path, compressed: bool) -> None:
 @pytest.mark.parametrize("compressed", [False, True])
 def test_a_laser_scan_that_is_cut_short(tmp_path: Path, compressed: bool) -> None:
     data = las_bytes(POINTS, COLORS, compressed)
-    for stop in (100, len(data) // 2, len(data) - 9):
-        with pytest.raises(InputError, match="truncated"):
+    last = "a table of chunks" if compressed else f"{len(POINTS)} points, got {len(POINTS) - 1}: truncated"
+    for stop, said in ((100, "a header of 227 bytes, got 100"), (300, "truncated"), (len(data) - 9, last)):
+        with pytest.raises(InputError, match=said):
             _read(tmp_path / ("a.laz" if compressed else "a.las"), data[:stop])
+
+
+def test_another_file_is_no_laser_scan(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"expected a file that starts with LASF, got b'PDF-'"):
+        _read(tmp_path / "a.las", b"PDF-1.4" + bytes(300))
+
+
+def test_compressed_points_of_another_size_are_refused_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    data = las_bytes(POINTS, COLORS, True)
+    parts = struct.pack("<HHHHHHH", 2, 6, 20, 2, 8, 6, 2)
+    assert data.count(parts) == 1
+    with pytest.raises(InputError, match="expected compressed points of 26 bytes, got 31: damaged"):
+        _read(tmp_path / "a.laz", data.replace(parts, struct.pack("<HHHHHHH", 2, 6, 25, 2, 8, 6, 2)))
+    assert capfd.readouterr().err == ""
 
 
 def test_a_table_of_chunks_that_claims_everything(tmp_path: Path) -> None:

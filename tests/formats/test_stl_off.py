@@ -52,6 +52,10 @@ def test_stl(tmp_path: Path, habit: str) -> None:
 def test_what_follows_a_binary_stl_and_its_colors_are_noted(tmp_path: Path) -> None:
     assert _read(tmp_path / "a.stl", BINARY + b"trailer").notes == ("7 bytes after the last triangle left out",)
     colored = bytearray(BINARY)
+    colored[84 + 48 : 84 + 50] = b"\xff\x00"
+    assert _read(tmp_path / "a.stl", bytes(colored)).notes == ()  # no color without its bit
+    colored[84 + 48 : 84 + 50] = b"\xff\x80"
+    assert _read(tmp_path / "a.stl", bytes(colored)).notes == ("colors of triangles left out",)
     colored[:6] = b"COLOR="
     colored[84 + 48 : 84 + 50] = b"\xff\x80"
     assert _read(tmp_path / "a.stl", bytes(colored)).notes == ("colors of triangles left out",)
@@ -120,12 +124,14 @@ def test_off(tmp_path: Path, habit: str) -> None:
 
 
 OFF_REFUSED = {
-    "cut": (_off("OFF")[:-9], "expected 4 vertices and 4 faces, got 7 lines: truncated"),
+    "cut": (_off("OFF")[:-9], "expected 4 vertices and 4 faces, one in each line, got 7 lines: truncated"),
     "cut in a face": (_off("OFF")[:-3], "line 10: expected a face of 3 vertices, got 2 numbers: truncated"),
     "binary": ("OFF BINARY\n" + "\0" * 99, "expected text that starts with OFF"),
     "four dimensions": (_off("4OFF"), "expected text that starts with OFF"),
+    "n dimensions": (_off("nOFF"), "expected text that starts with OFF"),
     "a word": (_off("OFF").replace("0 1 0", "0 one 0"), "line 5: expected numbers, got 'one'"),
     "beyond the vertices": (_off("OFF").replace("3 1 2 3", "3 1 2 4"), "line 10: refers to vertex 4, of 4"),
+    "a face of far too many": (_off("OFF").replace("3 1 2 3", "9" * 20 + " 1 2 3"), "line 10: expected a face of"),
     "two coordinates": (_off("OFF", [row[:3] for row in ROWS]), "line 3: expected 3 numbers of a vertex, got 2"),
 }
 

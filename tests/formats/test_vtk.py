@@ -34,7 +34,7 @@ def test_legacy_polygons(binary: bool, tmp_path: Path) -> None:
     assert np.array_equal(mesh.faces, BOX.faces)
 
 
-@pytest.mark.parametrize("form", ["ascii", "binary", "zlib", "raw"])
+@pytest.mark.parametrize("form", ["ascii", "binary", "zlib", "lzma", "raw"])
 def test_xml_in_all_encodings(form: str, tmp_path: Path) -> None:
     mesh = read(polydata(BOX.vertices, BOX.faces, form), tmp_path / "a.vtp")
     assert np.allclose(mesh.points, BOX.vertices)
@@ -64,6 +64,7 @@ def test_one_cell_in_base64(tmp_path: Path) -> None:
         (13, [0, 3, 1, 4, 7, 5], 0.5),
         (14, [0, 1, 2, 3, 4], 1 / 3),
         (24, [0, 1, 3, 4, 5, 5, 5, 5, 5, 5], 1 / 6),
+        (71, [0, 1, 3, 4, 5, 5, 5, 5, 5, 5], 1 / 6),
     ],
 )
 def test_volumes_are_turned_outside(kind: int, corners: list[int], volume: float, tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import gzip
 import io
+import json
 import struct
 import tempfile
+from base64 import b64encode
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +27,8 @@ from .vtk_files import legacy, polydata, unstructured
 
 __all__ = ["dataset", "shapes"]
 
+SPLATS = "KHR_gaussian_splatting"
+
 
 def shapes() -> dict[str, bytes]:
     """File name -> content, at least one for every reader of shapes."""
@@ -37,11 +41,14 @@ def shapes() -> dict[str, bytes]:
     faces = np.asarray(mesh.faces)
     files["text.vtk"] = legacy(mesh.vertices, faces)
     files["binary.vtk"] = legacy(mesh.vertices, faces, {"v": mesh.vertices}, binary=True)
-    files |= {f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "raw")}
+    files |= {
+        f"{form}.vtp": polydata(mesh.vertices, faces, form) for form in ("ascii", "binary", "zlib", "lzma", "raw")
+    }
     files["cells.vtu"] = unstructured(mesh.vertices, faces, 5, form="raw")
     text = io.StringIO()
     np.savetxt(text, mesh.vertices)
-    files["points.xyz"] = text.getvalue().encode()
+    files |= dict.fromkeys(("points.xyz", "points.txt", "points.asc"), text.getvalue().encode())
+    files["big_endian.ply"] = _big_endian(mesh)
     for degree in (0, 3):
         files[f"splats_{degree}.ply"] = inria_bytes(_splats(degree))
     files["splats.splat"] = _antimatter(20)
@@ -75,9 +82,41 @@ def _scenes(mesh: trimesh.Trimesh) -> dict[str, bytes]:
             out[f"cells_{version[0]}_{binary}.msh"] = msh_bytes(CUBE, tetrahedra, version, binary)
     for form in ("ascii", "binary", "zlib", "appended"):
         out[f"cells_{form}.vtu"] = vtu_bytes(points, cells, kinds, form)
+    scenes = {"full.glb": _full(), "splats.glb": _gltf_splats(), **_compressed_gltf()}
     with tempfile.TemporaryDirectory() as folder:
-        out["full.glb"] = _full().glb(Path(folder) / "a.glb").read_bytes()
+        for name, file in scenes.items():
+            out[name] = file.glb(Path(folder) / name).read_bytes()
+    full = _full()
+    full.tree["buffers"] = [{"byteLength": len(full.data), "uri": f"data:;base64,{b64encode(full.data).decode()}"}]
+    out["full.gltf"] = json.dumps(full.tree).encode()
     return out
+
+
+def _gltf_splats() -> Gltf:
+    splats = _splats(1)
+    points = np.asarray(splats.points)
+    file, count = Gltf(points, indices=None), len(points)
+    properties = {
+        "ROTATION": np.tile(np.eye(4)[3], (count, 1)),
+        "SCALE": np.full((count, 3), 0.1),
+        "OPACITY": np.ones(count),
+    }
+    properties |= {f"SH_DEGREE_{int(n > 0)}_COEF_{max(n - 1, 0)}": np.asarray(splats.harmonics)[:, n] for n in range(4)}
+    attributes = {f"{SPLATS}:{name}": file.add(values.astype(np.float32)) for name, values in properties.items()}
+    file.primitive["attributes"] |= attributes
+    file.primitive |= {"mode": 0, "extensions": {SPLATS: {"kernel": "ellipse"}}}
+    return file
+
+
+def _compressed_gltf() -> dict[str, Gltf]:
+    """Files that say a known compression, once as required, and once beside numbers that are not there."""
+    draco, meshopt, required = Gltf(), Gltf(), Gltf()
+    draco.primitive["extensions"] = {"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {"POSITION": 0}}}
+    del draco.tree["accessors"][0]["bufferView"]
+    meshopt.tree["buffers"] = [{}, {"byteLength": 999, "extensions": {"EXT_meshopt_compression": {"fallback": True}}}]
+    meshopt.tree["bufferViews"][0]["buffer"] = 1
+    required.tree["extensionsRequired"] = ["EXT_meshopt_compression"]
+    return {"draco.glb": draco, "meshopt.glb": meshopt, "required.glb": required}
 
 
 def _full() -> Gltf:
@@ -132,6 +171,15 @@ def _scans(points: np.ndarray) -> dict[str, bytes]:
 def _exported(shape: trimesh.Trimesh | trimesh.PointCloud, kind: str) -> bytes:
     data = shape.export(file_type=kind)
     return data if isinstance(data, bytes) else str(data).encode()
+
+
+def _big_endian(mesh: trimesh.Trimesh) -> bytes:
+    header = f"ply\nformat binary_big_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
+    header += "".join(f"property double {axis}\n" for axis in "xyz")
+    header += f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = np.zeros(len(mesh.faces), [("count", "u1"), ("corners", ">i4", 3)])
+    rows["count"], rows["corners"] = 3, mesh.faces
+    return header.encode() + np.asarray(mesh.vertices, ">f8").tobytes() + rows.tobytes()
 
 
 def _splats(degree: int, count: int = 20) -> GaussianSplats:

@@ -1,6 +1,7 @@
 """Damaged motions as `odeform import` reads them: one `(folder, random) -> path` for each kind of source."""
 
 import io
+import json
 import zipfile
 from collections.abc import Callable
 from functools import cache
@@ -8,8 +9,9 @@ from pathlib import Path
 
 import c3d
 import numpy as np
+import trimesh
 
-from .mutations import Random, mutated
+from .mutations import Random, mutated, mutated_json
 from .vtk_files import legacy, polydata, unstructured
 
 __all__ = ["SEQUENCES"]
@@ -133,6 +135,34 @@ def _vtk_frames(folder: Path, random: Random) -> Path:
     return root
 
 
+def _stl_frames(folder: Path, random: Random) -> Path:
+    """Frames of triangles, one of them damaged."""
+    root = _root(folder)
+    kind = ("stl", "stl_ascii")[random.integers(2)]
+    for name in ("a", "b"):
+        (root / name).mkdir()
+        for k, frame in enumerate(FRAMES):
+            data = trimesh.Trimesh(frame, FACES, process=False).export(file_type=kind)
+            (root / name / f"{k}.stl").write_bytes(data if isinstance(data, bytes) else str(data).encode())
+    file = root / "a" / f"{random.integers(4)}.stl"
+    file.write_bytes(mutated(file.read_bytes(), random))
+    return root
+
+
+def _series(folder: Path, random: Random) -> Path:
+    """A damaged list of frames in JSON."""
+    root = _root(folder)
+    for k, frame in enumerate(FRAMES):
+        (root / f"f{k}.vtk").write_bytes(legacy(frame, FACES))
+    content = {"file-series-version": "1.0", "files": [{"name": f"f{k}.vtk", "time": 0.05 * k} for k in range(4)]}
+    text = json.dumps(content).encode()
+    (root / "a.vtk.series").write_bytes(
+        mutated_json(content, random) if random.random() < 0.5 else mutated(text, random)
+    )
+    (root / "b.vtk.series").write_bytes(text)
+    return root
+
+
 def _archive(folder: Path, random: Random) -> Path:
     """A damaged archive, or a sound one with an odd path or a damaged table."""
     path = folder / "motions.zip"
@@ -157,5 +187,7 @@ SEQUENCES: dict[str, Callable[[Path, Random], Path]] = {
     "sequence fields": _one_file("vtk", _fields),
     "sequence list": _listed,
     "sequence frames of VTK": _vtk_frames,
+    "sequence frames of STL": _stl_frames,
+    "sequence series": _series,
     "sequence archive": _archive,
 }

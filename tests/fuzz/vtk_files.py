@@ -1,6 +1,7 @@
 """Files of VTK as text, written for tests."""
 
 import base64
+import lzma
 import struct
 import zlib
 
@@ -34,7 +35,7 @@ def legacy(points: Rows, faces: Rows, vectors: dict[str, Rows] | None = None, bi
 
 
 def polydata(points: Rows, faces: Rows, form: str = "ascii") -> bytes:
-    """A `.vtp` file; `form` is ascii, binary, zlib or raw (appended)."""
+    """A `.vtp` file; `form` is ascii, binary, zlib, lzma or raw (appended)."""
     return _xml("PolyData", np.asarray(points, "<f4"), "Polys", np.asarray(faces), None, {}, form)
 
 
@@ -72,7 +73,7 @@ def _xml(
         if form == "binary":
             text = base64.b64encode(struct.pack("<I", len(data)) + data)
         else:
-            packed = zlib.compress(data)
+            packed = (zlib if form == "zlib" else lzma).compress(data)
             header = struct.pack("<4I", 1, len(data), 0, len(packed))
             text = base64.b64encode(header) + base64.b64encode(packed)
         return f'{head} format="binary">{text.decode()}</DataArray>'
@@ -82,7 +83,8 @@ def _xml(
     if types is not None:
         lists.append(array("types", types))
     fields = "".join(array(name, np.asarray(values, "<f4")) for name, values in vectors.items())
-    compressor = ' compressor="vtkZLibDataCompressor"' if form == "zlib" else ""
+    packer = {"zlib": "ZLib", "lzma": "LZMA"}.get(form)
+    compressor = f' compressor="vtk{packer}DataCompressor"' if packer else ""
     counted = "NumberOfCells" if types is not None else "NumberOfPolys"
     count = f'NumberOfPoints="{len(points)}" {counted}="{len(cells)}"'
     text = (

@@ -51,7 +51,8 @@ def even_step(
             return step
         if not decimal or 2 * np.count_nonzero(skipped) <= len(steps):
             index = int(np.argmax(skipped > 0))
-            lowest, highest = first + numbers[index] + step, first + numbers[index + 1] - step
+            ends = first + numbers[index] + step, first + numbers[index + 1] - step
+            lowest, highest = (0.0 if abs(end) < UNEVEN * step else end for end in ends)  # a sum of decimals is rounded
             frames = f"frames {short(lowest)} to {short(highest)} are"
             missing = f"frame {short(lowest)} is" if skipped[index] == 1 else frames
             between = f"between {names[index]} and {names[index + 1]}"

@@ -13,6 +13,7 @@ from odeform.dataset.importers.frame_reading import VTK, displacement_field, rea
 from odeform.dataset.importers.recording import Recording
 from odeform.errors import InputError
 from odeform.formats.delimited import parse_number, read_table, with_unit
+from odeform.formats.reading import read_geometry
 from odeform.types import Times
 
 __all__ = ["ENDINGS", "frame_folder", "recorded_files", "visible"]
@@ -39,11 +40,20 @@ def frame_folder(folder: Path) -> Recording:
 def recorded_files(files: Sequence[Path], where: str, times: Times | None = None, counted: bool = False) -> Recording:
     """Files in their order, of VTK perhaps with points that a field displaces."""
     field = displacement_field(files, where) if files[0].suffix.lower() in VTK and len(files) > 1 else ""
+    notes = _left_out(files[0])
     if field:
         read = functools.partial(read_displaced, files, field)
-        notes = (f"the points stand still; they are displaced by the field {field}",)
+        notes = (f"the points stand still; they are displaced by the field {field}", *notes)
         return Recording(where, len(files), read, times, counted, notes=notes)
-    return Recording(where, len(files), functools.partial(read_frames, files), times, counted)
+    return Recording(where, len(files), functools.partial(read_frames, files), times, counted, notes=notes)
+
+
+def _left_out(file: Path) -> tuple[str, ...]:
+    """Notes on what a frame has beside its mesh; none of a damaged one, which is refused where all are read."""
+    try:
+        return read_geometry(file, merge=False).notes
+    except InputError:
+        return ()
 
 
 def visible(folder: Path) -> list[Path]:

@@ -87,7 +87,7 @@ def numbered_frames(files: Sequence[Path], where: str) -> Numbered:
 def _parsed(path: Path, pattern: re.Pattern[str]) -> _Name:
     text, numbers, end = [], [], 0
     for found in pattern.finditer(path.stem):
-        text.append(path.stem[end : found.start()].casefold())
+        text.append(re.sub(" +", " ", path.stem[end : found.start()].casefold()))  # numbers may be padded by spaces
         numbers.append(found[0])
         end = found.end()
     return _Name(path, (*text, path.stem[end:].casefold()), tuple(numbers))

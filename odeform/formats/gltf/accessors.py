@@ -77,7 +77,9 @@ def _strided(document: Document, accessor: Tree, count: int, width: int, dtype: 
     size = width * dtype.itemsize
     stride = document.number(view, "byteStride", 0) or size
     need = start + stride * (count - 1) + size if count else 0
-    if stride < size or need > len(data):
+    if stride < size:
+        raise InputError(f"{document.where}: expected a byteStride of at least {size} bytes an element, got {stride}")
+    if need > len(data):
         raise InputError(
             f"{document.where}: accessor of {count:,} elements of {size} bytes: expected a buffer view of {need:,} "
             f"bytes, got {len(data):,}"
@@ -95,6 +97,6 @@ def _replaced(document: Document, dense: NDArray[Any], sparse: object) -> NDArra
     count = document.number(sparse, "count")
     where = _strided(document, places, count, 1, _dtype(document, places))[:, 0]
     if where.dtype.kind not in "iu" or (count and int(where.max()) >= len(dense)):
-        raise InputError(f"{document.where}: a sparse accessor refers beyond its {len(dense)} elements")
+        raise InputError(f"{document.where}: a sparse accessor: expected whole numbers below {len(dense)} as indices")
     dense[where] = _strided(document, values, count, dense.shape[1], dense.dtype)
     return dense

@@ -129,7 +129,8 @@ class Document:
             if isinstance(uri, str):
                 data = self.read_beside(uri)
             if data is None:
-                raise InputError(f"{self.where}: buffer {index}: no such file {str(uri)[:100]!r} beside it")
+                what = f"no such file {uri[:100]!r} beside it" if isinstance(uri, str) else "expected a URI, got none"
+                raise InputError(f"{self.where}: buffer {index}: {what}")
             size = self.number(item, "byteLength")
             if len(data) < size:
                 raise InputError(
@@ -208,6 +209,8 @@ def read_document(path: Path) -> Document:
     binary = None
     if data[:4] == b"glTF":
         data, binary = _chunks(data, where)
+    elif data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] != b"{" and b"\0" not in data[:8]:  # else JSON in UTF-16
+        raise InputError(f"{where}: expected glTF, binary or as JSON, got {data[:12]!r}")
     tree = parse_json(data.removeprefix(b"\xef\xbb\xbf"), where)
     if not isinstance(tree, dict):
         raise InputError(f"{where}: expected a JSON object of glTF")

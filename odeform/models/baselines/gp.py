@@ -40,8 +40,9 @@ class GaussianProcess(FittedModel):
             return
         self._times, self._mean, self._modes = arrays["times"], arrays["pod.mean"], arrays["pod.modes"]
         scales = np.array(checkpoint.config["length_scales"], dtype=float)
-        if not (np.isfinite(scales) & (scales > 0.0)).all():
-            raise ValueError(f"length_scales: expected positive numbers, got {scales}")
+        count = len(self.schema.learned)
+        if scales.shape != (count,) or not (np.isfinite(scales) & (scales > 0.0)).all():
+            raise ValueError(f"length_scales: expected {count} positive numbers, got {scales}")
         order = checkpoint.config.get("order", ORDERS[0])
         if order not in ORDERS:
             raise ValueError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {order!r}")

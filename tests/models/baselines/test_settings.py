@@ -1,5 +1,6 @@
 """What stands in a checkpoint of a baseline is checked when it is read, or at the latest when it is used."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +17,8 @@ FRAME = {"anchor": [0.0, 0.0, 0.1], "arm": 0.1, "reach": 0.2, "largest": 1.0, "s
     ("model", "settings"),
     [
         ("gp", {"length_scales": [0.0, 1.0]}),
+        ("gp", {"length_scales": 1.0}),
+        ("gp", {"length_scales": [1.0, 1.0, 1.0]}),
         ("gp", {"order": 3}),
         ("gp", {"length_scales": [float("nan"), 1.0]}),
         ("pod-rbf", {"smoothing": float("nan")}),
@@ -50,6 +53,14 @@ def test_inputs_are_the_parameters_of_the_scene(model: str) -> None:
     arrays = {**checkpoint.arrays, "theta": checkpoint.arrays["theta"][:, :1]}
     with pytest.raises(InputError, match=r"theta: expected shape \(S, 2\)"):
         model_class(model)(replace(checkpoint, arrays=arrays))
+
+
+@pytest.mark.parametrize(("name", "change"), [("times", np.flip), ("shifts", lambda shifts: np.nan * shifts)])
+def test_the_mean_motion_has_times_that_increase(name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    checkpoint = open_checkpoint("mass-elastic/direct")
+    arrays = {**checkpoint.arrays, f"mean.{name}": change(checkpoint.arrays[f"mean.{name}"])}
+    with pytest.raises(InputError, match="mean: expected times that increase"):
+        model_class("direct")(replace(checkpoint, arrays=arrays))
 
 
 def test_the_anchor_is_a_point() -> None:
