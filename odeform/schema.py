@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -299,10 +299,6 @@ class Schema:
     def inputs(self, parameters: Parameters) -> Floats:
         """(P,) the normalised parameters as inputs of a model: soft-clipped to magnitudes below 1.15."""
         return soft_clip(self.vector(parameters), 1.0, BEYOND)
-
-    def batch_inputs(self, sets: Sequence[Parameters]) -> Floats:
-        """(B, P) `inputs` of B sets of parameters."""
-        return soft_clip(np.stack([self.vector(parameters) for parameters in sets]), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:
         """Corners of the box of trained ranges, scaled by `reach` about its centre; an azimuth keeps its default.

@@ -19,6 +19,12 @@ __all__ = [
     "vector_from_rotation",
 ]
 
+UNTURNED = np.eye(3)
+ACROSS = np.array(
+    [[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=float
+)
+"""(3, 9): w @ ACROSS are the entries of the matrix of v -> w x v."""
+
 
 def rotation_z(angle: float) -> Rotations:
     """(3, 3) rotation by `angle` radians about the vertical axis."""
@@ -35,13 +41,18 @@ def is_rotation(matrix: Floats) -> bool:
 def rotation_from_vector(vector: Vectors) -> Rotations:
     """(..., 3) rotation vectors in radians, of any length -> (..., 3, 3) (Rodrigues)."""
     vector = np.asarray(vector, dtype=float)
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vector, -1, 0)
-    o = np.zeros_like(x)
-    skew = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=-1).reshape(*vector.shape[:-1], 3, 3)
-    # sinc is exact at a vanishing angle
-    half = np.sinc(angle / (2 * np.pi))
-    return np.eye(3) + np.sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
+    # by few calls: of one vector, they take longer than the arithmetic
+    angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None]
+    skew = (vector @ ACROSS).reshape(*vector.shape, 3)
+    half = _sinc(angle / (2 * np.pi))
+    return UNTURNED + _sinc(angle / np.pi) * skew + 0.5 * half**2 * (skew @ skew)
+
+
+def _sinc(x: Floats) -> Floats:
+    """As `np.sinc`, sin(pi x) / (pi x): exact where x vanishes."""
+    angle = np.pi * x
+    safe = np.where(angle, angle, 1e-20)
+    return np.sin(safe) / safe
 
 
 def body_spin(vector: Float[np.ndarray, "*#batch 3"], change: Float[np.ndarray, "*#batch 3"]) -> Vectors:

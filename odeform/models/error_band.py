@@ -1,11 +1,12 @@
 """How wrong a model is likely to be: an error band from its errors on sequences that it was not trained on."""
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.models.continuation import LATER_ERRORS
 from odeform.types import Arrays, Floats, Times
 
-__all__ = ["FEWEST", "ErrorBand", "error_band"]
+__all__ = ["FEWEST", "OUTSIDE", "ErrorBand", "error_band", "excess_of"]
 
 NOMINAL = 0.9
 FEWEST = 8
@@ -13,7 +14,9 @@ FEWEST = 8
 WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
 """Candidates for the distance in normalised parameters over which errors are similar."""
 TINY = 1e-6  # mm
-FARTHEST = 10.0  # widths outside the trained range, from where on the band stops widening
+OUTSIDE = "val.outside"
+"""(2, P): by how much the logarithm of errors grows, per half trained range below and above it."""
+FARTHEST = 10.0  # doublings outside the trained range, at which the band stops widening
 ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a frame are taken over
 
 
@@ -28,15 +31,17 @@ class ErrorBand:
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
     the product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles
-    around each time make the band; the scale of a sequence is estimated from the others alone. Beyond the trained
-    ranges nothing was validated: there the band doubles with each `width` outside. Beyond the window it grows in
-    proportion to the time, or as the errors of the continuation did when it predicted the last third of the window, if
-    that is more; after as long as that, with the square of the time that they were predicted for.
+    around each time make the band; the scale of a sequence is estimated from the others alone. Outside of the trained
+    ranges it grows as errors on simulations there did (`OUTSIDE`); without these, it doubles with each `width`. Beyond
+    the window it grows in proportion to the time, or as the errors of the continuation did when it predicted the last
+    third of the window, if that is more; after as long as that, with the square of the time that they were predicted
+    for.
     """
 
     def __init__(self, arrays: Arrays) -> None:
         """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
+        self._growth = arrays.get(OUTSIDE)
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
@@ -59,11 +64,17 @@ class ErrorBand:
         weights = np.exp(squares.min(axis=1, keepdims=True) - squares)
         return (weights @ self._levels) / weights.sum(axis=1)
 
+    def _outside(self, theta: Floats) -> float:
+        excess = excess_of(theta)
+        if self._growth is None:
+            grown = np.log(2.0) * float(np.linalg.norm(excess)) / self._width
+        else:
+            grown = float((excess * self._growth).sum())
+        return min(grown, np.log(2.0) * FARTHEST)
+
     def at(self, theta: Floats, times: Times) -> Floats:
         """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and the quantile `NOMINAL`."""
-        inside = np.clip(theta, -1.0, 1.0)
-        outside = min(float(np.linalg.norm(theta - inside)) / self._width, FARTHEST)
-        level = self._smooth(inside[None], self._width)[0] + np.log(2.0) * outside
+        level = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0] + self._outside(theta)
         stop = self._times[-1]
         profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
         grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)
@@ -74,3 +85,8 @@ class ErrorBand:
         )
         later *= (np.maximum(frames / leads[-1], 1.0) ** 2)[:, None]
         return np.where(times[:, None] > 0.0, np.maximum(grown, later), 0.0)
+
+
+def excess_of(theta: Float[np.ndarray, "*batch parameters"]) -> Float[np.ndarray, "*batch 2 parameters"]:
+    """(..., P) -> (..., 2, P): how far parameters are below -1, and above 1; at most 1,000."""
+    return np.clip(np.stack([-1.0 - theta, theta - 1.0], axis=-2), 0.0, 1e3)

@@ -87,7 +87,7 @@ class Model(ReducedModel):
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
     ) -> BatchTrajectory:
-        theta, azimuths = self.schema.batch_inputs(sets), np.array([self.schema.azimuth(each) for each in sets])
+        theta, azimuths = self.batch_inputs(sets), np.array([self.schema.azimuth(each) for each in sets])
         make = self.batch_problem(theta, geometry, azimuths, getattr(np, settings.dtype))
         solved = SolvedBatch(make, settings, until, 1.0 / self.schema.window.rate)
         if self.residual is None:

@@ -3,9 +3,10 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.models.base import Predictor, check_finite
@@ -25,8 +26,8 @@ from odeform.motion.recent import InUse, geometry_key
 from odeform.motion.reduced_batch import BatchPart, ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import ReducedSpace
-from odeform.motion.trajectory import Adjusted, Trajectory
-from odeform.schema import Parameters
+from odeform.motion.trajectory import Shown, Trajectory
+from odeform.schema import BEYOND, Parameters, soft_clip
 from odeform.solver.batch_steps import can_batch
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, MotionSequence, Times
@@ -39,6 +40,8 @@ class ReducedModel(Predictor):
 
     together: int = 0
     """How many motions are solved at once, as many as need a few tens of megabytes; 0: one by one."""
+    reach: ClassVar[tuple[float, float]] = (1.0, BEYOND)
+    """Half trained ranges up to which inputs are as they are asked for, and how far they go beyond."""
     continues_itself: bool = False
     """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
 
@@ -79,6 +82,14 @@ class ReducedModel(Predictor):
         solved = self.trajectory(theta, evaluated, settings, min(until, window.stop))
         return continued(solved, self.dynamics, theta, window)
 
+    def inputs(self, parameters: Parameters) -> Floats:
+        """(P,) normalised parameters, soft-clipped by `reach`."""
+        return self.batch_inputs([parameters])[0]
+
+    def batch_inputs(self, sets: Sequence[Parameters]) -> Floats:
+        """(B, P) `inputs` of B sets of parameters."""
+        return soft_clip(np.stack([self.schema.vector(parameters) for parameters in sets]), *self.reach)
+
     def evaluate_basis(self, geometry: Geometry, azimuth: float) -> EvaluatedBasis:
         """The basis on a geometry at an azimuth in radians; kept while a motion uses it, or until the next one."""
 
@@ -98,12 +109,17 @@ class ReducedModel(Predictor):
         observed: MotionSequence | None,
     ) -> ReducedMotion:
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
-        trajectory = self._continued(self.schema.inputs(parameters), evaluated, settings, until)
-        if self.space.rolling is not None:
-            trajectory = Adjusted(trajectory, lambda _, y: self.space.with_modes(y))
+        trajectory = self._continued(self.inputs(parameters), evaluated, settings, until)
+        shown = Shown(trajectory, self.to_body)
         return ReducedMotion(
-            self.schema, parameters, geometry, self.space, evaluated, trajectory, self.trust, self.watched_body
+            self.schema, parameters, geometry, self.space, evaluated, shown, self.trust, self.watched_body
         )
+
+    def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
+        """What is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
+        if self.space.rolling is None:
+            return y
+        return self.space.with_modes(y.reshape(-1, y.shape[-1])).reshape(*y.shape[:-1], -1)
 
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
@@ -141,14 +157,8 @@ class ReducedModel(Predictor):
         else:
             window = self.schema.window
             known = self.batch_trajectory(geometry, sets, settings, min(until, window.stop))
-            trajectory = continued_batch(known, self.dynamics, self.schema.batch_inputs(sets), window)
-        if self.space.rolling is None:
-            return trajectory
-
-        def with_modes(_: Times, y: Floats) -> Floats:
-            return self.space.with_modes(y.reshape(-1, y.shape[-1])).reshape(*y.shape[:-1], -1)
-
-        return AdjustedBatch(trajectory, with_modes)
+            trajectory = continued_batch(known, self.dynamics, self.batch_inputs(sets), window)
+        return AdjustedBatch(trajectory, self.to_body)
 
     @cached_property
     def watched_body(self) -> WatchedBody:

@@ -6,6 +6,7 @@ with the ODE in place of the cheap simulation. The regression is that of the tra
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -53,8 +54,13 @@ class Residual:
     def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "*batch times y"]]:
         """(T,) s -> (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
         several motions, (B, T, 6 + K)."""
-        spline = CubicSpline(self.times, self.regression.frames(inputs), axis=-2)
-        return lambda times: spline(np.clip(times, self.times[0], self.times[-1]))
+        frames = self.regression.frames(inputs)
+        return lambda times: self._spline(np.clip(times, self.times[0], self.times[-1])) @ frames
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        """(T',) s -> (T', T) what each frame counts there."""
+        return CubicSpline(self.times, np.eye(len(self.times)))
 
     def adjustment(self, own: Moving, inputs: Any) -> Adjustment:
         """Adds it to the coordinates (T, 6 + K) of the motion `own` of the ODE, or of several; zero at time 0."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from odeform.cancellation import check_cancelled
 from odeform.motion.base import SolveStats
-from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import motion_rmse
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Field
@@ -22,7 +21,6 @@ __all__ = ["Problem", "SolvedTrajectory", "describe"]
 MOMENTS = 128  # times at which the error of the solver is measured
 FINER = {SolverSettings("dopri5", tolerance=t, dtype="float64"): mm for t, mm in ((1e-6, 1e-4), (1e-9, 0.0))}
 """The finer solutions that errors are measured against -> error in mm from which on each suffices."""
-RECENT = 4  # results that are kept: pose, deformation and gradient of a time are evaluated one after the other
 
 
 class Problem(NamedTuple):
@@ -67,7 +65,6 @@ class SolvedTrajectory:
             self._extend(until)
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
         self._span = until
-        self._recent: Recent[Floats] = Recent(RECENT)
 
     def _extend(self, until: float) -> None:
         """Solve at least to `until` seconds, as far as possible."""
@@ -99,17 +96,12 @@ class SolvedTrajectory:
         return self._sample(times)
 
     def reduced(self, times: Floats) -> Floats:
-        """(T,) seconds -> (T, 6 + K), read-only; zero at time 0."""
-        requested = np.asarray(times, dtype=float)
-        return self._recent.get(requested.tobytes(), lambda: self._read_out(requested))
-
-    def _read_out(self, times: Floats) -> Floats:
+        """(T,) seconds -> (T, 6 + K); zero at time 0."""
+        times = np.asarray(times, dtype=float)
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))
         # y(0) = 0 bit-exactly: a product over many rows rounds differently from that over one
-        y = self._problem.readout(times, self._sample(times)) * (times > 0.0)[:, None]
-        y.flags.writeable = False
-        return y
+        return self._problem.readout(times, self._sample(times)) * (times > 0.0)[:, None]
 
     @cached_property
     def _error_mm(self) -> float | None:

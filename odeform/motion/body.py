@@ -1,14 +1,16 @@
 """The trained body in reduced coordinates: how low it reaches and how far it deforms, cheaply, at many times."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import POSE, ReducedSpace, rotation_of
 from odeform.motion.watch import Sample
-from odeform.types import Floats, Mesh, PointCloud, Points
+from odeform.types import Floats, Mesh, PointCloud, Points, Rotations, Times, Vectors
 
 __all__ = ["WatchedBody", "watched_body"]
 
@@ -29,20 +31,43 @@ class WatchedBody:
         `ReducedSpace.bounded`."""
         space = self.all.space
         with np.errstate(all="ignore"):
-            deformation = np.linalg.norm(predicted[:, POSE:], axis=1) / space.largest[1]
-            y = space.bounded(predicted, windows)
-            lowest = _lowest(self.few, y)
-            near = np.flatnonzero((lowest >= self.limit) & (lowest < self.limit + NEAR))
-            if len(near):
-                lowest[near] = _lowest(self.all, y[near])
+            deformation = np.sqrt(np.square(predicted[:, POSE:]).sum(axis=1)) / space.largest[1]
+            heights, rotation, shift = self._at(space.bounded(predicted, windows))
+            return Sample(heights, deformation, rotation @ self._centre + shift + space.anchor)
+
+    def lowest(self, predicted: Float[np.ndarray, "times y"]) -> Times:
+        """(T,) height in metres of the lowest point, at predictions (T, 6 + K) within the trained window."""
+        with np.errstate(all="ignore"):
+            return self._at(self.all.space.bounded(predicted, np.ones(len(predicted))))[0]
+
+    def _at(self, y: Floats) -> tuple[Times, Rotations, Vectors]:
+        """Heights, rotations and shifts at coordinates (T, 6 + K); the last are kept: motions are raised from the
+        floor, and then checked, at the same moments."""
+
+        def placed() -> tuple[Times, Rotations, Vectors]:
             rotation, shift = rotation_of(y[:, :POSE], 0.0)
-            centre = self.few.rest.mean(axis=0, dtype=float)
-            return Sample(lowest, deformation, rotation @ centre + shift + space.anchor)
+            return self._heights(y, rotation, shift), rotation, shift
+
+        return self._recent.get(y.tobytes(), placed)
+
+    @cached_property
+    def _recent(self) -> Recent[tuple[Times, Rotations, Vectors]]:
+        return Recent(1)
+
+    def _heights(self, y: Floats, rotation: Rotations, shift: Vectors) -> Times:
+        lowest = _lowest(self.few, y, rotation, shift)
+        near = np.flatnonzero((lowest >= self.limit) & (lowest < self.limit + NEAR))
+        if len(near):
+            lowest[near] = _lowest(self.all, y[near], rotation[near], shift[near])
+        return lowest
+
+    @cached_property
+    def _centre(self) -> Floats:
+        return self.few.rest.mean(axis=0, dtype=float)
 
 
-def _lowest(evaluated: EvaluatedBasis, y: Floats) -> Floats:
+def _lowest(evaluated: EvaluatedBasis, y: Floats, rotation: Rotations, shift: Vectors) -> Times:
     """(T,) height in metres of the lowest point. The azimuth does not change it."""
-    rotation, shift = rotation_of(y[:, :POSE], 0.0)
     local = (y[:, POSE:].astype(np.float32) @ evaluated.values).reshape(len(y), -1, 3) + evaluated.rest
     heights = (local @ rotation[:, 2, :, None].astype(np.float32))[..., 0]
     return heights.min(axis=1).astype(float) + shift[:, 2] + evaluated.space.anchor[2]

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from odeform.motion.trajectory import Moving
 from odeform.types import Floats, Times
 
-__all__ = ["FloorProjection"]
+__all__ = ["FloorProjection", "raised"]
 
-MOST = 0.03  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
+MOST = 0.01  # m; a motion that would have to be raised farther is lost, and is left to the plausibility check
 
 
 class FloorProjection:
@@ -27,37 +27,55 @@ class FloorProjection:
         lowest: Callable[[Floats], Floats],
         limit: float,
         grid: Float[np.ndarray, " grid"] | None = None,
+        most: float = MOST,
     ) -> None:
         """`lowest` maps coordinates (R, 6 + K) of `own` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
-        With `grid`, in s, the change is linear between these times; after them, each moment has its own.
+        A moment that would have to be raised by more than `most` m stays as it is. With `grid`, in s, the change is
+        linear between these times; after them, each moment has its own.
         """
-        self._own, self._lowest, self._limit, self._grid = own, lowest, limit, grid
+        self._own, self._lowest, self._limit, self._grid, self._most = own, lowest, limit, grid, most
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
-        by = self._by(y) if self._grid is None or times.min() > self._grid[-1] else self._between(times, y, self._grid)
-        if by.any():
-            y = y.copy()
-            y[..., 2] += by
-        return y
+        if self._grid is None or times.min() > self._grid[-1]:
+            return raised(y, self._lowest, self._limit, self._most)
+        return _moved_up(y, self._between(times, y, self._grid))
 
     def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
         """Of each motion, from the changes on the grid."""
         by = np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
         by = by.reshape(y.shape[:-1])
         if len(later := np.flatnonzero(times > grid[-1])):
-            by[..., later] = self._by(y[..., later, :])
+            by[..., later] = self._missing(y[..., later, :])
         return by
 
     @cached_property
     def _on_grid(self) -> Floats:
         """(G,) m at the times of the grid, or (B, G)."""
         assert self._grid is not None
-        return self._by(self._own.reduced(self._grid))
+        return self._missing(self._own.reduced(self._grid))
 
-    def _by(self, y: Floats) -> Floats:
-        """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
-        deeper = self._limit - self._lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
-        return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite
+    def _missing(self, y: Floats) -> Floats:
+        return _missing(y, self._lowest, self._limit, self._most)
+
+
+def raised(
+    y: Floats, lowest: Callable[[Floats], Floats], limit: float, most: float = MOST
+) -> Float[np.ndarray, "*batch times y"]:
+    """Coordinates (..., T, 6 + K), each moment raised by itself; the others as of `FloorProjection`."""
+    return _moved_up(y, _missing(y, lowest, limit, most))
+
+
+def _moved_up(y: Floats, by: Floats) -> Floats:
+    if by.any():
+        y = y.copy()
+        y[..., 2] += by
+    return y
+
+
+def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float, most: float) -> Floats:
+    """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
+    deeper = limit - lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
+    return np.where((deeper > 0.0) & (deeper <= most), deeper, 0.0)  # false for what is not finite

@@ -81,7 +81,7 @@ class ReducedSpace:
         for part, largest in ((slice(0, 3), self.largest[0] * windows), (slice(POSE, None), self.largest[1])):
             limit = MARGIN * largest
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                size = np.linalg.norm(y[:, part], axis=1)
+                size = np.sqrt(np.square(y[:, part]).sum(axis=1))
                 if (size > limit).any():
                     y = y.copy()
                     y[:, part] *= np.where(size > limit, soft_clip(size, limit, limit - largest) / size, 1.0)[:, None]

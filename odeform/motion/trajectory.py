@@ -8,9 +8,12 @@ from jaxtyping import Float
 
 from odeform.locks import Lock
 from odeform.motion.base import SolveStats
+from odeform.motion.recent import Recent
 from odeform.types import Floats, Times
 
-__all__ = ["Adjusted", "Adjustment", "Moving", "Piecewise", "Trajectory"]
+__all__ = ["Adjusted", "Adjustment", "Moving", "Piecewise", "Shown", "Trajectory"]
+
+RECENT = 4  # results that are kept
 
 Adjustment = Callable[[Times, Floats], Floats]
 """(T,) seconds and coordinates (T, n) there -> coordinates (T, m); of many motions, (B, T, n) -> (B, T, m)."""
@@ -63,6 +66,26 @@ class Adjusted:
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K)."""
         return self._adjust(times, self.own.reduced(times))
+
+
+class Shown(Adjusted):
+    """An adjusted trajectory whose last results are kept: pose, deformation and gradient of a time are evaluated one
+    after the other. They are read-only."""
+
+    def __init__(self, own: Trajectory, adjust: Adjustment) -> None:
+        super().__init__(own, adjust)
+        self._recent: Recent[Floats] = Recent(RECENT)
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """(T,) s -> (T, 6 + K)."""
+        requested = np.asarray(times, dtype=float)
+
+        def adjusted() -> Floats:
+            y = super(Shown, self).reduced(requested)
+            y.flags.writeable = False
+            return y
+
+        return self._recent.get(requested.tobytes(), adjusted)
 
 
 class Piecewise:

@@ -13,16 +13,17 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from odeform.errors import InputError
-from odeform.solver.batch_steps import BatchField, BatchStepper, batch_stepper, rms
-from odeform.solver.integrate import GAINS, GROW, MAX_STEPS, SAFETY, SHRINK, SolverSettings
+from odeform.solver.batch_steps import BatchField, BatchStepper, Together, batch_stepper, rms
+from odeform.solver.compiled import CompiledField, Nodes, Rule, solve_together
+from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Method
 from odeform.solver.registry import get_method
+from odeform.solver.runge_kutta import ExplicitRungeKutta
 from odeform.solver.solution import Status, between, hermite_weights
+from odeform.solver.step_control import GAINS, GROW, MAX_STEPS, SAFETY, SHRINK
 from odeform.types import Floats, Times
 
 __all__ = ["BatchSolution", "integrate_batch"]
-
-NODES = 192  # that are made room for at first
 
 
 @dataclass
@@ -99,32 +100,36 @@ def integrate_batch(
     """
     if start.dtype.char not in "fd":
         raise InputError(f"batch: expected states in float32 or float64, got {start.dtype}")
-    count = len(start)
-    method = get_method(quality.method)
-    rows, first = np.arange(count), np.full(count, begin)
+    method, rows = get_method(quality.method), np.arange(len(start))
+    if isinstance(field, Together) and isinstance(method, ExplicitRungeKutta):
+        fields = [each for each in field.fields if isinstance(each, CompiledField)]
+        if len(fields) == len(start):
+            rule = Rule(method.tableau, quality.step, quality.tolerance, MAX_STEPS)
+            start = start.astype(fields[0].dtype)
+            nodes = Nodes.begin(np.full(len(start), begin), start, np.zeros_like(start), rule.bends)
+            return _found(solve_together(fields, nodes, rule, begin, until, before_step), rule.bends)
     with np.errstate(all="ignore"):  # an overflow ends an integration with a status
-        slopes = field(rows, first, start)
-        shape = (count, NODES, start.shape[1])
-        solution = BatchSolution(
-            np.full(shape[:2], np.inf),
-            np.zeros(shape, start.dtype),
-            np.zeros(shape, start.dtype),
-            np.zeros(shape, start.dtype) if method.knows_middle and quality.tolerance is not None else None,
-            np.zeros(count, dtype=int),
-            np.ones(count, dtype=int),
-            np.zeros(count, dtype=int),
-            [Status.OK] * count,
-        )
-        solution._append(rows, first, start, slopes, 0.0)
+        slopes = field(rows, np.full(len(start), begin), start)
+        bends = method.knows_middle and quality.tolerance is not None
+        solution = _found(Nodes.begin(np.full(len(start), begin), start, slopes, bends), bends)
+        solution.evaluations[:] = 1
         _fail(solution, rows, ~(_finite(start) & _finite(slopes)), Status.NON_FINITE)
-        rows = np.flatnonzero(solution.ok) if until > begin else rows[:0]
+        rows = rows[solution.ok] if until > begin else rows[:0]
         stepper = batch_stepper(method, field, start)
-        run = _Run(field, stepper, solution, until, before_step, rows, first[rows], start[rows], slopes[rows])
+        times = solution.times[rows, 0]
+        run = _Run(field, stepper, solution, until, before_step, rows, times, start[rows], slopes[rows])
         if quality.step is not None:
             run.fixed(quality.step)
         else:
             run.controlled(method, quality.tolerance or 0.0)
     return solution
+
+
+def _found(nodes: Nodes, bends: bool) -> BatchSolution:
+    known = nodes.middles if bends else None
+    _, rejected, evaluations = nodes.tallies.T
+    parts = nodes.times, nodes.states, nodes.slopes, known, nodes.counts, evaluations, rejected
+    return BatchSolution(*parts, nodes.statuses)
 
 
 def _finite(values: Floats) -> Bool[np.ndarray, " rows"]:

@@ -1,5 +1,6 @@
 """Single steps of many states at once, each of a length of its own."""
 
+from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -8,13 +9,22 @@ from jaxtyping import Float, Int
 from odeform.errors import InputError
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.linearly_implicit import LinearlyImplicit
-from odeform.solver.method import Method
+from odeform.solver.method import Field, Method
 from odeform.solver.registry import get_method
 from odeform.solver.runge_kutta import ExplicitRungeKutta, gemv, weights_of
 from odeform.solver.tableau import Tableau
 from odeform.types import Floats
 
-__all__ = ["BatchField", "BatchStages", "BatchStepper", "StiffBatchField", "batch_stepper", "can_batch", "rms"]
+__all__ = [
+    "BatchField",
+    "BatchStages",
+    "BatchStepper",
+    "StiffBatchField",
+    "Together",
+    "batch_stepper",
+    "can_batch",
+    "rms",
+]
 
 Rows = Int[np.ndarray, " rows"]
 Each = Float[np.ndarray, " rows"]
@@ -30,6 +40,18 @@ class BatchField(Protocol):
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
         """The slopes (R, n) at states (R, n) and times (R,) in s of the problems `rows` (R,), increasing indices."""
         ...
+
+
+class Together:
+    """The fields of many problems, one by one: each bit of a slope is as it would be alone."""
+
+    def __init__(self, fields: Sequence[Field]) -> None:
+        self.fields = fields
+
+    def __call__(self, rows: Rows, times: Each, states: States) -> States:
+        """As `BatchField`."""
+        each = zip(rows.tolist(), times.tolist(), states, strict=True)
+        return np.stack([self.fields[row](time, state) for row, time, state in each])
 
 
 @runtime_checkable

@@ -11,18 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from odeform.errors import InputError
+from odeform.solver.compiled import CompiledField, Rule
 from odeform.solver.method import Field, Method, Stepper
 from odeform.solver.registry import get_method
+from odeform.solver.runge_kutta import ExplicitRungeKutta
 from odeform.solver.solution import Solution, Status
+from odeform.solver.step_control import GAINS, GROW, MAX_STEPS, SAFETY, SHRINK
 
 __all__ = ["SolverSettings", "integrate"]
-
-MAX_STEPS = 20_000
-SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0
-GAINS = 0.7, 0.4
-"""Exponents of the errors of this step and the last one, times the order (Gustafsson 1991, ACM TOMS 17(4)), of methods
-without gains of their own. Without the last one, a third of the steps into a landing were rejected."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,12 @@ def integrate(
     continued in place, by one thread at a time. `before_step` is called before each step, and may raise
     (`check_cancelled`). Failures end the solution early with a status other than OK; nothing else is raised.
     """
+    method = get_method(quality.method)
+    if isinstance(field, CompiledField) and isinstance(method, ExplicitRungeKutta):
+        solution = begin if isinstance(begin, Solution) else Solution([begin], [start], [np.zeros_like(start)])
+        rule = Rule(method.tableau, quality.step, quality.tolerance, MAX_STEPS)
+        field.extend(solution, rule, until, before_step)
+        return solution
     if isinstance(begin, Solution):
         solution = begin
     else:
@@ -111,7 +116,6 @@ def integrate(
             solution.status = Status.NON_FINITE
     with solution.lock:
         if solution.status is Status.OK and solution.end < until:
-            method = get_method(quality.method)
             stepper = method.stepper(start)
             if quality.step is not None:
                 _fixed(stepper, field, quality.step, solution, until, before_step)

@@ -34,7 +34,7 @@ class Stepper(Protocol):
 class Method(Protocol):
     """A one-step method. Between its nodes a solution is the cubic Hermite interpolant of states and slopes.
 
-    One that controls its step may have `gains` of its own, in place of `odeform.solver.integrate.GAINS`.
+    One that controls its step may have `gains` of its own, in place of `odeform.solver.step_control.GAINS`.
     """
 
     @property

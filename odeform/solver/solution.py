@@ -1,5 +1,6 @@
 """The result of an integration: the state at any time, a status and statistics."""
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -70,7 +71,7 @@ class Solution:
         last = self.steps - 1  # once: the solution may be growing
         if last < 0:
             return self.states[0]
-        index = int(np.searchsorted(self.times, time, side="right")) - 1
+        index = bisect_right(self.times, time) - 1
         index = min(max(index, 0), last)
         step = self.times[index + 1] - self.times[index]
         s = min(max((time - self.times[index]) / step, 0.0), 1.0)

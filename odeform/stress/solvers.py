@@ -39,7 +39,7 @@ def check_field(model: Model, seed: int = 0) -> Checks:
     last = window.stop if window.reach else float(window.soft_clamped(np.array(10.0 * window.stop)))
     exponent, within, ever, by = -math.inf, 0.0, 0.0, 1e-6
     for parameters in inside(schema, SAMPLES, seed):
-        field, start, *_ = model.problem(schema.inputs(parameters), evaluated, np.float64)
+        field, start, *_ = model.problem(model.inputs(parameters), evaluated, np.float64)
 
         def end(at: Floats, field: Field = field) -> Floats:
             return integrate(field, at, step, window.stop).at(window.stop)
@@ -84,7 +84,7 @@ def check_calibration(model: Model, seed: int = 0) -> Checks:
     rows = []
     for index in range(CALIBRATION[0]):
         scale = (1.0, 1.5, 1.0, 10.0)[index % 4]
-        theta = schema.inputs(inside(schema, 1, seed + index, scale)[0])
+        theta = model.inputs(inside(schema, 1, seed + index, scale)[0])
         truth = model.integrate(theta, evaluated, TRUTH, stop).reduced(times)
         for quality in (
             *model.qualities.values(),

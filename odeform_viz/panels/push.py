@@ -25,6 +25,7 @@ __all__ = ["PushPanel"]
 
 MARGIN = 1.5  # times the strongest trained force: the end of the slider
 WIDEST = 60.0  # degrees of each tilt
+LABELS = {"young": "stiffness"}
 HINT = "Click the body to choose where the sphere pushes. Drag the ball at the arrow's tail to change the force."
 
 
@@ -49,7 +50,10 @@ class PushPanel(Panel):
             self._strength = gui.add_slider("force (N)", 0.0, 1.0, 0.01, 0.0, hint="")
             self._up = self._add_tilt(gui, "tilt up (°)", "off the inward normal, along the surface and upwards")
             self._side = self._add_tilt(gui, "tilt sideways (°)", "off the inward normal, along the surface")
-            self._body = {p.name: gui.add_slider(p.label, 0.0, 1.0, 0.001, 0.0) for p in self._of_body()}
+            self._body = {
+                p.name: gui.add_slider(f"{LABELS.get(p.name, p.name)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)
+                for p in self._of_body()
+            }
             buttons = gui.add_button_group("set", ("straight in", "default"), hint="the direction, or the whole push")
             buttons.on_click(self._clicked)
         for control in (self._object, self._strength, self._up, self._side, *self._body.values()):

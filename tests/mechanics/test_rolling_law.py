@@ -7,11 +7,13 @@ import pytest
 
 from odeform.geometry.primitives import octasphere
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.rolling import field as fields
 from odeform.mechanics.rolling.contact import COEFFICIENTS, PLAIN, RollingContact, first_law
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support, support_of
+from odeform.solver.compiled import CompiledField
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.solution import Status
 from odeform.types import Floats, Ints
@@ -48,6 +50,30 @@ def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
     assert np.allclose(together.T, alone, rtol=1e-12, atol=1e-12)
     assert (together[4] > 0.0).any()
     assert (together[4] == -GRAVITY).any()
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [SolverSettings(name, tolerance=1e-5, dtype="float64") for name in ("bosh3", "dopri5")],
+    ids=str,
+)
+def test_compiled_motions_are_those_of_numpy(
+    support: Support, settings: SolverSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Through flight, landings on corners, sliding and rolling."""
+    begin, material = state(height=0.05, speed=1.5, rising=0.5, spin=-5.0), np.array([0.3, -0.6])
+    times = np.linspace(0.0, 0.5, 200)
+
+    def moved() -> Floats:
+        field = make_field(any_law(), support, RADIUS, material)
+        assert isinstance(field, CompiledField) == fields.compiles()
+        return integrate(field, UNITS * begin, settings, 0.5).sample(times)
+
+    found = moved()
+    monkeypatch.setattr(fields, "compiles", lambda: False)
+    expected = moved()
+    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    assert expected[:, 1].min() < 0.0
 
 
 def check_derivatives(law: RollingContact, support: Support, chosen: Ints, accuracy: float = 1e-4) -> Floats:

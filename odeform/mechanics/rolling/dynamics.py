@@ -110,8 +110,8 @@ class RollingDynamics:
         self.power = np.exp(np.clip(logs["power"], *POWERS))
         self.damping_power = 1.0 / (1.0 + np.exp(-logs["damping_power"]))
         self.share = np.exp(np.clip(logs["corners"], *SHARES))
-        self._bases = np.stack([logs[name] for name in ADJUSTED], axis=1)
-        self._bias = law.bias + material @ law.first[INPUTS:]
+        self.bases = np.stack([logs[name] for name in ADJUSTED], axis=1)
+        self.bias = law.bias + material @ law.first[INPUTS:]
 
     def slopes(self, states: Float[np.ndarray, "states motions"]) -> Floats:
         """(8, M) -> (8, M)."""
@@ -147,8 +147,8 @@ class RollingDynamics:
         lever = self.lever[rows]
         sliding = fast - lever * spin
         inputs = np.stack([depth / DEEP, up / UPWARD, np.abs(sliding), np.abs(fast) / AHEAD], axis=1)
-        hidden = np.tanh(inputs @ self.law.first[:INPUTS] + self._bias[rows])
-        exponents = self._bases[rows] + hidden @ self.law.last
+        hidden = np.tanh(inputs @ self.law.first[:INPUTS] + self.bias[rows])
+        exponents = self.bases[rows] + hidden @ self.law.last
         strong = np.exp(np.clip(exponents, *EXPONENTS))
         stiffness, damping, friction, rolling, slow, felt = strong.T
         spring = stiffness * depth ** self.power[rows]

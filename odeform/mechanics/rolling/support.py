@@ -1,7 +1,6 @@
 """How high a body with corners stands: a mesh of a ball rolls from facet to facet."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -23,11 +22,6 @@ class Support:
     """m at even angles from 0 to 2 pi, both included."""
     slopes: Float[np.ndarray, " angles"]
     """m per rad."""
-
-    @cached_property
-    def lists(self) -> tuple[list[float], list[float]]:
-        """Heights and slopes as plain numbers, which are faster to look up one at a time."""
-        return self.heights.tolist(), self.slopes.tolist()
 
     def at(self, angles: Floats) -> tuple[Floats, Floats]:
         """Heights and slopes (...) at angles (...) in rad, of any size."""

@@ -7,21 +7,19 @@ costs more than the arithmetic. `network.py` is the same network for training; a
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg import get_blas_funcs
 
 from odeform.models.latent.config import ModelConfig
-from odeform.models.latent.weights import FieldLayers, branch_decoders, encoder_statistics, field_layers
+from odeform.models.latent.weights import branch_decoders, encoder_statistics, field_layers
 from odeform.models.layers import Layers, read_layers
 from odeform.motion.reduced_space import POSE
-from odeform.solver.batch_steps import BatchField
 from odeform.solver.method import Field
-from odeform.types import Arrays, Floats, Ints
+from odeform.solver.runge_kutta import gemv
+from odeform.types import Arrays, Floats
 
 __all__ = [
     "Decoder",
     "Encoder",
     "Field",
-    "make_batch_field",
     "make_decoder",
     "make_encoder",
     "make_field",
@@ -84,82 +82,24 @@ def make_encoder(weights: Arrays, config: ModelConfig) -> Encoder:
 
 
 def make_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], Field]:
-    """theta (P,) -> the field dz/dt = f(z). Matrices are laid out once; new parameters only change a bias.
-
-    Products are those of matrices, with one column: they round each column alike, however many there are, where those
-    with a vector round in another order (`make_batch_field`).
-    """
-    layers, (first, middle, last), later = _laid_out(weights, config, dtype)
-    (product,), tanh = get_blas_funcs(("gemm",), dtype=first.dtype), np.tanh
-    middle_bias, last_bias = (bias[:, None] for bias in later)
+    """theta (P,) -> the field dz/dt = f(z). Matrices are laid out once; new parameters only change a bias."""
+    layers = field_layers(weights, config)
+    first, middle, last = (np.asfortranarray(m.astype(dtype)) for m in (layers.first, layers.middle, layers.last))
+    middle_bias, last_bias = (bias.astype(dtype) for bias in layers.biases[1:])
+    product, tanh = gemv(first.dtype), np.tanh
 
     def fold(theta: Floats) -> Field:
-        first_bias = _folded_bias(layers, theta).astype(dtype)[:, None]
+        first_bias = (layers.biases[0] + layers.conditioning @ theta).astype(dtype)
 
         # unrolled: a call takes a few microseconds, a tenth of which a loop adds
         def field(_: float, state: Floats) -> Floats:
             x = product(1.0, first, state, 1.0, first_bias)
             x = product(1.0, middle, tanh(x, x), 1.0, middle_bias)
-            return product(1.0, last, tanh(x, x), 1.0, last_bias)[:, 0]
+            return product(1.0, last, tanh(x, x), 1.0, last_bias)
 
         return field
 
     return fold
-
-
-def make_batch_field(weights: Arrays, config: ModelConfig, dtype: type) -> Callable[[Floats], BatchField]:
-    """theta (B, P) -> the fields of B motions: each bit of their slopes is as `make_field` has it for one of them."""
-    layers, (first, middle, last), (middle_bias, last_bias) = _laid_out(weights, config, dtype)
-    ends = np.cumsum([0, *(config.sizes(branch)["field"][1] for branch in config.branches)])
-    branches = []
-    for begin, end, out in zip(ends[:-1], ends[1:], config.states, strict=True):
-        # without the zeros of `FieldLayers`, which add nothing to a sum: they take as long as all else
-        blocks = (first[begin:end], middle[begin:end, begin:end], last[out, begin:end])
-        hidden = slice(begin, end)
-        branches.append(((hidden, hidden, out), [np.asfortranarray(block) for block in blocks]))
-
-    def fold(theta: Floats) -> BatchField:
-        biases = np.stack([_folded_bias(layers, row) for row in theta]).astype(dtype)
-        known: tuple[Ints, list[Callable[[Floats], Floats]]] | None = None
-
-        def of(rows: Ints) -> list[Callable[[Floats], Floats]]:
-            every = (biases[rows], *(np.tile(bias, (len(rows), 1)) for bias in (middle_bias, last_bias)))
-            return [
-                _slopes(matrices, [np.ascontiguousarray(b[:, part]).T for b, part in zip(every, parts, strict=True)])
-                for parts, matrices in branches
-            ]
-
-        def field(rows: Ints, times: Floats, states: Floats) -> Floats:
-            nonlocal known
-            if known is None or known[0] is not rows:
-                known = rows, of(rows)
-            return np.concatenate([slopes(states.T) for slopes in known[1]]).T
-
-        return field
-
-    return fold
-
-
-def _laid_out(weights: Arrays, config: ModelConfig, dtype: type) -> tuple[FieldLayers, list[Floats], list[Floats]]:
-    layers = field_layers(weights, config)
-    matrices = [np.asfortranarray(m.astype(dtype)) for m in (layers.first, layers.middle, layers.last)]
-    return layers, matrices, [bias.astype(dtype) for bias in layers.biases[1:]]
-
-
-def _folded_bias(layers: FieldLayers, theta: Floats) -> Floats:
-    return layers.biases[0] + layers.conditioning @ theta
-
-
-def _slopes(matrices: list[Floats], biases: list[Floats]) -> Callable[[Floats], Floats]:
-    """Three layers with tanh between them; states are columns."""
-    (product,) = get_blas_funcs(("gemm",), dtype=matrices[0].dtype)
-
-    def slopes(states: Floats) -> Floats:
-        for index, (matrix, bias) in enumerate(zip(matrices, biases, strict=True)):
-            states = product(1.0, matrix, np.tanh(states, states) if index else states, 1.0, bias)
-        return states
-
-    return slopes
 
 
 def make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats], Decoder]:

@@ -9,8 +9,10 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from odeform.checkpoint import Checkpoint
+from odeform.compiling import compiles
+from odeform.models.latent.compiled import make_compiled_field
 from odeform.models.latent.config import ModelConfig
-from odeform.models.latent.inference import make_batch_field, make_decoder, make_encoder, make_field, pool_shape
+from odeform.models.latent.inference import make_decoder, make_encoder, make_field, pool_shape
 from odeform.models.latent.sensitivity import Sensitivities, make_sensitivities
 from odeform.models.latent.weights import check_weights
 from odeform.models.model import Model
@@ -19,6 +21,7 @@ from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.recent import Recent
+from odeform.solver.batch_steps import Together
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, Times
 
@@ -65,8 +68,8 @@ class LatentModel(Model):
         check_weights(self.weights, self.config)
         self._encode = make_encoder(self.weights, self.config)
         self._decoder = make_decoder(self.weights, self.config)
-        self._fields = {dtype: make_field(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
-        self._batch_fields = {d: make_batch_field(self.weights, self.config, d) for d in (np.float32, np.float64)}
+        make = make_compiled_field if compiles() else make_field
+        self._fields = {dtype: make(self.weights, self.config, dtype) for dtype in (np.float32, np.float64)}
         self.residual = parameter_residual(checkpoint.arrays, self.space.coordinates, self.config.parameters)
         self._pooled: Recent[tuple[EvaluatedBasis, list[Floats]]] = Recent(1)
 
@@ -97,7 +100,7 @@ class LatentModel(Model):
             return y.reshape(len(theta), len(times), -1)
 
         origin = decoded(np.zeros(1), start[:, None])
-        field = self._batch_fields[dtype](theta)
+        field = Together([self._fields[dtype](each) for each in theta])
         return lambda: BatchProblem(field, start, lambda times, states: decoded(times, states) - origin)
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Float[np.ndarray, "jet times y"]:

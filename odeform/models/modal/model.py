@@ -51,6 +51,7 @@ HEIGHTS = 2  # times of each trained frame at which it is looked up how low a bo
 SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
 SOFTEST = 2.0  # times the deformation of training motions, that of the softest body that the sliders reach
 SETTLED = 4  # bodies of another mass and stiffness that are kept
+SUNK = 0.03  # m by which a body is raised at most: one that falls over lands on few samples, whose springs give way
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
 QUALITIES = {
@@ -300,4 +301,4 @@ class ModalModel(Model):
     def _projection(self, motion: Moving) -> FloorProjection:
         body, window = self.watched_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)
+        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid, SUNK)

@@ -2,6 +2,8 @@
 contact."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
@@ -10,24 +12,23 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.mechanics.rolling.contact import RollingContact
-from odeform.mechanics.rolling.dynamics import MOVING, STATE, RollingDynamics
+from odeform.mechanics.rolling.dynamics import MOVING, STATE
 from odeform.mechanics.rolling.field import make_field, units_of
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.model import Model
 from odeform.models.residual import parameter_residual
-from odeform.models.rolling.batch import batch_field
-from odeform.models.rolling.phases import Push, rising
+from odeform.models.rolling.phases import RISING, Push, rising
 from odeform.models.rolling.readout import Readout, inputs_of
-from odeform.models.rolling.start import push_inputs, read_start
+from odeform.models.rolling.start import Start, push_inputs, read_start
 from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.floor_projection import FloorProjection
-from odeform.motion.reduced_space import POSE
+from odeform.motion.floor_projection import raised
+from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
-from odeform.schema import Parameters
-from odeform.solver.batch_steps import BatchField
+from odeform.schema import BEYOND, Parameters, soft_clip
+from odeform.solver.batch_steps import BatchField, Together
 from odeform.solver.integrate import SolverSettings
 from odeform.solver.method import Field
 from odeform.types import Floats, Geometry, Times, Vector
@@ -35,7 +36,7 @@ from odeform.types import Floats, Geometry, Times, Vector
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
-__all__ = ["UNTURNED", "RollingModel", "placed"]
+__all__ = ["UNTURNED", "RollingModel", "axes_of"]
 
 FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
 """What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
@@ -45,17 +46,28 @@ UNTURNED = np.array([0.0, 1.0, 0.0])
 """The axis of a body that does not turn: any level one."""
 
 
-def placed(moved: Float[np.ndarray, "*rows 3"], axis: Vector) -> Float[np.ndarray, "*rows 6"]:
-    """(..., 3) ahead, up (m) and angle (rad), about the level unit vector `axis` -> (..., 6): shift (m), rotation
-    vector. The same of their rates."""
-    ahead = np.cross(axis, UP)
-    return np.concatenate([moved[..., :1] * ahead + moved[..., 1:2] * UP, moved[..., 2:] * axis], axis=-1)
+def axes_of(axis: Vector) -> Float[np.ndarray, "3 6"]:
+    """What a unit of way ahead (m), of height (m) and of angle (rad), about the level unit vector `axis`, adds to shift
+    (m) and rotation vector. The same of their rates."""
+    out = np.zeros((MOVING, POSE))
+    out[0, :3], out[1, :3], out[2, 3:] = np.cross(axis, UP), UP, axis
+    return out
+
+
+def trained(theta: Floats) -> Floats:
+    """Inputs (..., P) of what was only learned, which nothing bounds far from the trained ranges."""
+    return soft_clip(theta, 1.0, BEYOND)
 
 
 class RollingModel(Model):
-    """The motion of one round body in a plane, or up and down."""
+    """The motion of one round body in a plane, or up and down.
+
+    Mechanics goes on past the trained ranges: start, law and ODE follow the parameters themselves. The deformation and
+    the correction, which are learned, follow inputs that are clipped (`trained`).
+    """
 
     model = "rolling"
+    reach = (2.0, 1.0)
     made_of = (
         "mechanics: a round body that flies, lands and rolls, with fitted contact coefficients that a small network "
         "adjusts; a second network reads the deformation off the state; the push is regressed on the parameters"
@@ -87,15 +99,24 @@ class RollingModel(Model):
         self._clearance = float(config.get("clearance_m", 0.0))
         """m of the lowest point at rest above the floor, which states count their heights from."""
         self._axis = UNTURNED if self.space.rolling is None else self.space.rolling.axis
-        self._radius = float(config["radius_m"])
+        self._axes, self._radius = axes_of(self._axis), float(config["radius_m"])
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
         self.law = RollingContact.from_arrays(arrays, len(self._materials))
-        self._start = read_start(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
+        regression = read_start(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
+        self._start = Start(regression, self.schema, self.law)
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.space.coordinates - POSE)
         self.residual = parameter_residual(arrays, self.space.coordinates, len(learned))
         # the body that viewers show is smoother than the one whose corners it rolls over
         self._support = support_of(self.space.basis.scale * self.space.basis.centers, self._axis)
+
+    @cached_property
+    def space(self) -> ReducedSpace:
+        own = super().space
+        return replace(own, largest=(np.inf, own.largest[1]))  # how far the body gets follows from the mechanics
+
+    def residual_inputs(self, theta: Floats) -> Floats:
+        return trained(theta)
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """The state (8,) begins when the push is over; the push itself is a cubic to there.
@@ -109,49 +130,52 @@ class RollingModel(Model):
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
     ) -> Callable[[], BatchProblem]:
         start, readout = self._begun(theta)
-        return lambda: BatchProblem(self._batch_field(theta), start.astype(dtype), readout, self.begin)
+        return lambda: BatchProblem(self._together(theta), start.astype(dtype), readout, self.begin)
 
     def _field(self, theta: Floats) -> Field:
         return make_field(self.law, self._support, self._radius, theta[self._materials])
 
-    def _batch_field(self, theta: Float[np.ndarray, "batch parameters"]) -> BatchField:
-        return batch_field(
-            lambda some: RollingDynamics(self.law, self._support, self._radius, some),
-            theta[:, self._materials],
-            self._units,
-        )
+    def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> BatchField:
+        return Together([self._field(each) for each in theta])
 
     def _begun(self, theta: Float[np.ndarray, "*batch parameters"]) -> tuple[Floats, Callable[[Times, Floats], Floats]]:
         """States (..., 8) when the push is over, and the readout from then on, for theta (..., P)."""
-        material = theta[..., self._materials]
         # one by one, to the last bit: a landing that comes a moment later on a corner amplifies what differs
-        moving = [self._start(push_inputs(self.schema, each[None]))[0] for each in np.atleast_2d(theta)]
+        moving = [self._start(each) for each in np.atleast_2d(theta)]
         start = np.zeros((*theta.shape[:-1], STATE))
         start[..., : 2 * MOVING] = np.reshape(moving, (*theta.shape[:-1], 2 * MOVING))
-        pose = self._decoded(start[..., None, :], material)[..., 0, :POSE]
-        rate = placed(start[..., MOVING : 2 * MOVING], self._axis)
-        push = Push(self.begin, pose, rate, self.space.coordinates)
+        pose, rate = self._placed(start[..., :MOVING]), start[..., MOVING : 2 * MOVING] @ self._axes
+        push, decoded = Push(self.begin, pose, rate, self.space.coordinates), self._decoder(theta)
 
         def readout(times: Times, states: Floats) -> Floats:
-            y = self._decoded(states / self._units, material)
-            # how the push deforms the body does not follow from the motion: it is regressed
-            y[..., POSE:] *= rising(times - self.begin)[:, None]
-            early = times < self.begin
-            y[..., early, :] = push(times[early])
+            y = decoded(states / self._units)
+            if times.min(initial=np.inf) < self.begin + RISING:
+                # how the push deforms the body does not follow from the motion: it is regressed
+                y[..., POSE:] *= rising(times - self.begin)[:, None]
+                early = times < self.begin
+                y[..., early, :] = push(times[early])
             return y
 
         return start * self._units, readout
 
-    def _decoded(
-        self, states: Float[np.ndarray, "*batch times states"], material: Float[np.ndarray, "*batch materials"]
-    ) -> Float[np.ndarray, "*batch times y"]:
-        """States (..., T, 8) of bodies of materials (..., Q) -> (..., T, 6 + S)."""
-        rows, bodies, times = states.reshape(-1, STATE), np.atleast_2d(material), states.shape[-2]
-        touch = 1e-3 * self.law.coefficients(bodies)["touch"]
-        deformation = self._readout(inputs_of(rows.T, np.repeat(touch, times), np.repeat(bodies, times, axis=0)))
-        moved = rows[:, :MOVING] - [0.0, self._clearance, 0.0]
-        y = np.concatenate([placed(moved, self._axis), deformation], axis=1)
-        return y.reshape(*states.shape[:-1], -1)
+    def _placed(self, moved: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch 6"]:
+        """(..., 3) ahead, up (m) and angle (rad) of states -> (..., 6) shift (m), rotation vector."""
+        return (moved - [0.0, self._clearance, 0.0]) @ self._axes
+
+    def _decoder(self, theta: Float[np.ndarray, "*batch parameters"]) -> Callable[[Floats], Floats]:
+        """States (..., T, 8) under theta (..., P) -> coordinates (..., T, 6 + S)."""
+        bodies = np.atleast_2d(theta)[:, self._materials]
+        touch, material = 1e-3 * self.law.coefficients(bodies)["touch"], trained(bodies)
+
+        def decoded(states: Float[np.ndarray, "*batch times states"]) -> Float[np.ndarray, "*batch times y"]:
+            rows, times = states.reshape(-1, STATE), states.shape[-2]
+            repeated = 1 if len(bodies) == 1 else times  # of one body, they are broadcast
+            of_rows = (np.repeat(part, repeated, axis=0) for part in (touch, material))
+            inputs = inputs_of(rows.T, *of_rows)
+            y = np.concatenate([self._placed(rows[:, :MOVING]), self._readout(inputs)], axis=1)
+            return y.reshape(*states.shape[:-1], -1)
+
+        return decoded
 
     @property
     def _restart(self) -> float | None:
@@ -169,7 +193,7 @@ class RollingModel(Model):
             assert isinstance(motion, Adjusted)
             corrected = motion
             motion = Piecewise(motion, stop, lambda: self._restarted(theta, corrected, settings, stop, until))
-        return Adjusted(motion, FloorProjection(motion, self._lowest_points, self._lowest))
+        return motion
 
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
@@ -178,11 +202,14 @@ class RollingModel(Model):
         motion = super().batch_trajectory(geometry, sets, settings, until if stop is None else min(until, stop))
         if stop is not None:
             assert isinstance(motion, AdjustedBatch)
-            theta, corrected = self.schema.batch_inputs(sets), motion
+            theta, corrected = self.batch_inputs(sets), motion
             motion = PiecewiseBatch(
                 motion, stop, lambda: self._restarted_batch(theta, corrected, settings, stop, until)
             )
-        return AdjustedBatch(motion, FloorProjection(motion, self._lowest_points, self._lowest))
+        return motion
+
+    def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
+        return raised(super().to_body(times, y), self.watched_body.lowest, self._lowest)
 
     def _restarted(
         self, theta: Floats, corrected: Adjusted, settings: SolverSettings, stop: float, until: float
@@ -200,22 +227,22 @@ class RollingModel(Model):
         solved = corrected.own
         assert isinstance(solved, SolvedBatch)
         start, readout = self._resumed(theta, solved, corrected, stop)
-        problem = BatchProblem(self._batch_field(theta), start.astype(settings.dtype), readout, stop)
+        problem = BatchProblem(self._together(theta), start.astype(settings.dtype), readout, stop)
         return SolvedBatch(lambda: problem, settings, until, 1.0 / self.schema.window.rate)
 
     def _resumed(
         self, theta: Floats, solved: SolvedTrajectory | SolvedBatch, corrected: Moving, stop: float
     ) -> tuple[Floats, Callable[[Times, Floats], Floats]]:
         """States (..., 8) of the corrected motions at `stop` seconds, and the readout from then on."""
-        material, times = theta[..., self._materials], np.array([stop])
+        decoded, times = self._decoder(theta), np.array([stop])
         start = solved.states(times)[..., 0, :] + self._units * self._added(solved, corrected, stop)
-        end, first = corrected.reduced(times), self._decoded(start[..., None, :] / self._units, material)
+        end, first = corrected.reduced(times), decoded(start[..., None, :] / self._units)
         # what the residual adds to the deformation gives way to what follows from the motion
         given_up = end - first
         given_up[..., :POSE] = 0.0
 
         def readout(times: Times, states: Floats) -> Floats:
-            moved = self._decoded(states / self._units, material) - first
+            moved = decoded(states / self._units) - first
             return end + moved - rising(times - stop)[:, None] * given_up
 
         return start, readout
@@ -234,7 +261,3 @@ class RollingModel(Model):
         before, now = moved[..., 0, :], moved[..., 1, :]
         rest = np.zeros((*now.shape[:-1], STATE - 2 * MOVING))
         return np.concatenate([now, (now - before) * rate, rest], axis=-1)
-
-    def _lowest_points(self, y: Float[np.ndarray, "times y"]) -> Times:
-        """(T, 6 + S) -> (T,) heights in m of the body's lowest point."""
-        return self.watched_body.sample(self.space.with_modes(y), np.ones(len(y))).lowest

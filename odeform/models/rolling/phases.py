@@ -8,9 +8,10 @@ from jaxtyping import Float
 from odeform.motion.reduced_space import POSE
 from odeform.types import Times
 
-__all__ = ["Push", "rising"]
+__all__ = ["RISING", "Push", "rising"]
 
-RISING = 0.04  # s
+RISING = 0.04
+"""s."""
 
 
 @dataclass(frozen=True, eq=False)

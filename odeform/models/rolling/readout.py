@@ -20,7 +20,7 @@ SIZE = 192
 
 
 def inputs_of(
-    states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, " rows"], material: Float[np.ndarray, "rows q"]
+    states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, "#rows"], material: Float[np.ndarray, "#rows q"]
 ) -> Float[np.ndarray, "rows inputs"]:
     """What the deformation follows from: depths now and before, how the contact moves, and which side is down.
 
@@ -30,10 +30,15 @@ def inputs_of(
     _, height, angle, ahead, rising, spin, one, two = states
     above = height - touch
     near = np.exp(-np.maximum(above, 0.0) / NEAR)
-    depths = [100.0 * np.maximum(-above, 0.0), 50.0 * np.minimum(above, HIGHEST), one, two]
-    sides = np.exp(1j * angle[:, None] * TURNS)
-    own = np.stack([*depths, near * rising, near * ahead, near * spin], axis=1)
-    return np.concatenate([own, sides.real, sides.imag, material], axis=1)
+    sides = angle[:, None] * TURNS
+    out = np.empty((len(angle), INPUTS + material.shape[1]))
+    out[:, 0], out[:, 1] = 100.0 * np.maximum(-above, 0.0), 50.0 * np.minimum(above, HIGHEST)
+    out[:, 2], out[:, 3] = one, two
+    out[:, 4], out[:, 5], out[:, 6] = near * rising, near * ahead, near * spin
+    np.cos(sides, out=out[:, 7 : 7 + len(TURNS)])
+    np.sin(sides, out=out[:, 7 + len(TURNS) : INPUTS])
+    out[:, INPUTS:] = material
+    return out
 
 
 def _silu(x: Float[np.ndarray, "rows hidden"]) -> Float[np.ndarray, "rows hidden"]:

@@ -1,0 +1,167 @@
+"""How right motions outside of the trained ranges are: compared with simulations at their sides and corners.
+
+Run `python -m odeform_figures.studies.outside CKPT`. With `--fit FILE` it writes the checkpoint with a band that widens
+there as the errors of other simulations do. The shipped figures are in `assets/studies`.
+"""
+
+import argparse
+import io
+import itertools
+import os
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from odeform.checkpoint import write_checkpoint
+from odeform.errors import InputError
+from odeform.io import atomic_write, write_or_print
+from odeform.models.base import Predictor
+from odeform.models.error_band import OUTSIDE
+from odeform.models.registry import load, load_model
+from odeform.models.training.outside import growth_outside
+from odeform.parallel import parallel_map
+from odeform.schema import Parameter, Parameters, Schema
+from odeform.simulation.scenes.registry import get_scene
+from odeform.types import Floats, Frames, PointCloud
+
+__all__ = ["Outside", "compared", "fitted", "outside", "summary"]
+
+SHARES = (0.1, 0.25)
+"""How far outside: of the end of a range, or of the range where that end is zero."""
+FIT, TEST = 11, 23
+"""Seeds of the motions that a band is fitted to, and of those that say how right it is."""
+SCATTER = (0.7, 1.3)  # times these shares, for corners of the first
+
+
+class Outside(NamedTuple):
+    """A motion outside of the trained ranges."""
+
+    name: str
+    parameters: Parameters
+    errors: Floats
+    """(T,) mm at the frames after the first."""
+    band: Floats
+    """(T, 2) mm."""
+
+
+def outside(schema: Schema, share: float, seed: int) -> list[tuple[str, dict[str, float]]]:
+    """Names and parameters: one beyond each end of each range, the others inside; then all beyond, at each corner."""
+    rng, rows = np.random.default_rng(seed + round(100 * share)), []
+
+    def inside() -> dict[str, float]:
+        return {p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in schema.parameters}
+
+    for p in schema.learned:
+        for side in (-1, 1):
+            rows.append((f"{p.name} {'-+'[side > 0]}", {**inside(), p.name: _beyond(p, side, share)}))
+    for sides in itertools.product((-1, 1), repeat=len(schema.learned)):
+        row = inside()
+        for p, side in zip(schema.learned, sides, strict=True):
+            row[p.name] = _beyond(p, side, share * (1.0 if seed == TEST else rng.uniform(*SCATTER)))
+        rows.append((f"corner {''.join('-+'[side > 0] for side in sides)}", row))
+    return rows
+
+
+def _beyond(p: Parameter, side: int, share: float) -> float:
+    end = p.low if side < 0 else p.high
+    return end + side * share * (abs(end) if end else p.high - p.low)
+
+
+def _simulated(scene: str, keep: Path | None, job: tuple[str, dict[str, float]]) -> Frames:
+    name, parameters = job
+    file = None if keep is None else keep / f"{name}.npy"
+    if file is not None and file.exists():
+        return np.load(file)
+    known = get_scene(scene)
+    vertices = known.simulate(parameters, rate=known.schema.window.rate, step=known.step).vertices.astype(np.float32)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        np.save(buffer := io.BytesIO(), vertices)
+        atomic_write(file, buffer.getvalue())
+    return vertices
+
+
+def compared(model: Predictor, seed: int, workers: int, keep: Path | None = None) -> dict[float, list[Outside]]:
+    """The motions of each of `SHARES`, whose simulations are kept in the folder `keep`."""
+    scene, times, found = model.schema.scene, model.schema.window.times, {}
+    for share in SHARES:
+        jobs = [(f"{scene}-{seed}-{share:g}-{name}", row) for name, row in outside(model.schema, share, seed)]
+        truths = parallel_map(f"outside {share:g}", partial(_simulated, scene, keep), jobs, workers)
+        found[share] = [_compared(model, times, *job, truth) for job, truth in zip(jobs, truths, strict=True)]
+    return found
+
+
+def _compared(model: Predictor, times: Floats, name: str, parameters: Parameters, truth: Frames) -> Outside:
+    motion = model.solve(PointCloud(truth[0]), parameters)
+    truth = truth[np.minimum(np.arange(len(times)), len(truth) - 1)]  # simulations end when the body lies still
+    errors = 1e3 * np.sqrt(np.square(motion.vertices(times) - truth).mean(axis=(1, 2)))
+    band = model.error_band(motion.parameters, times)
+    if band is None:
+        raise InputError(f"{model.model}: expected a model with an error band")
+    return Outside(name, parameters, errors[1:], band[1:])
+
+
+def summary(motions: list[Outside]) -> dict[str, Any]:
+    """Pooled errors in mm of all motions, of those at sides and at corners, and what of them the 90 % band covers."""
+    corners = [motion for motion in motions if "corner" in motion.name]
+    sides = [motion for motion in motions if "corner" not in motion.name]
+    pooled = {name: _rms([each.errors for each in some]) for name, some in (("sides", sides), ("corners", corners))}
+    covered = [_rms([each.errors]) <= _rms([each.band[:, 1]]) for each in motions]
+    return {
+        "pooled_mm": _rms([each.errors for each in motions]),
+        **{f"{name}_mm": value for name, value in pooled.items()},
+        "covered_motions": float(np.mean(covered)),
+        "covered_frames": float(np.mean([each.errors <= each.band[:, 1] for each in motions])),
+        "motions": {
+            each.name: {"rmse_mm": _rms([each.errors]), "band_mm": _rms([each.band[:, 1]])} for each in motions
+        },
+    }
+
+
+def _rms(values: list[Floats]) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values else 0.0
+
+
+def fitted(model: Predictor, motions: list[Outside]) -> Predictor:
+    """The model with a band that widens as the errors of these motions do."""
+    schema, times, bands = model.schema, model.schema.window.times, []
+    theta = np.stack([schema.vector(schema.complete(each.parameters)) for each in motions])
+    for row in theta:
+        ends = zip(schema.learned, np.clip(row, -1.0, 1.0), strict=True)
+        nearest = schema.complete({p.name: p.denormalise(float(u)) for p, u in ends})
+        bands.append(model.error_band(nearest, times))
+    growth = growth_outside(theta, np.stack([each.errors for each in motions]), np.stack(bands)[:, 1:])
+    arrays = {**model.checkpoint.arrays, OUTSIDE: growth}
+    return load_model(replace(model.checkpoint, arrays=arrays))
+
+
+def main() -> None:
+    """Run the comparison from the command line."""
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.outside", description=__doc__)
+    cores = os.cpu_count() or 1
+    parser.add_argument("checkpoint", metavar="CKPT", help="a checkpoint of a scene without objects")
+    parser.add_argument("--workers", type=int, default=cores, metavar="W", help=f"processes (default: {cores})")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="folder of simulations, which take minutes")
+    parser.add_argument("--fit", type=Path, metavar="FILE", help="fit the band first, and write the checkpoint")
+    parser.add_argument("--json", metavar="FILE", help="write the result to this file instead of printing it")
+    args = parser.parse_args()
+    try:
+        model = load(args.checkpoint)
+        if args.fit is not None:
+            found = compared(model, FIT, args.workers, args.keep)
+            model = fitted(model, [motion for motions in found.values() for motion in motions])
+            write_checkpoint(args.fit, model.checkpoint)
+        test = compared(model, TEST, args.workers, args.keep)
+    except InputError as error:
+        parser.error(str(error))
+    command = f"python -m odeform_figures.studies.outside {args.checkpoint}"
+    write_or_print(
+        {"command": command, **{f"{share:g}": summary(motions) for share, motions in test.items()}}, args.json
+    )
+
+
+if __name__ == "__main__":
+    main()

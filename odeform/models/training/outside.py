@@ -1,0 +1,40 @@
+"""How a band of errors widens outside of the trained ranges: as the errors of simulated motions there do."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import nnls
+
+from odeform.models.error_band import NOMINAL, excess_of
+from odeform.types import Floats
+
+__all__ = ["growth_outside"]
+
+RIDGE = 0.2  # half ranges; what few motions say of one side is chance
+WIDER = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0)  # times the growth of the mean, to choose from
+
+
+def growth_outside(
+    theta: Float[np.ndarray, "motions parameters"],
+    rmse: Float[np.ndarray, "motions times"],
+    bands: Float[np.ndarray, "motions times 2"],
+) -> Float[np.ndarray, "2 parameters"]:
+    """The growth that `odeform.models.error_band.OUTSIDE` names, from motions outside of the trained ranges.
+
+    `theta` are their normalised parameters, `rmse` their errors in mm at times after 0, and `bands` those of the
+    nearest trained parameters. The growth of each side is fitted to the errors' root mean squares, and is none where
+    they do not grow; then all are widened until a share `NOMINAL` of all errors is covered.
+    """
+    excess = excess_of(theta).reshape(len(theta), -1)
+    grown = np.log(_rms(rmse) / _rms(bands[..., 0]))
+    matrix = np.concatenate([excess, RIDGE * np.eye(excess.shape[1])])
+    growth, _ = nnls(matrix, np.concatenate([np.maximum(grown, 0.0), np.zeros(excess.shape[1])]))
+
+    def covered(times: float) -> float:
+        return float((rmse <= bands[..., 1] * np.exp(times * excess @ growth)[:, None]).mean())
+
+    wider = next((times for times in WIDER if covered(times) >= NOMINAL), WIDER[-1])
+    return wider * growth.reshape(2, -1)
+
+
+def _rms(values: Float[np.ndarray, "motions times"]) -> Floats:
+    return np.sqrt(np.square(values).mean(axis=1))

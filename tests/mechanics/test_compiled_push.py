@@ -1,0 +1,59 @@
+"""Compiled steps of pushed bodies are those of the NumPy code."""
+
+import numpy as np
+import pytest
+from soft_block import SIZE, Block
+
+from odeform.compiling import compiles
+from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.push import make_push
+from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
+from odeform.mechanics.step import Mechanics, Projectile
+
+pytestmark = pytest.mark.skipif(not compiles(), reason="needs Numba")
+
+CONTACTS = np.array([[0.5 * SIZE[0], 0.01, 0.01], [0.5 * SIZE[0], -0.01, 0.02], [0.5 * SIZE[0], 0.0, -0.01]])
+FORCES = np.array([[-3.0, 0.5, 0.0], [-1.0, 0.0, -2.0], [0.0, 0.0, 0.0]])
+PULSE, STEP = 0.0205, 1e-3  # the pulse ends within a step
+
+
+def bodies(block: Block) -> tuple[PushedBodies, CompiledBodies]:
+    mechanics = Mechanics(block.body, ContactParameters(), Projectile(0.012, 0.020))
+    push = make_push(block.body, 5, CONTACTS, CONTACTS + np.array([0.012, 0.0, 0.0]), FORCES)
+    return PushedBodies(mechanics, push, PULSE), CompiledBodies(mechanics, push, PULSE)
+
+
+def test_states_slopes_and_errors_agree_to_rounding(block: Block) -> None:
+    reference, compiled = bodies(block)
+    rows, steps, states = np.arange(3), np.full(3, STEP), reference.start
+    for index in range(60):
+        times = index * steps
+        known, found = (each.advance(rows, times, states, steps) for each in (reference, compiled))
+        for one, other in zip(known, found, strict=True):
+            np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-10 * np.abs(one).max() + 1e-15)
+        slopes = reference(rows, times, states)
+        np.testing.assert_allclose(compiled(rows, times, states), slopes, rtol=1e-9, atol=1e-10 * np.abs(slopes).max())
+        states = known[0]
+    assert np.abs(states[:2, :3]).max() > 1e-3, "they have been pushed"
+
+
+def test_a_motion_is_the_same_to_the_bit_in_any_batch(block: Block) -> None:
+    _, compiled = bodies(block)
+    rows, steps = np.arange(3), np.array([STEP, 0.5 * STEP, 2.0 * STEP])
+    together = compiled.advance(rows, 0.0 * steps, compiled.start, steps)
+    for row in range(3):
+        some = slice(row, row + 1)
+        alone = compiled.advance(rows[some], 0.0 * steps[some], compiled.start[some], steps[some])
+        for one, all_of_them in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(one[0], all_of_them[row])
+
+
+def test_what_is_not_finite_stays_so(block: Block) -> None:
+    _, compiled = bodies(block)
+    states = compiled.start
+    states[0, 14] = np.nan
+    after, slopes, errors = compiled.advance(np.arange(3), np.zeros(3), states, np.full(3, STEP))
+    assert not np.isfinite(after[0]).all()
+    assert not np.isfinite(errors[0])
+    assert np.isfinite(after[1:]).all()
+    assert np.isfinite(slopes[1:]).all()
