@@ -55,8 +55,8 @@ class Mechanics:
     parameters: ContactParameters
     projectile: Projectile
     stress: float = 1.0
-    """Fraction of the floor's force on the body in zero of its coordinates that its own stress there balances: one where
-    it rests there."""
+    """Fraction of the floor's force on the body in zero of its coordinates that its stress there balances: one where it
+    rests there."""
     rest: Rest | None = None
     """None where it rests in zero."""
 
