@@ -133,7 +133,7 @@ def trained(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
             for model in models:
                 path = folder / f"{model}.safetensors"
                 # on so few motions the regression alone would be as good, and the ODE have no share
-                without = ("correction",) if model == "odeform" else ()
+                without = ("residual",) if model == "odeform" else ()
                 train(dataset, path, model, seed=1, steps=60, without=without, report=_silent)
 
     folder = made_once("models", fit)

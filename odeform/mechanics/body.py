@@ -24,9 +24,9 @@ class Samples:
     points: Points
     """(S, 3) m."""
     rows: Float[np.ndarray, "6 samples modes"]
-    """What each mode does there: displacement (3) in m and rotation of the surface (3) in rad per root kilogram."""
+    """Modes there: each one's displacement (3) in m and rotation of the surface (3) in rad per root kilogram."""
     masses: Perpoint
-    """(S,) kg of the body that each stands for, by its share of the surface."""
+    """(S,) kg of the body that each stands for, by its part of the surface."""
 
     @property
     def modes(self) -> Float[np.ndarray, "samples 3 modes"]:
@@ -35,13 +35,13 @@ class Samples:
 
     @cached_property
     def tree(self) -> KDTree:
-        """For the nearest samples of a point."""
+        """Finds the nearest samples of a point."""
         return KDTree(self.points)
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """What a body is as a whole, at rest on the floor z = 0."""
+    """Describes a body as a whole, at rest on the floor z = 0."""
 
     mass: float
     """kg"""
@@ -54,7 +54,7 @@ class Solid:
 
 
 def solid_of(positions: Points, masses: Perpoint, damping: float) -> Solid:
-    """From nodes (N, 3) m of `masses` (N,) kg that rest on the floor."""
+    """Sums nodes (N, 3) m of `masses` (N,) kg that rest on the floor."""
     mass = float(masses.sum())
     centre = masses @ positions / mass
     arms = positions - centre
@@ -68,12 +68,12 @@ class ReducedBody:
     """A body as a whole, its modes, and where it may touch what is around it; in axes of the scene."""
 
     solid: Solid
-    squares: Float[np.ndarray, " modes"]
+    eigenvalues: Float[np.ndarray, " modes"]
     """(K,) squared angular frequencies, 1/s^2."""
     support: Samples
-    """Where it may touch the floor."""
+    """Samples that may be in contact with the floor."""
     surface: Samples
-    """Where something may touch it."""
+    """Samples at which something may push it."""
 
     def changed(self, mass: float, stiffness: float) -> "ReducedBody":
         """The same body with so many times the mass and the stiffness. Its modes keep their shapes."""
@@ -83,7 +83,7 @@ class ReducedBody:
             for name, samples in (("support", self.support), ("surface", self.surface))
         }
         heavier = replace(solid, mass=mass * solid.mass, inertia=mass * solid.inertia)
-        return replace(self, solid=heavier, squares=stiffness / mass * self.squares, **parts)
+        return replace(self, solid=heavier, eigenvalues=stiffness / mass * self.eigenvalues, **parts)
 
     @cached_property
     def reach(self) -> float:
@@ -110,17 +110,17 @@ def reduce_body(
     surface: Points,
     faces: Faces,
     modes: Float[np.ndarray, "modes points 3"],
-    turns: Float[np.ndarray, "points 3 modes"],
-    squares: Floats,
+    modal_rotations: Float[np.ndarray, "points 3 modes"],
+    eigenvalues: Floats,
     solid: Solid,
 ) -> ReducedBody:
-    """From its surface (N, 3) m relative to the mass centre, the modes there in m per root kilogram, how they turn it
-    (`surface_turns`), and the rest."""
+    """Makes the body from its surface (N, 3) m relative to the mass centre, the modes there in m per root kilogram, how
+    they turn it (`surface_turns`), and the rest."""
     corners = surface[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
     # in this order in memory too, or else a gather of some samples copies all of them first
-    rows = np.ascontiguousarray(np.concatenate([modes.transpose(2, 1, 0), turns.transpose(1, 0, 2)]))
+    rows = np.ascontiguousarray(np.concatenate([modes.transpose(2, 1, 0), modal_rotations.transpose(1, 0, 2)]))
     areas *= 0.5 * solid.mass / areas.sum()
     around *= 0.5 * solid.mass / around.sum()
     everywhere = Samples(
@@ -128,7 +128,7 @@ def reduce_body(
         np.concatenate([rows, rows[:, faces].mean(axis=2)], axis=1),
         np.concatenate([around, areas]),
     )
-    return ReducedBody(solid, squares, _support(surface, rows, solid.mass), everywhere)
+    return ReducedBody(solid, eigenvalues, _support(surface, rows, solid.mass), everywhere)
 
 
 def _support(points: Points, rows: Floats, mass: float) -> Samples:

@@ -25,14 +25,14 @@ compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"re
 
 
 class Constants(NamedTuple):
-    """What stays the same over the motions of B pushes of one body, in K directions with S samples."""
+    """Holds what stays the same over the motions of B pushes of one body, in K directions with S samples."""
 
     points: ndarray  # (B, 3, S) m
     rows: ndarray  # (B, 6, S, K)
     stiffness: ndarray  # (B, S) N/m of each sample
     grip: ndarray  # (B, S) N s/m
     level: ndarray  # (F,) m of the first F samples, which may touch the floor
-    squares: ndarray  # (B, K) 1/s^2
+    eigenvalues: ndarray  # (B, K) 1/s^2
     preload: ndarray  # (B, K)
     inertia: ndarray  # (3, 3) kg m^2
     spread: ndarray  # (6 + K,) m^2
@@ -55,7 +55,7 @@ class Constants(NamedTuple):
 @compiled
 @no_type_check
 def _copy(source, out):
-    """In a loop: assignments to slices take seconds to compile."""
+    """Copies in a loop: assignments to slices take seconds to compile."""
     for k in range(len(out)):
         out[k] = source[k]
 
@@ -74,7 +74,7 @@ def _turn(rows, i, z, size, out):
 @compiled
 @no_type_check
 def _bent(points, i, motion, place):
-    """Where the sample is, and three factors of its rotation: see `odeform.mechanics.warping`."""
+    """Returns where the sample is, and three factors of its rotation: see `odeform.mechanics.warping`."""
     t0, t1, t2 = motion[3], motion[4], motion[5]
     square = t0 * t0 + t1 * t1 + t2 * t2 + SMALL
     angle = np.sqrt(square)
@@ -281,7 +281,7 @@ def _free(c, b, z, size, pushed, v, momentum, rate):
     rate[3], rate[4], rate[5] = l1 * v[5] - l2 * v[4], l2 * v[3] - l0 * v[5], l0 * v[4] - l1 * v[3]
     for k in range(size):
         momentum[6 + k] = v[6 + k]
-        rate[6 + k] = -c.squares[b, k] * z[12 + k] - c.preload[b, k]
+        rate[6 + k] = -c.eigenvalues[b, k] * z[12 + k] - c.preload[b, k]
     if pushed:
         momentum[6 + size] = c.projectile * v[6 + size]
         rate[6 + size] = c.forces[b]
@@ -315,7 +315,7 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
             for other in range(axis + 1):
                 matrix[3 + axis, 3 + other] = c.inertia[axis, other]
         for k in range(size):
-            matrix[6 + k, 6 + k] = 1.0 + step * (step + c.relaxation) * c.squares[b, k]
+            matrix[6 + k, 6 + k] = 1.0 + step * (step + c.relaxation) * c.eigenvalues[b, k]
         if pushed:
             matrix[6 + size, 6 + size] = c.projectile
         for j in range(count):
@@ -366,7 +366,7 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
 @no_type_check
 def _step(c, b, z, pushed, step, out, work):
     """The state after a step of second order; returns its error in m."""
-    size = c.squares.shape[1]
+    size = c.eigenvalues.shape[1]
     chosen, gaps, springs, jacobian, whole, half, matrix = work
     floor, count = _near(c, b, z, size, pushed, step, chosen, gaps)
     good, begin = True, z
@@ -441,7 +441,7 @@ def _slope(z, after, size, pushed, step, out):
 @no_type_check
 def _work(c):
     """Room for a step."""
-    size = c.squares.shape[1]
+    size = c.eigenvalues.shape[1]
     state, width = 20 + 2 * size, 7 + size
     return (
         np.empty(2 * MOST, np.int64),
@@ -461,7 +461,7 @@ def advance_all(c, rows, times, states, steps, out, slopes, errors):
 
     The end of the pulse ends a step.
     """
-    size = c.squares.shape[1]
+    size = c.eigenvalues.shape[1]
     work, middle = _work(c), np.empty(states.shape[1])
     for row in range(len(rows)):
         step, error, after = steps[row], 0.0, out[row]
@@ -480,7 +480,7 @@ def advance_all(c, rows, times, states, steps, out, slopes, errors):
 @no_type_check
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
-    size = c.squares.shape[1]
+    size = c.eigenvalues.shape[1]
     chosen, gaps, springs, jacobian, _, _, matrix = _work(c)
     start = 13 + size
     for row in range(len(rows)):
@@ -492,7 +492,7 @@ def slope_of(c, rows, times, states, out):
         _local(z, size, v)
         _free(c, b, z, size, pushed, v, momentum, rate)
         for k in range(size):
-            rate[6 + k] -= c.relaxation * c.squares[b, k] * v[6 + k]
+            rate[6 + k] -= c.relaxation * c.eigenvalues[b, k] * v[6 + k]
         for j in range(count):
             n, s, t = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2]
             r0, r1, r2 = 0.0, 0.0, 0.0

@@ -38,8 +38,9 @@ class Contacts:
     def resistance(
         self, velocity: Float[np.ndarray, "#steps batch velocities"], step: Float[np.ndarray, "#steps #batch 1"]
     ) -> tuple[Floats, Floats]:
-        """What C contacts add to the matrix (H, B, V, V) in kg and to the momentum (H, B, V) of each of H steps that
-        ends with about `velocity`: springs and dampers along the normal, friction against sliding, all implicit."""
+        """Returns what C contacts add to the matrix (H, B, V, V) in kg and to the momentum (H, B, V) of each of H steps
+        that ends with about `velocity`: springs and dampers along the normal, friction against sliding, all
+        implicit."""
         time = step + self.damping
         relative, force = self._at(velocity, time)
         active = np.where(force > 0.0, step * self.stiffness, 0.0)
@@ -67,7 +68,7 @@ class Contacts:
         return out
 
     def forces(self, velocity: Float[np.ndarray, "batch velocities"]) -> Float[np.ndarray, "batch velocities"]:
-        """What they do to the rate of the momentum, at these velocities."""
+        """Returns what they add to the rate of the momentum, at these velocities."""
         relative, force = self._at(velocity[None], self.damping)
         pushes = -self._drag(force, relative)[..., None] * relative
         pushes[..., 0] = force

@@ -24,7 +24,7 @@ SPARE = 8  # eigenvectors computed besides those wanted; six are rigid
 class ElasticModes:
     """K deformations that vibrate independently, without rigid motion."""
 
-    squares: Float[np.ndarray, " modes"]
+    eigenvalues: Float[np.ndarray, " modes"]
     """Squared angular frequencies in 1/s^2, ascending, none negative."""
     shapes: Float[np.ndarray, "modes nodes 3"]
     """Orthonormal under the nodal masses: metres per root kilogram."""
@@ -115,6 +115,6 @@ def elastic_modes(stiffness: csc_matrix, masses: Perpoint, positions: Points, co
     root = np.sqrt(weights)[:, None]
     left, size, _ = np.linalg.svd(root * vectors, full_matrices=False)
     span: Floats = left[:, size > 0.1 * size[0]] / root
-    squares, turn = np.linalg.eigh(span.T @ (symmetric @ span))
+    eigenvalues, turn = np.linalg.eigh(span.T @ (symmetric @ span))
     shapes = (span @ turn[:, :count]).T.reshape(-1, len(masses), 3)
-    return ElasticModes(np.maximum(squares[:count], 0.0), shapes)
+    return ElasticModes(np.maximum(eigenvalues[:count], 0.0), shapes)

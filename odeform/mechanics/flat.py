@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float
 
+from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State
-from odeform.mechanics.turns import skew
 from odeform.types import Floats, Rotations, Vectors
 
 __all__ = ["body_motion", "flat_slopes", "packed", "parts_of", "start_of", "unpacked"]
@@ -21,7 +21,7 @@ def start_of(directions: int) -> Floats:
 
 
 def parts_of(states: States) -> tuple[slice, ...]:
-    """Of flat states: shift, rotation, deformation, projectile, and velocities."""
+    """Slices flat states: shift, rotation, deformation, projectile, and velocities."""
     return _slices((states.shape[1] - 20) // 2)
 
 
@@ -32,7 +32,7 @@ def _slices(directions: int) -> tuple[slice, ...]:
 
 
 def unpacked(states: States, pushing: bool) -> State:
-    """From flat states (R, 20 + 2 K), with or without the projectile."""
+    """Reads flat states (R, 20 + 2 K), with or without the projectile."""
     shift, turn, modes, projectile, velocity = (states[:, part] for part in parts_of(states))
     whole = State(shift, turn.reshape(-1, 3, 3), modes, projectile, velocity)
     return whole if pushing else whole.without_projectile()

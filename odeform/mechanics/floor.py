@@ -29,24 +29,27 @@ class Floor:
     """(K,) modal force of the floor at rest, which the body's own stress balances."""
 
 
-def stand(body: ReducedBody, law: ContactParameters) -> Floor:
+def stand(body: ReducedBody, parameters: ContactParameters) -> Floor:
     """The springs, and the height and tilt of the floor at which they carry the body without turning it.
 
     The equilibrium is the minimum of the potential energy of the springs and the weight, which is convex.
     """
     x, y, z = body.support.points.T
     weight, size = body.solid.mass * GRAVITY, float(np.sqrt((body.support.points**2).sum(axis=1).mean()))
-    stiffness = TOUCHING * weight / law.sink * body.support.masses / body.solid.mass
+    stiffness = TOUCHING * weight / parameters.static_penetration * body.support.masses / body.solid.mass
     shape = np.stack([np.ones_like(x), x / size, y / size])
     low = z - z.min()
 
     def energy(plane: Floats) -> tuple[float, Floats]:
-        depth = np.maximum(law.sink * (plane @ shape) - low, 0.0)
-        value = 0.5 * stiffness @ depth**2 - weight * law.sink * plane[0]
-        slope = law.sink * (shape @ (stiffness * depth)) - weight * law.sink * np.eye(3)[0]
-        return value / (weight * law.sink), slope / (weight * law.sink)
+        depth = np.maximum(parameters.static_penetration * (plane @ shape) - low, 0.0)
+        value = 0.5 * stiffness @ depth**2 - weight * parameters.static_penetration * plane[0]
+        slope = (
+            parameters.static_penetration * (shape @ (stiffness * depth))
+            - weight * parameters.static_penetration * np.eye(3)[0]
+        )
+        return value / (weight * parameters.static_penetration), slope / (weight * parameters.static_penetration)
 
     plane = minimize(energy, np.array([1.0, 0.0, 0.0]), jac=True, method="BFGS", options={"gtol": 1e-10}).x
-    offset = -law.sink * (plane @ shape)
+    offset = -parameters.static_penetration * (plane @ shape)
     force = stiffness * np.maximum(-(low + offset), 0.0)
     return Floor(offset - z.min(), stiffness, force @ body.support.rows[2])

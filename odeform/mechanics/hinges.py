@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from odeform.mechanics.turns import skew
+from odeform.mechanics.rotations import skew
 from odeform.types import Floats, Ints, Points
 
 __all__ = ["hinge_stiffness"]

@@ -29,12 +29,12 @@ class Nodes:
 
     @property
     def rotations(self) -> Float[np.ndarray, "batch times 3 3"]:
-        """From rest."""
+        """Starts from rest."""
         return np.stack([state.rotation for state in self.states], axis=1)
 
     @property
     def amplitudes(self) -> Float[np.ndarray, "batch times directions"]:
-        """Of the directions of deformation, root kg m."""
+        """Amplitudes of the directions of deformation, root kg m."""
         return np.stack([state.modes for state in self.states], axis=1)
 
 
@@ -44,7 +44,7 @@ def push_body(mechanics: Mechanics, push: Push, pulse: float, until: float, step
     count = max(round(pulse / step), 1)
     step = pulse / count
     bodies = pushed_bodies(mechanics, push, pulse)
-    flat, rows = bodies.start, np.arange(len(push.squares))
+    flat, rows = bodies.start, np.arange(len(push.eigenvalues))
     states, steps = [unpacked(flat, True)], np.full(len(rows), step)
     for index in range(max(int(np.ceil(until / step - 1e-9)), 1)):
         flat = bodies.advance(rows, index * steps, flat, steps)[0]

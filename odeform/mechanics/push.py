@@ -14,7 +14,7 @@ __all__ = ["WIDTHS", "Push", "make_push", "no_push"]
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
 LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
-PARTS = ("modes", "squares", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
+PARTS = ("modes", "eigenvalues", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Push:
 
     modes: Float[np.ndarray, "batch modes directions"]
     """Amplitudes of the body's modes by those of the K directions."""
-    squares: Float[np.ndarray, "batch directions"]
+    eigenvalues: Float[np.ndarray, "batch directions"]
     """Squared angular frequencies, 1/s^2."""
     support: int
     """The first samples are those that may touch the floor; the sphere may touch the others."""
@@ -41,7 +41,7 @@ class Push:
     centres: Float[np.ndarray, "batch 3"]
     """m, of the spheres at the start, relative to the mass centre of the body at rest."""
     guides: Float[np.ndarray, "batch 3"]
-    """Of unit length."""
+    """Directions of unit length."""
     forces: Float[np.ndarray, "batch 1"]
     """N along the guide."""
 
@@ -64,7 +64,7 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
     The `soft` softest modes are among the directions of deformation. Without a force the guide points at the contact.
     """
     around = body.near(contacts, LOADED)
-    modes, squares = _directions(body, soft, contacts, around)
+    modes, eigenvalues = _directions(body, soft, contacts, around)
     strength, inward = np.linalg.norm(forces, axis=1, keepdims=True), contacts - centres
     ahead = inward / np.linalg.norm(inward, axis=1, keepdims=True)
     guides = np.where(strength > 0.0, forces / np.where(strength > 0.0, strength, 1.0), ahead)
@@ -80,15 +80,15 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
             # one component after the other: what is gathered stays in the cache
             _fill(row[:count], stand, modes[index], soft)
             _fill(row[count:], touched.take(near[index], axis=0), modes[index], soft)
-    return Push(modes, squares, count, points, rows, masses, centres, guides, strength)
+    return Push(modes, eigenvalues, count, points, rows, masses, centres, guides, strength)
 
 
 def no_push(body: ReducedBody, soft: int) -> Push:
     """A body that nothing but the floor touches, in its `soft` softest modes."""
-    support, soft = body.support, min(soft, len(body.squares))
+    support, soft = body.support, min(soft, len(body.eigenvalues))
     return Push(
-        np.eye(len(body.squares))[None, :, :soft],
-        body.squares[None, :soft],
+        np.eye(len(body.eigenvalues))[None, :, :soft],
+        body.eigenvalues[None, :soft],
         len(support.points),
         np.ascontiguousarray(support.points.T)[None],
         np.ascontiguousarray(support.rows[..., :soft])[None],
@@ -110,7 +110,7 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     away = ((body.surface.points[around] - contacts[:, None]) ** 2).sum(axis=2)
     patches = body.surface.masses[around] * np.exp(-away / np.square(WIDTHS)[:, None, None])
     patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1)
-    stiff, batch = body.squares[soft:], len(around)
+    stiff, batch = body.eigenvalues[soft:], len(around)
     loads = np.empty((batch, len(stiff), 3, len(WIDTHS)))
     # from near to far; the nearest one is loaded wherever it is
     counts = np.maximum((away <= (REACH * max(WIDTHS)) ** 2).sum(axis=1), 1)
@@ -119,8 +119,8 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
             load[:, axis] = (patch[:, :count] @ body.surface.rows[axis].take(loaded[:count], axis=0))[:, soft:].T
     loads = loads.reshape(batch, len(stiff), -1)
     local = np.linalg.qr(loads / stiff[:, None])[0]
-    squares, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))
-    modes = np.zeros((batch, len(body.squares), soft + squares.shape[1]))
+    eigenvalues, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))
+    modes = np.zeros((batch, len(body.eigenvalues), soft + eigenvalues.shape[1]))
     modes[:, range(soft), range(soft)] = 1.0
     modes[:, soft:, soft:] = local @ turn
-    return modes, np.concatenate([np.broadcast_to(body.squares[:soft], (batch, soft)), squares], axis=1)
+    return modes, np.concatenate([np.broadcast_to(body.eigenvalues[:soft], (batch, soft)), eigenvalues], axis=1)

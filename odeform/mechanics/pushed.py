@@ -38,7 +38,7 @@ class PushedBody:
     @property
     def directions(self) -> int:
         """Number K of directions of deformation."""
-        return self.push.squares.shape[1]
+        return self.push.eigenvalues.shape[1]
 
     @property
     def start(self) -> Floats:
@@ -58,6 +58,6 @@ class PushedBody:
         return after[0], slopes[0], float(errors[0])
 
     def body_motion(self, states: Float[np.ndarray, "rows state"]) -> tuple[Vectors, Rotations, Floats, Vectors]:
-        """As `body_motion` of states (T, 20 + 2 K), and the centres of the projectile (T, 3) m."""
+        """Returns `body_motion` of states (T, 20 + 2 K), and the centres of the projectile (T, 3) m."""
         way = states[:, parts_of(states)[3]]
         return *body_motion(states), self.push.centres + way * self.push.guides

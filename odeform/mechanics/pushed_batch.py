@@ -83,14 +83,14 @@ class PushedBodies:
         key, (last, steps) = rows.tobytes(), self._known.get(pushing, (b"", None))
         if steps is None or last != key:
             whole = self._push if pushing else self._push.over
-            some = whole if len(rows) == len(whole.squares) else whole.some(rows)
+            some = whole if len(rows) == len(whole.eigenvalues) else whole.some(rows)
             steps = Steps(self._mechanics, some, self._preload[rows])
             self._known[pushing] = key, steps
         return steps
 
 
 class CompiledBodies:
-    """As `PushedBodies`, in machine code; every motion is as it would be alone, to the bit."""
+    """Computes what `PushedBodies` does, in machine code; every motion is as it would be alone, to the bit."""
 
     def __init__(self, mechanics: Mechanics, push: Push, pulse: float) -> None:
         """Projectiles push for `pulse` seconds from time 0 on."""
@@ -100,19 +100,22 @@ class CompiledBodies:
     def _constants(self) -> "Constants":
         from odeform.mechanics.compiled_push import Constants  # importing Numba takes half a second
 
-        mechanics, push, law = self._mechanics, self._push, self._mechanics.law
+        mechanics, push, parameters = self._mechanics, self._push, self._mechanics.parameters
         solid, floor, stands = mechanics.body.solid, mechanics.floor, push.support
-        spread = np.full(6 + push.squares.shape[1], 1.0 / solid.mass)
+        spread = np.full(6 + push.eigenvalues.shape[1], 1.0 / solid.mass)
         spread[:3], spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
-        stiffness, grip = law.push_stiffness * push.masses, law.push_grip * push.masses
-        stiffness[:, :stands], grip[:, :stands] = floor.stiffness, law.floor_grip * push.masses[:, :stands]
+        stiffness, grip = parameters.push_stiffness * push.masses, parameters.push_regularisation * push.masses
+        stiffness[:, :stands], grip[:, :stands] = (
+            floor.stiffness,
+            parameters.floor_regularisation * push.masses[:, :stands],
+        )
         return Constants(
             points=push.points,
             rows=push.rows,
             stiffness=stiffness,
             grip=grip,
             level=floor.level,
-            squares=law.stiffness * push.squares,
+            eigenvalues=parameters.stiffness * push.eigenvalues,
             preload=mechanics.preload(push),
             inertia=np.ascontiguousarray(solid.inertia, dtype=float),
             spread=spread,
@@ -122,10 +125,10 @@ class CompiledBodies:
             mass=float(solid.mass),
             gravity=GRAVITY,
             relaxation=float(mechanics.relaxation),
-            floor_damping=law.floor_damping,
-            floor_friction=law.floor_friction,
-            push_damping=law.push_damping,
-            push_friction=law.push_friction,
+            floor_damping=parameters.floor_damping,
+            floor_friction=parameters.floor_friction,
+            push_damping=parameters.push_damping,
+            push_friction=parameters.push_friction,
             radius=mechanics.projectile.radius,
             projectile=mechanics.projectile.mass,
             reach=mechanics.body.reach,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from odeform.mechanics.turns import turn, turned
+from odeform.mechanics.rotations import turn, turned
 from odeform.types import Floats
 
 __all__ = ["State", "apart", "extrapolated"]

@@ -15,9 +15,9 @@ from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import parts_of, start_of, unpacked
 from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.push import Push
+from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State, apart, extrapolated
 from odeform.mechanics.touching import Near, Touching
-from odeform.mechanics.turns import skew
 from odeform.types import Floats
 
 __all__ = ["Mechanics", "Projectile", "Rest", "Steps"]
@@ -39,53 +39,53 @@ class Projectile:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Where a body rests that is not at zero of its coordinates, as in `State`."""
+    """Coordinates of a body that does not rest at zero, as in `State`."""
 
     shift: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
     modes: Float[np.ndarray, " soft"]
-    """Of the first directions of every push, which are the body's softest modes."""
+    """Amplitudes of the first directions of every push, which are the body's softest modes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mechanics:
-    """A body under a law of contact and material, and what it is pushed by."""
+    """A body under contact parameters, and what it is pushed by."""
 
     body: ReducedBody
-    law: ContactParameters
+    parameters: ContactParameters
     projectile: Projectile
     stress: float = 1.0
-    """Share of the floor's force on the body in zero of its coordinates that its own stress there balances: one where
-    it rests there."""
+    """Fraction of the floor's force on the body in zero of its coordinates that its stress there balances: one where it
+    rests there."""
     rest: Rest | None = None
     """None where it rests in zero."""
 
     @cached_property
     def floor(self) -> Floor:
         """Springs of the floor."""
-        return stand(self.body, self.law)
+        return stand(self.body, self.parameters)
 
     @property
     def relaxation(self) -> float:
         """Ratio of damping to stiffness, s."""
-        return self.law.damping * self.body.solid.damping
+        return self.parameters.damping * self.body.solid.damping
 
     def start(self, push: Push) -> Float[np.ndarray, "batch state"]:
         """(B, 20 + 2 K): flat states at rest."""
-        size = push.squares.shape[1]
+        size = push.eigenvalues.shape[1]
         state = start_of(size)
         if self.rest is not None:
             shift, turn, modes, *_ = parts_of(state[None])
             state[shift], state[turn] = self.rest.shift, self.rest.rotation.ravel()
             state[modes][: len(self.rest.modes)] = self.rest.modes
-        return np.tile(state, (len(push.squares), 1))
+        return np.tile(state, (len(push.eigenvalues), 1))
 
     def preload(self, push: Push) -> Float[np.ndarray, "batch directions"]:
         """(B, K): what the body's own stress does to its directions of deformation in zero. Where it rests elsewhere,
         it is what keeps each of them there: stiff directions, in which the rest is not known, do not begin to ring."""
         if self.rest is None:
             return self.stress * self.floor.preload @ push.modes
-        steps = Steps(self, push, np.zeros_like(push.squares))
+        steps = Steps(self, push, np.zeros_like(push.eigenvalues))
         return steps.slope(unpacked(self.start(push), False))[:, 6:]
 
 
@@ -93,20 +93,24 @@ class Steps:
     """The right-hand side for B pushes, and steps in time."""
 
     def __init__(self, mechanics: Mechanics, push: Push, preload: Floats) -> None:
-        """What all steps share is computed here; `preload` (B, K) as of `Mechanics`."""
-        law, solid = mechanics.law, mechanics.body.solid
-        batch, size = push.squares.shape
+        """Computes what all steps need; `preload` (B, K) as of `Mechanics`."""
+        parameters, solid = mechanics.parameters, mechanics.body.solid
+        batch, size = push.eigenvalues.shape
         self._solid, self._relaxation, self._forces = solid, mechanics.relaxation, push.forces
-        self._squares, self._preload = law.stiffness * push.squares, preload
+        self._eigenvalues, self._preload = parameters.stiffness * push.eigenvalues, preload
         self._masses = np.concatenate([np.full(3, solid.mass), np.zeros(3), np.ones(size), [mechanics.projectile.mass]])
         self._stiffness = np.zeros((batch, len(self._masses)))
-        self._stiffness[:, 6:-1] = self._squares
+        self._stiffness[:, 6:-1] = self._eigenvalues
         # mean square displacement of the body by a unit of each coordinate, m^2
         self._spread = np.full(6 + size, 1.0 / solid.mass)
         self._spread[:3], self._spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
         self._touching = {
             pushed: Touching(
-                push if pushed else push.over, mechanics.floor, law, mechanics.projectile.radius, mechanics.body.reach
+                push if pushed else push.over,
+                mechanics.floor,
+                parameters,
+                mechanics.projectile.radius,
+                mechanics.body.reach,
             )
             for pushed in (True, False)
         }
@@ -130,7 +134,7 @@ class Steps:
         """(B, V) accelerations."""
         local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
         _, rate = self._free(state, local)
-        rate[:, inner] -= self._relaxation * self._squares * local[:, inner]
+        rate[:, inner] -= self._relaxation * self._eigenvalues * local[:, inner]
         rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
         matrix = np.zeros((*local.shape, local.shape[1]))
         self._add_masses(matrix, self._masses[: local.shape[1]])
@@ -158,7 +162,7 @@ class Steps:
         rate = np.empty_like(velocity)
         rate[:, :3] = -self._solid.mass * GRAVITY * state.rotation[:, 2]
         rate[:, 3:6] = (turning[:, None] @ skew(spin))[:, 0]
-        rate[:, 6 : state.body] = -self._squares * state.modes - self._preload
+        rate[:, 6 : state.body] = -self._eigenvalues * state.modes - self._preload
         rate[:, state.body :] = self._forces[:, : int(state.pushed)]
         return momentum, rate
 

@@ -1,4 +1,4 @@
-"""Where bodies of a batch touch the floor, and the projectiles that push them."""
+"""Finds where bodies of a batch are in contact with the floor, and with the projectiles that push them."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.floor import Floor
 from odeform.mechanics.push import Push
+from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State
-from odeform.mechanics.turns import skew
 from odeform.mechanics.warping import Turning
 from odeform.types import Floats, Ints, Rotations
 
@@ -34,11 +34,11 @@ class Near:
     points: Float[np.ndarray, "batch 3 contacts"]
     """m at rest, from the mass centre."""
     rows: Float[np.ndarray, "batch 6 contacts directions"]
-    """What the directions of deformation do there, as in `Push`."""
+    """Displacements there by the directions of deformation, as in `Push`."""
     level: Float[np.ndarray, "batch floor"]
     """m, as in `Floor`."""
     springs: Float[np.ndarray, "4 batch contacts"]
-    """As of `Contacts`."""
+    """Parameters of springs, as in `Contacts`."""
 
     def contacts(self, state: State) -> Contacts:
         """Linearised about a state, in axes of the bodies, in which samples need no rotation."""
@@ -69,18 +69,20 @@ class Near:
 class Touching:
     """Finds where B pushed bodies may touch something."""
 
-    def __init__(self, push: Push, floor: Floor, law: ContactParameters, radius: float, reach: float) -> None:
+    def __init__(self, push: Push, floor: Floor, parameters: ContactParameters, radius: float, reach: float) -> None:
         """Spheres of `radius` m push for as long as states hold them; no sample of the support is farther than `reach`
         m from the mass centre."""
-        self._push, self._law, self._radius, self._level, self._reach = push, law, radius, floor.level, reach
+        self._push, self._parameters = push, parameters
+        self._radius, self._level, self._reach = radius, floor.level, reach
         batch, _, samples = push.points.shape
         self._springs = np.empty((4, batch, samples))
         stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
         mass = push.masses[:, push.support :]
-        stands[0], stands[1], stands[2] = floor.stiffness, law.floor_damping, law.floor_friction
-        stands[3] = law.floor_grip * push.masses[:, : push.support]
-        pushed[0], pushed[1], pushed[2] = law.push_stiffness * mass, law.push_damping, law.push_friction
-        pushed[3] = law.push_grip * mass
+        stands[0], stands[1], stands[2] = floor.stiffness, parameters.floor_damping, parameters.floor_friction
+        stands[3] = parameters.floor_regularisation * push.masses[:, : push.support]
+        pushed[0] = parameters.push_stiffness * mass
+        pushed[1], pushed[2] = parameters.push_damping, parameters.push_friction
+        pushed[3] = parameters.push_regularisation * mass
         self._first = samples * np.arange(batch)[:, None]  # of each body, among all samples
         self._row = samples * np.arange(6)[:, None]
 
@@ -92,13 +94,13 @@ class Touching:
         height = _heights(place[..., : push.support], self._level, state)
         spin = np.sqrt((state.velocity[:, 3:6] ** 2).sum(axis=1))
         down = np.minimum(state.velocity[:, 2] - self._reach * spin, 0.0)
-        stand, real = _nearest(height, MARGIN - (2.0 * step + self._law.floor_damping) * down, FLOOR)
+        stand, real = _nearest(height, MARGIN - (2.0 * step + self._parameters.floor_damping) * down, FLOOR)
         chosen = stand
         if state.pushed:
             away = place[..., push.support :] - _centre(push, state)
             distance = np.sqrt((away * away).sum(axis=1))
             speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
-            way = (2.0 * step + self._law.push_damping) * np.sqrt((speed * speed).sum(axis=1))
+            way = (2.0 * step + self._parameters.push_damping) * np.sqrt((speed * speed).sum(axis=1))
             pushed, touched = _nearest(distance, self._radius + MARGIN + way, PUSH)
             chosen = np.concatenate([stand, push.support + pushed], axis=1)
             real = np.concatenate([real, touched], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.sparse import csr_array
 
-from odeform.mechanics.turns import skew
+from odeform.mechanics.rotations import skew
 from odeform.types import Faces, Floats, Points
 
 __all__ = ["Turning", "surface_turns"]
@@ -43,7 +43,7 @@ class Turning:
         self._once, self._twice = np.sin(angle) / angle, 2.0 * half * half
 
     def warped(self, displacement: Float[np.ndarray, "*batch 3 points"]) -> Float[np.ndarray, "*batch 3 points"]:
-        """Where displacements of the modes, which do not turn with the points, take them."""
+        """Moves points by displacements of the modes, which do not turn with them."""
         turns, rest = self._turns, 1.0 - self._once
         cross = turns[..., AFTER, :] * displacement[..., BEFORE, :]
         cross -= turns[..., BEFORE, :] * displacement[..., AFTER, :]
@@ -52,7 +52,7 @@ class Turning:
 
     @property
     def rotations(self) -> Float[np.ndarray, "*batch points 3 3"]:
-        """Of each point, once it has moved."""
+        """Rotates each point, once it has moved."""
         turns = self._turns.swapaxes(-1, -2)
         once, twice = self._once.swapaxes(-1, -2), self._twice.swapaxes(-1, -2)
         out = (twice * turns)[..., None] * turns[..., None, :]

@@ -197,7 +197,7 @@ class _Frames:
                 self._frames.append(self._dynamics.next(before, now, self._theta))
             kept = np.stack(self._frames, axis=1)
         four = [kept[:, index + k] for k in range(4)]
-        y = catmull_rom(*four, share=(frames - index)[:, None])
+        y = catmull_rom(*four, fraction=(frames - index)[:, None])
         return y.reshape(*self._batch, *y.shape[1:])
 
 

@@ -167,7 +167,7 @@ class Motion(Remade, ABC):
         return self.trust.error_band(self.parameters, times) if known else None
 
     def stop_at(self, time: float) -> Stop | None:
-        """What is shown in place of `time` in seconds, and why; None where that moment itself is shown."""
+        """Says what is shown in place of `time` in seconds, and why; None where that moment itself is shown."""
         clock = float(self.schema.window.soft_clamped(np.array(time)))
         return None if self.watch is None else self.watch.stop_at(clock)
 
@@ -178,7 +178,8 @@ class Motion(Remade, ABC):
 
     @cached_property
     def status(self) -> str:
-        """That of the solver, and from where on the motion is not physically possible; "ok" if neither says more."""
+        """Says the solver's status, and from where on the motion is not physically possible; "ok" if neither says
+        more."""
         stop, solver = self.first_stop(), self.stats.status
         if stop is None:
             return solver

@@ -36,7 +36,7 @@ class BatchTrajectory(Protocol):
 
 
 class AdjustedBatch:
-    """As `Adjusted`, of many motions: the adjustment is that of coordinates (B, T, n)."""
+    """Adjusts many motions as `Adjusted` does one: the adjustment is that of coordinates (B, T, n)."""
 
     def __init__(self, own: BatchTrajectory, adjust: Adjustment) -> None:
         self.own, self._adjust = own, adjust
@@ -57,7 +57,7 @@ class AdjustedBatch:
 
 
 class PiecewiseBatch:
-    """As `Piecewise`, of many motions."""
+    """Joins pieces of many motions as `Piecewise` does of one."""
 
     def __init__(self, own: BatchTrajectory, stop: float, make_later: Callable[[], BatchTrajectory]) -> None:
         """`make_later` is called at most once; what it returns is asked for times after `stop` only."""

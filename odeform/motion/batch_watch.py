@@ -1,4 +1,4 @@
-"""Which of many motions are physically possible up to a time; the others are watched one by one (`watch.py`)."""
+"""Finds which of many motions are physically possible up to a time; the others are watched one by one (`watch.py`)."""
 
 from collections.abc import Callable
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""What one has to know of a motion before using it, in words."""
+"""Says in words what has to be known of a motion before using it."""
 
 import numpy as np
 

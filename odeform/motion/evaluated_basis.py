@@ -34,7 +34,7 @@ class EvaluatedBasis:
     """(4 + K, 3 N): shifts along the three axes, `rest`, and the modes. One product deforms and shifts a body."""
     reach: Float[np.ndarray, " modes"]
     """Largest displacement of any point by each mode."""
-    shares: Perpoint
+    areas: Perpoint
     """Share of the surface at each point."""
 
     @property
@@ -45,11 +45,11 @@ class EvaluatedBasis:
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:
         """Mean products of the modes over the surface: c gram c is the mean square displacement, m^2."""
-        shares, modes = np.repeat(self.shares, 3).astype(np.float32), len(self.values)
+        areas, modes = np.repeat(self.areas, 3).astype(np.float32), len(self.values)
         out = np.zeros((modes, modes))
-        for at in range(0, len(shares), CHUNK):
+        for at in range(0, len(areas), CHUNK):
             part = self.values[:, at : at + CHUNK]
-            out += (part * shares[at : at + CHUNK]) @ part.T
+            out += (part * areas[at : at + CHUNK]) @ part.T
         return out.astype(np.float32)
 
     @cached_property

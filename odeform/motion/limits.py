@@ -1,4 +1,4 @@
-"""What no motion of a body in a scene can do: the bounds that predicted motions are held to."""
+"""Bounds what a motion of a body in a scene can do."""
 
 from dataclasses import dataclass
 

@@ -57,7 +57,7 @@ class MotionBatch(Remade, Sequence[Motion]):
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """By name, values (B,) in the units of the schema; the object is one name."""
+        """Parameters by name: values (B,) in the units of the schema; the object is one name."""
         first = self._sets[0]
         return {
             name: value if isinstance(value, str) else np.array([given[name] for given in self._sets])

@@ -105,10 +105,10 @@ class PointFrame:
 
 @dataclass(frozen=True, eq=False)
 class Probes:
-    """`points` (M, 3) of the trained body, canonical, metres, and their `shares` (M,) of its surface."""
+    """`points` (M, 3) of the trained body, canonical, metres, and their `areas` (M,), fractions of its surface."""
 
     points: Float[np.ndarray, "probes 3"]
-    shares: Float[np.ndarray, " probes"]
+    areas: Float[np.ndarray, " probes"]
 
 
 def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
@@ -166,9 +166,9 @@ class PointMotion(Motion):
         return out
 
     def pose(self, t: float | Times) -> Pose:
-        moved, (points, shares) = self._displaced(self._body, t), (self._probes.points, self._probes.shares)
-        rotation, shift = best_rigid(points, points + moved, shares)
-        centre = shares @ points
+        moved, (points, areas) = self._displaced(self._body, t), (self._probes.points, self._probes.areas)
+        rotation, shift = best_rigid(points, points + moved, areas)
+        centre = areas @ points
         turned = self._turn @ rotation @ self._turn.T
         anchor = np.array(self._frame.anchor)
         out = np.zeros((len(moved), 4, 4))
@@ -197,11 +197,11 @@ class PointMotion(Motion):
         return float(np.linalg.norm(self.local(time), axis=1).max())
 
     def deformation_rms(self, times: Times) -> Times:
-        moved, (points, shares) = self._displaced(self._body, times), (self._probes.points, self._probes.shares)
-        rotation, shift = best_rigid(points, points + moved, shares)
-        centre = shares @ points
+        moved, (points, areas) = self._displaced(self._body, times), (self._probes.points, self._probes.areas)
+        rotation, shift = best_rigid(points, points + moved, areas)
+        centre = areas @ points
         back = np.einsum("tji,tnj->tni", rotation, points + moved - (centre + shift)[:, None])
-        return np.sqrt(((back - (points - centre)) ** 2).sum(axis=2) @ shares)
+        return np.sqrt(((back - (points - centre)) ** 2).sum(axis=2) @ areas)
 
     def _displaced(self, trajectory: PointTrajectory, t: float | Times) -> Frames:
         """(T, N, 3) metres, canonical, float32; (1, N, 3) for a single time."""
@@ -214,7 +214,7 @@ class PointMotion(Motion):
 
         # without this motion: what refers to itself stays until Python looks for cycles, and motions are large
         def sample(times: Times) -> Sample:
-            """Of the probes. Deformations are bounded by construction."""
+            """Samples the probes. Deformations are bounded by construction."""
             moved = probes.points + _predicted(body, mean, frame, times) + np.array(frame.anchor)
             return Sample(moved[..., 2].min(axis=1), np.zeros(len(times)), moved.mean(axis=1))
 

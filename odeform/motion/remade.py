@@ -7,7 +7,8 @@ __all__ = ["Remade"]
 
 
 class Remade:
-    """What `made_by` (a function and its arguments) returned. Pickles and copies hold these, and call it again."""
+    """Holds what `made_by` (a function and its arguments) returned. Pickles and copies hold these, and call it
+    again."""
 
     made_by: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
 

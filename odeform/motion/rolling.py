@@ -38,7 +38,7 @@ class Rolling:
         return self.harmonics.shape[2]
 
     def first(self, count: int) -> "Rolling":
-        """With the first `count` patterns."""
+        """Keeps the first `count` patterns."""
         return replace(self, harmonics=self.harmonics[..., :count])
 
     def angles(self, vectors: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch"]:

@@ -1,4 +1,4 @@
-"""What is known of how far motions of a model can be trusted: the bodies it was trained on, and physical limits."""
+"""Holds what is known of the validity of a model's motions: the bodies it was trained on, and physical limits."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

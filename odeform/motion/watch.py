@@ -73,7 +73,7 @@ class Watch:
         return self._recent.get(times.tobytes(), lambda: self._held(times))
 
     def stop_at(self, time: float) -> Stop | None:
-        """What is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
+        """Says what is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
         if time > self._window.stop:
             return self._after_window(time)
         return self._last_sound(time) if time > self._window.start and self._faults(np.array([time]))[0] else None

@@ -66,5 +66,5 @@ class LinearlyImplicit:
     knows_middle: bool = False
 
     def stepper(self, start: Any) -> _Stepper:
-        """For states like `start`, an array (n,)."""
+        """Makes the step for states like `start`, an array (n,)."""
         return _Stepper()

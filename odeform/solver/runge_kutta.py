@@ -124,5 +124,5 @@ class ExplicitRungeKutta:
         return self.tableau.middle is not None
 
     def stepper(self, start: Any) -> Stages:
-        """For states like `start`, an array (n,)."""
+        """Makes the step for states like `start`, an array (n,)."""
         return Stages(self.tableau, start)

@@ -23,7 +23,7 @@ class Tableau:
     b: Row
     """(s,) weights of the slopes in the step."""
     c: Row
-    """(s,) nodes, as a share of the step."""
+    """(s,) nodes, as a fraction of the step."""
     embedded: Row | None = None
     """(s,) weights of the embedded method, whose difference to `b` estimates the error of a step."""
     fsal: bool = False

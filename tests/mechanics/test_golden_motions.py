@@ -23,14 +23,14 @@ from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats
 
 CONTACT = ContactParameters(
-    sink=6e-5,
+    static_penetration=6e-5,
     floor_damping=4e-3,
     floor_friction=0.45,
-    floor_grip=2.5e3,
+    floor_regularisation=2.5e3,
     push_stiffness=4.5e5,
     push_damping=6e-3,
     push_friction=0.4,
-    push_grip=7.5e3,
+    push_regularisation=7.5e3,
     stiffness=0.95,
     damping=1.15,
 )
@@ -59,7 +59,7 @@ def reduced(name: str) -> ReducedBody:
     points, shapes = item.settled[surface] - masses @ item.settled / masses.sum(), modes.shapes[:, surface]
     turns = surface_turns(points, item.faces, shapes.transpose(1, 2, 0))
     solid = solid_of(item.settled, masses, material.damping)
-    return reduce_body(points, item.faces, shapes, turns, modes.squares, solid)
+    return reduce_body(points, item.faces, shapes, turns, modes.eigenvalues, solid)
 
 
 def pushed(name: str) -> Floats:
@@ -73,7 +73,7 @@ def pushed(name: str) -> Floats:
     end = push_body(Mechanics(body, CONTACT, SPHERE), push, 0.03, 0.06, 1e-3).states[-1]
     turn = Rotation.from_matrix(end.rotation[0]).as_rotvec()
     bent = np.linalg.norm(end.modes[0]) / np.sqrt(body.solid.mass)
-    hertz = np.sqrt(body.squares[:3]) / (2.0 * np.pi)
+    hertz = np.sqrt(body.eigenvalues[:3]) / (2.0 * np.pi)
     return np.concatenate([1e3 * end.shift[0], 1e3 * turn, [1e3 * bent], hertz])
 
 

@@ -100,9 +100,9 @@ def test_the_chip_vibrates_as_its_simulation_does() -> None:
     shell = material.young, material.poisson, material.thickness
     stiffness = tangent_stiffness(chip.points, chip.elements, chip.settled, *shell)
     modes = elastic_modes(stiffness, chip.masses, chip.settled, 6)
-    assert np.sqrt(modes.squares[0]) / (2.0 * np.pi) == pytest.approx(32.37, abs=0.05)
+    assert np.sqrt(modes.eigenvalues[0]) / (2.0 * np.pi) == pytest.approx(32.37, abs=0.05)
     force = simulated_force(chip.points, chip.elements, *shell, "both")
-    for square, shape in zip(modes.squares, modes.shapes, strict=True):
+    for square, shape in zip(modes.eigenvalues, modes.shapes, strict=True):
         pull = slope(force, chip.settled, shape)
         assert (shape * pull).sum() == pytest.approx(square, rel=1e-6)
         np.testing.assert_allclose(pull, square * chip.masses[:, None] * shape, atol=2e-2 * np.abs(pull).max())

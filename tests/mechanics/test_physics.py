@@ -27,12 +27,12 @@ def pushed_at_the_side(block: Block, force: float) -> Push:
 class Free:
     """The block without a projectile, in steps of `step` seconds."""
 
-    def __init__(self, block: Block, law: ContactParameters, step: float) -> None:
-        self.mechanics, self.push = Mechanics(block.body, law, SPHERE), pushed_at_the_side(block, 0.0)
+    def __init__(self, block: Block, parameters: ContactParameters, step: float) -> None:
+        self.mechanics, self.push = Mechanics(block.body, parameters, SPHERE), pushed_at_the_side(block, 0.0)
         self.steps, self.step = Steps(self.mechanics, self.push), step
 
     def state(self, shift: Vector, turn: Vector, speed: Vector, spin: Vector, bent: Floats | None = None) -> State:
-        size = self.push.squares.shape[1]
+        size = self.push.eigenvalues.shape[1]
         amplitudes = np.zeros(size) if bent is None else bent
         velocity = np.concatenate([speed, spin, np.zeros(size)])
         rotation = Rotation.from_rotvec(turn).as_matrix()
@@ -46,7 +46,8 @@ class Free:
     @property
     def modal(self) -> tuple[Floats, Floats]:
         """Stiffness (K,) of the directions, and the force (K,) that bends them at rest."""
-        return self.mechanics.law.stiffness * self.push.squares[0], self.mechanics.floor.preload @ self.push.modes[0]
+        stiffness = self.mechanics.parameters.stiffness * self.push.eigenvalues[0]
+        return stiffness, self.mechanics.floor.preload @ self.push.modes[0]
 
     def energy(self, state: State) -> float:
         """Joule, without that in springs of contacts."""
@@ -101,7 +102,9 @@ def test_a_thrown_body_falls_freely_and_its_modes_vibrate(block: Block) -> None:
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.3, 0.2, 0.0]])
 def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[float]) -> None:
     """Also on an edge, where most of it goes into spin."""
-    free = Free(block, ContactParameters(sink=2e-3, floor_damping=0.0, damping=0.0, floor_friction=0.0), 4e-4)
+    free = Free(
+        block, ContactParameters(static_penetration=2e-3, floor_damping=0.0, damping=0.0, floor_friction=0.0), 4e-4
+    )
     stiff, preload = free.modal
     start = free.state(
         np.array([0.0, 0.0, 0.03]), np.array(turn), np.array([0.1, 0.2, -0.5]), NOTHING, -preload / stiff
@@ -111,7 +114,7 @@ def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[floa
     assert end.velocity[0, 2] > 0.2
     assert abs(free.energy(end) - free.energy(start)) < 2e-3 * falling
     np.testing.assert_allclose(end.velocity[0, :2], [0.1, 0.2], atol=1e-9)  # no friction
-    lossy = Free(block, ContactParameters(sink=2e-3, damping=0.0, floor_friction=0.0), 4e-4)
+    lossy = Free(block, ContactParameters(static_penetration=2e-3, damping=0.0, floor_friction=0.0), 4e-4)
     assert free.energy(lossy.after(start, 0.12)) < free.energy(start) - 0.1 * falling
 
 
@@ -129,8 +132,8 @@ def test_a_sliding_body_stops_after_the_distance_of_coulomb(block: Block, fricti
 
 @pytest.mark.parametrize("friction", [0.2, 0.3])
 def test_a_body_slides_once_it_is_pushed_harder_than_friction_holds(block: Block, friction: float) -> None:
-    law = ContactParameters(floor_friction=friction, push_friction=0.0)
-    mechanics, mass = Mechanics(block.body, law, SPHERE), block.body.solid.mass
+    parameters = ContactParameters(floor_friction=friction, push_friction=0.0)
+    mechanics, mass = Mechanics(block.body, parameters, SPHERE), block.body.solid.mass
     limit = friction * mass * GRAVITY
 
     def speeds(share: float) -> Floats:
@@ -140,7 +143,9 @@ def test_a_body_slides_once_it_is_pushed_harder_than_friction_holds(block: Block
 
     # slow sliding: so fast that the friction of all that stands on the floor, limited and viscous, holds the force
     low = block.body.support.points[:, 2].min()
-    viscous = law.floor_grip * block.body.support.masses[block.body.support.points[:, 2] < low + 1e-6].sum()
+    viscous = (
+        parameters.floor_regularisation * block.body.support.masses[block.body.support.points[:, 2] < low + 1e-6].sum()
+    )
     assert speeds(0.5)[-1] == pytest.approx(0.5 / np.sqrt(0.75) * limit / viscous, rel=0.03)
     assert speeds(0.9)[-1] < 0.01
     gained = speeds(1.2)
@@ -150,8 +155,8 @@ def test_a_body_slides_once_it_is_pushed_harder_than_friction_holds(block: Block
 @pytest.mark.parametrize("friction", [0.25, 0.5])
 def test_a_sphere_rubs_along_what_it_pushes(block: Block, friction: float) -> None:
     """Pushed at a slant, the side of the body resists along the normal, and across it up to Coulomb's limit."""
-    law = ContactParameters(floor_friction=0.0, push_friction=friction)
-    mechanics = Mechanics(block.body, law, SPHERE)
+    parameters = ContactParameters(floor_friction=0.0, push_friction=friction)
+    mechanics = Mechanics(block.body, parameters, SPHERE)
     across = np.array([0.0, 1.0, 0.0])
     force = 2.0 * np.array([np.sin(0.6), -np.cos(0.6), 0.0])
     push = make_push(block.body, 5, SIDE[None], (SIDE + SPHERE.radius * across)[None], force[None])
@@ -160,11 +165,11 @@ def test_a_sphere_rubs_along_what_it_pushes(block: Block, friction: float) -> No
     assert -pushed[0] / pushed[1] == pytest.approx(friction, rel=0.07)
 
 
-@pytest.mark.parametrize("sink", [5e-5, 1e-4])
-def test_a_block_sinks_as_far_as_its_springs_give(block: Block, sink: float) -> None:
-    floor, support = stand(block.body, ContactParameters(sink=sink)), block.body.support
+@pytest.mark.parametrize("depth", [5e-5, 1e-4])
+def test_a_block_sinks_as_far_as_its_springs_give(block: Block, depth: float) -> None:
+    floor, support = stand(block.body, ContactParameters(static_penetration=depth)), block.body.support
     weight = block.body.solid.mass * GRAVITY
-    assert floor.stiffness.sum() == pytest.approx(4.0 * weight / sink)
+    assert floor.stiffness.sum() == pytest.approx(4.0 * weight / depth)
     depth = np.maximum(-(support.points[:, 2] + floor.level), 0.0)
     bottom = support.points[:, 2] < support.points[:, 2].min() + 1e-6
     np.testing.assert_allclose(depth[bottom], weight / floor.stiffness[bottom].sum(), rtol=1e-5)
@@ -177,7 +182,10 @@ def test_springs_balance_a_body_that_leans(block: Block) -> None:
     support = block.body.support
     uneven = support.masses * (1.0 + 8.0 * support.points[:, 0])
     body = type(block.body)(
-        block.body.solid, block.body.squares, type(support)(support.points, support.rows, uneven), block.body.surface
+        block.body.solid,
+        block.body.eigenvalues,
+        type(support)(support.points, support.rows, uneven),
+        block.body.surface,
     )
     floor = stand(body, ContactParameters())
     force = floor.stiffness * np.maximum(-(support.points[:, 2] + floor.level), 0.0)

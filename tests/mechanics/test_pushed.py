@@ -18,9 +18,9 @@ SPHERE = Projectile(0.012, 0.020)
 SOFT = 5  # of the block's 12 modes
 
 
-def pushed(block: Block, force: np.ndarray, law: ContactParameters | None = None) -> PushedBody:
+def pushed(block: Block, force: np.ndarray, parameters: ContactParameters | None = None) -> PushedBody:
     """A block that is pushed from the right."""
-    mechanics = Mechanics(block.body, law or ContactParameters(), SPHERE)
+    mechanics = Mechanics(block.body, parameters or ContactParameters(), SPHERE)
     push = make_push(block.body, SOFT, CONTACT[None], CONTACT[None] + 0.012 * NORMAL, force[None])
     return PushedBody(mechanics, push, PULSE)
 
@@ -120,11 +120,11 @@ def test_without_a_force_the_guide_points_at_the_contact(block: Block) -> None:
 
 def test_directions_of_deformation_vibrate_independently(block: Block) -> None:
     push = pushed(block, -2.0 * NORMAL).push
-    (modes,), (squares,) = push.modes, push.squares
+    (modes,), (squares,) = push.modes, push.eigenvalues
     np.testing.assert_allclose(modes.T @ modes, np.eye(len(squares)), atol=1e-9)
-    stiffness = modes.T @ (block.body.squares[:, None] * modes)
+    stiffness = modes.T @ (block.body.eigenvalues[:, None] * modes)
     np.testing.assert_allclose(stiffness, np.diag(squares), atol=1e-9 * squares.max())
-    np.testing.assert_array_equal(squares[:SOFT], block.body.squares[:SOFT])
+    np.testing.assert_array_equal(squares[:SOFT], block.body.eigenvalues[:SOFT])
 
 
 def test_directions_yield_at_the_contact_as_all_modes_do(block: Block) -> None:
@@ -132,9 +132,9 @@ def test_directions_yield_at_the_contact_as_all_modes_do(block: Block) -> None:
     push, body = pushed(block, -2.0 * NORMAL).push, block.body
     patch = body.surface.masses * np.exp(-((body.surface.points - CONTACT) ** 2).sum(axis=1) / WIDTHS[0] ** 2)
     load = np.einsum("s,sik->ik", patch / patch.sum(), body.surface.modes)
-    all_modes = (load / body.squares) @ load.T
+    all_modes = (load / body.eigenvalues) @ load.T
     mine = load @ push.modes[0]
-    np.testing.assert_allclose((mine / push.squares[0]) @ mine.T, all_modes, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose((mine / push.eigenvalues[0]) @ mine.T, all_modes, rtol=1e-9, atol=1e-12)
 
 
 def test_motions_do_not_depend_on_the_batch(block: Block) -> None:

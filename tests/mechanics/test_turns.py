@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.spatial.transform import Rotation
 
-from odeform.mechanics.turns import skew, turn, turned
+from odeform.mechanics.rotations import skew, turn, turned
 
 VECTORS = arrays.arrays(float, (3, 3), elements=st.floats(-1.0, 1.0))
 

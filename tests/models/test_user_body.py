@@ -35,7 +35,7 @@ def pushed(name: str) -> Pushes:
 
 @pytest.fixture(scope="module")
 def trained() -> PerObject:
-    """A model of the donut, with the law as it is before training."""
+    """A model of the donut, with the contact parameters as it is before training."""
     schema = replace(SCENE.schema, objects=("donut",))
     part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE)
     part = replace(part, config={**part.config, "largest": (0.5, 0.1)})

@@ -77,8 +77,8 @@ def test_the_mean_motion_is_added_and_held() -> None:
 
 def test_probes_are_spread_and_share_the_surface() -> None:
     probes = evaluate_probes(ball(), ANCHOR, 60)
-    assert probes.shares.sum() == pytest.approx(1.0)
-    assert probes.shares.max() < 3.0 / 60
+    assert probes.areas.sum() == pytest.approx(1.0)
+    assert probes.areas.max() < 3.0 / 60
     apart = np.linalg.norm(probes.points[:, None] - probes.points, axis=2) + np.eye(60)
     assert apart.min() > 0.02
     assert len(evaluate_probes(ball(0), ANCHOR).points) == 12

@@ -21,7 +21,7 @@ def trained(dataset: Dataset, out: Path, *without: str) -> LatentModel:
 
 @pytest.mark.slow
 def test_without_an_ode_the_state_stays(dataset: Dataset, tmp_path: Path) -> None:
-    model = trained(dataset, tmp_path / "a.safetensors", "ode", "correction")
+    model = trained(dataset, tmp_path / "a.safetensors", "ode", "residual")
     theta = np.zeros(model.config.parameters)
     field, start, *_ = model.problem(theta, model.evaluate_basis(model.rest, 0.0), np.float64)
     assert not field(0.1, start + 1.0).any()
@@ -30,7 +30,7 @@ def test_without_an_ode_the_state_stays(dataset: Dataset, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_without_conditions_decoders_know_states_alone(dataset: Dataset, tmp_path: Path) -> None:
-    model = trained(dataset, tmp_path / "a.safetensors", "clock", "parameters", "correction")
+    model = trained(dataset, tmp_path / "a.safetensors", "clock", "parameters", "residual")
     states, body = np.ones((5, model.config.state)), model.evaluate_basis(model.rest, 0.0)
     times, thetas = np.linspace(0.1, 0.9, 5), [np.full(model.config.parameters, value) for value in (-0.3, 0.6)]
     readouts = [model.problem(theta, body, np.float64).readout for theta in thetas]
@@ -49,7 +49,7 @@ def test_bad_requests() -> None:
         TrainRequest(without=("wings",))
     with pytest.raises(InputError, match="without 'ode': gp has no such parts"):
         TrainRequest("gp", without=("ode",))
-    with pytest.raises(InputError, match="without 'clock': rolling has network, corners, correction"):
+    with pytest.raises(InputError, match="without 'clock': rolling has network, corners, residual"):
         TrainRequest("rolling", without=("clock",))
     with pytest.raises(InputError, match="sequences: expected a positive number"):
         TrainRequest(sequences=0)

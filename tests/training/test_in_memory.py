@@ -183,7 +183,7 @@ def test_a_loss_sees_metres(model: str, monkeypatch: pytest.MonkeyPatch) -> None
         assert predicted.shape[:-1] == weights.shape
         return (weights[..., None] * (predicted - truth).abs()).mean()
 
-    without = ("random-features", "correction") if model == "latent" else ()
+    without = ("random-features", "residual") if model == "latent" else ()
     odeform.fit(balls(), model, steps=3, loss=loss, without=without, report=quiet)
     assert 0.02 < max(largest) < 0.2  # bodies move by up to 0.1 m, 0.05 of it in the mean
 

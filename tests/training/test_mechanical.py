@@ -1,4 +1,4 @@
-"""Training of the mechanical model on motions whose law is known."""
+"""Training of the mechanical model on motions whose contact_parameters is known."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +16,9 @@ from odeform.mechanics.step import Projectile
 from odeform.models.modal.coordinates import coordinates_of
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.model import ModalModel
-from odeform.models.modal.training import contact_fit as mechanical_law
+from odeform.models.modal.training import contact_fit as contact_fit
 from odeform.models.modal.training import fit as mechanical
-from odeform.models.modal.training.contact_fit import fit_law, relative_errors
+from odeform.models.modal.training.contact_fit import fit_contact_parameters, relative_errors
 from odeform.models.modal.training.parameter_cache import SHARED, ParameterCache
 from odeform.models.modal.training.pushes import Pushes
 from odeform.models.per_object import PerObject
@@ -28,7 +28,7 @@ from odeform.simulation.scenes.contact_force import PULSE, SCENE
 from odeform.training.train import train
 from odeform.types import MotionSequence
 
-LAW = ContactParameters(floor_friction=0.6, stiffness=0.8)
+PARAMETERS = ContactParameters(floor_friction=0.6, stiffness=0.8)
 SPHERE = Projectile(RADIUS, SCENE.fixed["projectile_mass_kg"])
 SPLITS = ("train", "train", "train", "val", "test")
 
@@ -41,7 +41,7 @@ def drawn() -> list[dict]:
 
 @pytest.fixture(scope="module")
 def motions(drawn: list[dict]) -> Pushes:
-    """Pushes of the donut as the law has them, truth included."""
+    """Pushes of the donut as the contact parameters have them, truth included."""
     body = elastic_body(get_object("donut"), 12, 8)
     contacts, forces = (np.array([[d[f"{kind}_{a}"] for a in "xyz"] for d in drawn]) for kind in ("contact", "force"))
     normals = -forces / np.linalg.norm(forces, axis=1, keepdims=True)
@@ -49,7 +49,7 @@ def motions(drawn: list[dict]) -> Pushes:
     times = np.arange(20) / 100.0
     empty = np.zeros((len(drawn), len(times), 18))
     pushes = Pushes(body, contacts, normals, contacts + RADIUS * normals, forces, SPHERE, times, empty, empty[..., 0])
-    return replace(pushes, reduced=pushes.predicted(LAW, PULSE, 2.5e-3))
+    return replace(pushes, reduced=pushes.predicted(PARAMETERS, PULSE, 2.5e-3))
 
 
 @pytest.mark.slow
@@ -57,11 +57,11 @@ def test_the_law_is_found_again(motions: Pushes) -> None:
     start = ContactParameters()
     before = np.square(relative_errors(motions, motions.predicted(start, PULSE, 2.5e-3))).sum()
     names = ("floor_friction", "stiffness")
-    found = fit_law([motions], PULSE, start, names, lambda _: None)
+    found = fit_contact_parameters([motions], PULSE, start, names, lambda _: None)
     after = np.square(relative_errors(motions, motions.predicted(found, PULSE, 2.5e-3))).sum()
     assert after < 1e-3 * before
-    assert found.floor_friction == pytest.approx(LAW.floor_friction, rel=0.02)
-    assert found.stiffness == pytest.approx(LAW.stiffness, rel=0.02)
+    assert found.floor_friction == pytest.approx(PARAMETERS.floor_friction, rel=0.02)
+    assert found.stiffness == pytest.approx(PARAMETERS.stiffness, rel=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def dataset(motions: Pushes, drawn: list[dict]) -> Dataset:
 def test_a_trained_checkpoint_predicts_pushes(
     dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mechanical_law, "EVALUATIONS", 1)  # fewer than it takes to learn
+    monkeypatch.setattr(contact_fit, "EVALUATIONS", 1)  # fewer than it takes to learn
     predictor = train(dataset, tmp_path / "model.safetensors", report=lambda _: None)
     assert isinstance(predictor, PerObject)
     assert set(predictor.qualities) == {"draft", "balanced", "reference"}
@@ -112,21 +112,21 @@ def test_a_trained_checkpoint_predicts_pushes(
 @pytest.mark.slow
 def test_finished_laws_are_not_fitted_again(dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "model.safetensors"
-    laws = ParameterCache(tmp_path / "model.safetensors.part", dataset, 0)
-    laws.add(SHARED, ContactParameters())
-    laws.add("donut", LAW)
+    known_parameters = ParameterCache(tmp_path / "model.safetensors.part", dataset, 0)
+    known_parameters.add(SHARED, ContactParameters())
+    known_parameters.add("donut", PARAMETERS)
 
     def fit(*given: object, **more: object) -> None:
         raise AssertionError("it is finished")
 
-    monkeypatch.setattr(mechanical, "fit_law", fit)
-    predictor = train(dataset, out, without=["correction"], resume=True, report=lambda _: None)
+    monkeypatch.setattr(mechanical, "fit_contact_parameters", fit)
+    predictor = train(dataset, out, without=["residual"], resume=True, report=lambda _: None)
     assert isinstance(predictor, PerObject)
     part = predictor.parts["donut"]
     assert isinstance(part, ModalModel)
-    assert part.law == LAW
+    assert part.contact_parameters == PARAMETERS
     assert part.residual is None
-    assert not laws.path.exists(), "it is of no use any more"
+    assert not known_parameters.path.exists(), "it is of no use any more"
 
 
 @pytest.mark.parametrize(
@@ -149,12 +149,12 @@ def test_frames_after_the_window_are_not_trained_on(
 ) -> None:
     seen = []
 
-    def fit(given: Dataset, laws: ParameterCache, seed: int, report: object, correct: bool) -> None:
-        seen.append((given.schema.window.stop, seed, correct))
+    def fit(given: Dataset, known_parameters: ParameterCache, seed: int, report: object, with_residual: bool) -> None:
+        seen.append((given.schema.window.stop, seed, with_residual))
         raise InputError("enough")
 
     monkeypatch.setattr(mechanical, "fit_mechanical", fit)
-    asked: tuple[dict[str, Any], ...] = ({"window": (0, 11)}, {}, {"without": ["correction"]})
+    asked: tuple[dict[str, Any], ...] = ({"window": (0, 11)}, {}, {"without": ["residual"]})
     for options in asked:
         with pytest.raises(InputError, match="enough"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)
@@ -162,5 +162,5 @@ def test_frames_after_the_window_are_not_trained_on(
     assert seen == [(0.1, 0, True), (whole, 0, True), (whole, 0, False)]
     refused: tuple[dict[str, Any], ...] = ({"every": 2}, {"steps": 10}, {"without": ["ode"]})
     for options in refused:
-        with pytest.raises(InputError, match=r"expected no --every|modal has correction"):
+        with pytest.raises(InputError, match=r"expected no --every|modal has residual"):
             train(dataset, tmp_path / "model.safetensors", report=lambda _: None, **options)

@@ -18,7 +18,7 @@ import numpy as np
 
 from odeform.checkpoint import write_checkpoint
 from odeform.errors import InputError
-from odeform.io import atomic_write, write_or_print
+from odeform.io import atomic_write
 from odeform.models.base import Predictor
 from odeform.models.error_band import OUTSIDE
 from odeform.models.registry import load, load_model
@@ -27,6 +27,7 @@ from odeform.parallel import parallel_map
 from odeform.schema import Parameter, Parameters, Schema
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames, PointCloud
+from odeform_figures.output import write_or_print
 
 __all__ = ["Outside", "compared", "fitted", "outside", "summary"]
 

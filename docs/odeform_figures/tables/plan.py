@@ -49,13 +49,13 @@ SCORED_PUSHES = {"pe-gnn": (FINAL,), **dict.fromkeys(("odeform", *SOLVED), (FRAM
 FEWER = {DROP: (44, 88, 175), "kick": (63, 126, 253), FORCE: (25, 50, 100)}
 """Training sequences of the learning curve, of each object: about an eighth, a quarter and a half of all."""
 ABLATED = {
-    (OURS, DROP): ((), ("correction",), ("network",)),
-    (OURS, "kick"): ((), ("correction",), ("network",), ("corners",)),
+    (OURS, DROP): ((), ("residual",), ("network",)),
+    (OURS, "kick"): ((), ("residual",), ("network",), ("corners",)),
     (LATENT, DROP): (
         (),
-        ("correction",),
-        *((*parts, "correction") for parts in (("ode",), ("clock",), ("parameters",), ("clock", "parameters"))),
-        ("random-features", "correction"),
+        ("residual",),
+        *((*parts, "residual") for parts in (("ode",), ("clock",), ("parameters",), ("clock", "parameters"))),
+        ("random-features", "residual"),
     ),
 }
 """Parts that ablations leave out, by model and scene. Of the latent ODE, the regression of what is left would hide what

@@ -10,7 +10,7 @@ __all__ = ["ablations", "learning_curve"]
 
 PAIR = ("RMSE", "deformation, %")
 LABELS = {
-    "correction": "the regression of what is left",
+    "residual": "the regression of what is left",
     "ode": "the ODE: states stay as they start",
     "clock": "the clock of the decoders",
     "parameters": "the parameters of the decoders",

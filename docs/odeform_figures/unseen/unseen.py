@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from odeform.models.modal.user_body import UserBodyPredictor, resting_body, take
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load
 from odeform_figures.unseen.instances import factors_of
-from odeform_figures.unseen.left_out import law_without, left_out_shape, without
+from odeform_figures.unseen.left_out import contact_parameters_without, left_out_shape, without
 from odeform_figures.unseen.measure import Measured, measure
 from odeform_figures.unseen.shapes import INSTANCE, LEFT_OUT, SCAN, UnseenShape, instance, scan, shape_file, simulated
 
@@ -35,7 +35,7 @@ class Plan:
     """Settings of what is measured."""
 
     keep: Path
-    """Folder of simulated motions and laws; what it holds is not made again."""
+    """Folder of simulated motions and contact parameters; what it holds is not made again."""
     pushes: int = 10
     """Number of pushes of each shape."""
     seed: int = 0
@@ -46,7 +46,7 @@ class Plan:
     """Training data, to leave one class out; None: this is not measured."""
     workers: int | None = None
     kept_only: bool = False
-    """Whether shapes and laws that the folder does not hold are left out instead of made."""
+    """Whether shapes and contact parameters that the folder does not hold are left out instead of made."""
 
 
 def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def _shapes(trained: PerObject, plan: Plan) -> Iterator[tuple[UnseenShape, PerOb
         for name in trained.parts:
             path = plan.keep / f"law-without-{name}.json"
             if _wanted(plan, path):
-                model = without(trained, name, _law(trained, dataset, name, path))
+                model = without(trained, name, _contact_parameters(trained, dataset, name, path))
                 yield left_out_shape(dataset, name, model), model
 
 
@@ -119,11 +119,11 @@ def _kept(plan: Plan, key: str, make: Callable[[], UnseenShape]) -> UnseenShape:
     return simulated(_file(plan, key), make, plan.pushes, plan.seed, plan.workers)
 
 
-def _law(trained: PerObject, dataset: Dataset, name: str, path: Path) -> ContactParameters:
+def _contact_parameters(trained: PerObject, dataset: Dataset, name: str, path: Path) -> ContactParameters:
     if not path.exists():
-        law = law_without(trained, dataset, name, print)
-        atomic_write(path, json.dumps(asdict(law), indent=1).encode())
-    return ContactParameters(**json.loads(path.read_text()))
+        contact_parameters = contact_parameters_without(trained, dataset, name, print)
+        atomic_write(path, json.dumps(contact_parameters.to_json(), indent=1).encode())
+    return ContactParameters.from_json(json.loads(path.read_text()))
 
 
 def _measured(model: PerObject, shape: UnseenShape) -> Measured:

@@ -51,7 +51,7 @@ class LatentModel(Model):
         "clock": "decoders are not conditioned on time",
         "parameters": "decoders are not conditioned on parameters",
         "random-features": "decoders have trained features only",
-        "correction": "what is left unexplained is not regressed",
+        "residual": "what is left unexplained is not regressed",
     }
 
     @classmethod
@@ -76,7 +76,7 @@ class LatentModel(Model):
     def _pool(self, evaluated: EvaluatedBasis) -> list[Floats]:
         def pooled() -> tuple[EvaluatedBasis, list[Floats]]:
             points = evaluated.rest.astype(float) / self.space.gyration_radius
-            return evaluated, pool_shape(self.weights, self.config, points, evaluated.shares)
+            return evaluated, pool_shape(self.weights, self.config, points, evaluated.areas)
 
         return self._pooled.get(id(evaluated), pooled)[1]
 

@@ -1,4 +1,4 @@
-"""What the mechanics of a trained body leaves unexplained, regressed on the push."""
+"""Regresses what the mechanics of a trained body leaves unexplained on the push."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""From the states of the mechanics to reduced coordinates, and the basis of deformations that goes with them."""
+"""Maps the states of the mechanics to reduced coordinates, and makes the basis of deformations that goes with them."""
 
 from dataclasses import dataclass, replace
 
@@ -24,10 +24,10 @@ class Coordinates:
 
     shifts: Float[np.ndarray, "3 modes"]
     """m per root kg m, in axes of the body."""
-    turns: Float[np.ndarray, "3 modes"]
+    modal_rotations: Float[np.ndarray, "3 modes"]
     """rad per root kg m."""
     coefficients: Float[np.ndarray, "basis modes"]
-    """Of the basis of deformations, which is orthonormal under the weights of the surface."""
+    """Coefficients of the basis of deformations, which is orthonormal under the weights of the surface."""
     arcs: Float[np.ndarray, "pairs y"]
     """(P, 6 + B): the second order of modal warping, by the products of two amplitudes, i <= j < K."""
     pairs: tuple[Ints, Ints]
@@ -35,14 +35,14 @@ class Coordinates:
 
     def along(self, directions: Float[np.ndarray, "modes directions"]) -> "Coordinates":
         """The same maps from amplitudes of directions of deformation, whose first K are modes themselves."""
-        maps = {name: getattr(self, name) @ directions for name in ("shifts", "turns", "coefficients")}
+        maps = {name: getattr(self, name) @ directions for name in ("shifts", "modal_rotations", "coefficients")}
         return replace(self, **maps)
 
     def reduced(self, shift: Vectors, rotation: Rotations, modes: Floats) -> Float[np.ndarray, "times y"]:
         """(T, 6 + B): the body's motion as shift, rotation vector and coefficients, in m and radians."""
         one, other = self.pairs
         arcs = (modes[:, one] * modes[:, other]) @ self.arcs
-        turned = rotation @ rotation_from_vector(modes @ self.turns.T + arcs[:, 3:POSE])
+        turned = rotation @ rotation_from_vector(modes @ self.modal_rotations.T + arcs[:, 3:POSE])
         moved = shift + np.einsum("tij,tj->ti", rotation, modes @ self.shifts.T + arcs[:, :3])
         coefficients = modes @ self.coefficients.T + arcs[:, POSE:]
         return np.concatenate([moved, vector_from_rotation(turned), coefficients], axis=1)
@@ -51,7 +51,7 @@ class Coordinates:
         """Shifts (T, 3) m and rotations (T, 3, 3) of the mass centre for which `reduced` gives a pose."""
         one, other = self.pairs
         arcs = (modes[:, one] * modes[:, other]) @ self.arcs[:, :POSE]
-        own = rotation_from_vector(modes @ self.turns.T + arcs[:, 3:])
+        own = rotation_from_vector(modes @ self.modal_rotations.T + arcs[:, 3:])
         rotation = rotation_from_vector(pose[:, 3:]) @ own.swapaxes(1, 2)
         return pose[:, :3] - np.einsum("tij,tj->ti", rotation, modes @ self.shifts.T + arcs[:, :3]), rotation
 
@@ -92,7 +92,7 @@ class _Rigid:
 
 def _arcs(body: ElasticBody, i: int) -> Float[np.ndarray, "pairs points 3"]:
     """The second-order displacements of mode i with the modes j >= i, by the products of their amplitudes."""
-    turns = body.turns.transpose(2, 0, 1)[i : body.dynamic]
+    turns = body.modal_rotations.transpose(2, 0, 1)[i : body.dynamic]
     modes = body.modes[i : body.dynamic]
     arcs = 0.5 * (np.cross(turns[:1], modes) + np.cross(turns, modes[:1]))
     arcs[0] *= 0.5

@@ -30,10 +30,10 @@ class ElasticBody:
     """(S, 3) m at rest in the scene."""
     faces: Faces
     weights: Perpoint
-    """(S,) share of the mass."""
+    """(S,) mass fraction."""
     modes: Float[np.ndarray, "modes points 3"]
     """m per root kilogram."""
-    squares: Float[np.ndarray, " modes"]
+    eigenvalues: Float[np.ndarray, " modes"]
     """1/s^2."""
     dynamic: int
     """K."""
@@ -42,19 +42,21 @@ class ElasticBody:
     """(3,) m: the mass centre."""
 
     def reduced(self) -> ReducedBody:
-        """As the mechanics knows it."""
-        return reduce_body(self.points - self.anchor, self.faces, self.modes, self.turns, self.squares, self.solid)
+        """Converts it to the body that the mechanics takes."""
+        return reduce_body(
+            self.points - self.anchor, self.faces, self.modes, self.modal_rotations, self.eigenvalues, self.solid
+        )
 
     @cached_property
-    def turns(self) -> Float[np.ndarray, "points 3 modes"]:
-        """By how much the modes turn the surface, rad per root kilogram."""
+    def modal_rotations(self) -> Float[np.ndarray, "points 3 modes"]:
+        """Rotations of the surface by the modes, rad per root kilogram."""
         return surface_turns(self.points, self.faces, self.modes.transpose(1, 2, 0))
 
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, besides those of the body that viewers show."""
         return {
             "body.modes": self.modes.astype(np.float16),
-            "body.squares": self.squares,
+            "body.squares": self.eigenvalues,
             "body.weights": self.weights,
             "body.anchor": self.anchor,
             "body.inertia": self.solid.inertia,
@@ -75,9 +77,16 @@ class ElasticBody:
         dynamic = int(numbers["dynamic"])
         solid = Solid(inertia=arrays["body.inertia"], **{k: v for k, v in numbers.items() if k != "dynamic"})
         points = arrays["rest.points"].astype(float)
-        modes, squares = arrays["body.modes"].astype(float), arrays["body.squares"]
+        modes, eigenvalues = arrays["body.modes"].astype(float), arrays["body.squares"]
         return cls(
-            points, arrays["rest.faces"], arrays["body.weights"], modes, squares, dynamic, solid, arrays["body.anchor"]
+            points,
+            arrays["rest.faces"],
+            arrays["body.weights"],
+            modes,
+            eigenvalues,
+            dynamic,
+            solid,
+            arrays["body.anchor"],
         )
 
 
@@ -94,4 +103,4 @@ def elastic_body(body: SoftObject, count: int = MODES, dynamic: int = DYNAMIC) -
     points = body.settled[surface].astype(np.float32).astype(float)
     # as a checkpoint holds them, so that training and prediction use the same
     shapes = modes.shapes[:, surface].astype(np.float16).astype(float)
-    return ElasticBody(points, body.faces, body.weights, shapes, modes.squares, dynamic, solid, anchor)
+    return ElasticBody(points, body.faces, body.weights, shapes, modes.eigenvalues, dynamic, solid, anchor)

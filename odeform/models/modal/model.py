@@ -59,19 +59,19 @@ QUALITIES = {
     "balanced": SolverSettings("limex", tolerance=1.5e-4, dtype="float64"),
     "reference": SolverSettings("limex", step=2.5e-4, dtype="float64"),
 }
-"""Of bodies whose solver errors were not measured."""
+"""Settings of bodies whose solver errors were not measured."""
 EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
 """The reference for solver errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Readout:
-    """From states of the mechanics to coordinates of a motion."""
+    """Maps states of the mechanics to coordinates of a motion."""
 
     coordinates: Coordinates
     settled: SettledBody | None
     scale: float
-    """Of amplitudes: modes of a heavier body move less by each unit."""
+    """Scales amplitudes: modes of a heavier body move less by each unit."""
 
     def __call__(self, times: Times, states: Floats) -> Floats:
         """(T,) s and states (T, 20 + 2 K) -> (T, 6 + K)."""
@@ -80,7 +80,7 @@ class _Readout:
         return y if self.settled is None else self.settled.relative(y)
 
     def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
-        """As `odeform.models.modal.release.released`."""
+        """Releases the body, see `odeform.models.modal.release.released`."""
         pose = y[:, :POSE] if self.settled is None else self.settled.absolute(y[:, :POSE])
         return released(self.coordinates, states, pose, self.scale)
 
@@ -101,7 +101,7 @@ class ModalModel(Model):
     finer = MappingProxyType({EXACT: 0.0})
     knows_objects = True
     resumable = True
-    ablations: ClassVar[Mapping[str, str]] = {"correction": "what is left unexplained is not regressed"}
+    ablations: ClassVar[Mapping[str, str]] = {"residual": "what is left unexplained is not regressed"}
 
     @classmethod
     def train(cls, run: "Run") -> Checkpoint:
@@ -112,7 +112,7 @@ class ModalModel(Model):
     def _read(self, checkpoint: Checkpoint) -> None:
         config = checkpoint.config
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
-        self.law, self.pulse = ContactParameters(**config["law"]), float(config["pulse_s"])
+        self.contact_parameters, self.pulse = ContactParameters.from_json(config["law"]), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest = float(shift), float(deformation)
@@ -142,7 +142,7 @@ class ModalModel(Model):
 
     @cached_property
     def _mechanics(self) -> Mechanics:
-        return Mechanics(self.body.reduced(), self.law, self.projectile)
+        return Mechanics(self.body.reduced(), self.contact_parameters, self.projectile)
 
     @cached_property
     def _coordinates(self) -> tuple[Coordinates, Basis]:
@@ -150,12 +150,12 @@ class ModalModel(Model):
 
     @property
     def coordinates(self) -> Coordinates:
-        """From states of the mechanics to reduced coordinates."""
+        """Maps states of the mechanics to reduced coordinates."""
         return self._coordinates[0]
 
     @cached_property
     def space(self) -> ReducedSpace:
-        """That of its coordinates."""
+        """Reads the space of its coordinates."""
         # mechanics knows how far a body moves; only its deformation may get lost
         return space_of(self.body, self._coordinates[1], (float("inf"), SOFTEST * self._largest[1]))
 
@@ -175,13 +175,15 @@ class ModalModel(Model):
         return self._changed.get((mass, stiffness), lambda: self._with(mass, stiffness))
 
     def _with(self, mass: float, stiffness: float) -> "ModalModel":
-        """With so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
+        """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
         out.settled_body = None
         if (mass, stiffness) != (1.0, 1.0):
             coordinates, basis = self._coordinates
-            out.settled_body = settled_body(self.body, self.law, self.projectile, out._ratios, coordinates, basis)
+            out.settled_body = settled_body(
+                self.body, self.contact_parameters, self.projectile, out._ratios, coordinates, basis
+            )
         return out
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
@@ -214,8 +216,8 @@ class ModalModel(Model):
         return self._evaluated.get((geometry_key(geometry), azimuth), lambda: settled.basis(measured, geometry))
 
     def _pushed(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[ContactInputs, Vectors]:
-        """What pushes at theta (B, P), relative to the mass centre of the body as it was measured, and the centres
-        (B, 3) of the spheres at rest."""
+        """Returns what pushes at theta (B, P), relative to the mass centre of the body as it was measured, and the
+        centres (B, 3) of the spheres at rest."""
 
         def found() -> tuple[ContactInputs, Vectors]:
             values = [[p.denormalise(float(x)) for p, x in zip(self.schema.learned, row, strict=True)] for row in theta]
@@ -236,14 +238,14 @@ class ModalModel(Model):
         return make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centres, inputs.force)
 
     def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
-        """That of states in the directions of deformation of one push."""
+        """Reads out states in the directions of deformation of one push."""
         return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
 
     def residual_inputs(self, theta: Floats) -> ContactInputs:
         return self._pushed(np.atleast_2d(theta))[0]
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
-        """Of one push, for theta (P,) in [-1, 1]; always in double precision."""
+        """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
         push = self._push(theta[None])
         pushed = PushedBody(self.mechanics, push, self.pulse)
         return Problem(pushed, pushed.start, self._readout(push.modes[0]))

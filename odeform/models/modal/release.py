@@ -1,4 +1,4 @@
-"""Where the ODE of a pushed body goes on by itself: from the state that the residual has corrected.
+"""Restarts the ODE of a pushed body from the state to which the residual has moved it.
 
 While a sphere pushes, contact decides what follows, and most of the error arises. Once it is gone, the mechanics knows
 what a body does; a regression of whole motions does not. So the residual corrects the rigid motion until then, and its

@@ -63,7 +63,7 @@ class SettledBody:
 
 def settled_body(
     body: ElasticBody,
-    law: ContactParameters,
+    contact_parameters: ContactParameters,
     projectile: Projectile,
     ratios: tuple[float, float],
     coordinates: Coordinates,
@@ -75,12 +75,12 @@ def settled_body(
     velocity whenever its kinetic energy passes a maximum (kinetic damping).
     """
     mass, stiffness = ratios
-    mechanics = Mechanics(body.reduced().changed(mass, stiffness), law, projectile, stiffness / mass)
+    mechanics = Mechanics(body.reduced().changed(mass, stiffness), contact_parameters, projectile, stiffness / mass)
     push = no_push(mechanics.body, body.dynamic)
     bodies = pushed_bodies(mechanics, push, 0.0)
     state, row, step = bodies.start, np.zeros(1, dtype=np.int64), np.full(1, STEP)
     speed, calm = 0.0, 0
-    velocity = slice(13 + push.squares.shape[1], None)
+    velocity = slice(13 + push.eigenvalues.shape[1], None)
     for _ in range(LONGEST):
         state = bodies.advance(row, step, state, step)[0]
         before, speed = speed, _speed(state[0, velocity], mechanics.body.solid.mass)
@@ -92,7 +92,7 @@ def settled_body(
     shift, rotation, modes = body_motion(state)
     mechanics = replace(mechanics, rest=Rest(shift[0], rotation[0], modes[0]))
     lighter = modes / np.sqrt(mass)  # amplitudes of the modes of the body that was measured
-    y = coordinates.along(np.eye(len(body.squares))[:, : body.dynamic]).reduced(shift, rotation, lighter)[0]
+    y = coordinates.along(np.eye(len(body.eigenvalues))[:, : body.dynamic]).reduced(shift, rotation, lighter)[0]
     return SettledBody(mechanics, Mesh(_points(body, basis, y), body.faces), y)
 
 

@@ -34,7 +34,7 @@ class ShapeErrors:
 
 @dataclass(frozen=True)
 class ShapeBand:
-    """The RMSE that half, and a share `NOMINAL`, of motions stay within: a scale times a profile over time.
+    """The RMSE that half, and a fraction `NOMINAL`, of motions stay within: a scale times a profile over time.
 
     The scale is exp(`level`) times powers of the motion's size in mm and of 1 + distance / `NEAR`.
     """
@@ -86,12 +86,12 @@ def fit_shape_band(shapes: Sequence[ShapeErrors], times: Times) -> ShapeBand:
     for frame in range(count):
         part = left[:, max(frame - near, 0) : frame + near + 1]
         repeated = np.repeat(weights, part.shape[1])
-        profile.append(tuple(_quantile(part.ravel(), repeated, share) for share in (0.5, NOMINAL)))
+        profile.append(tuple(_quantile(part.ravel(), repeated, fraction) for fraction in (0.5, NOMINAL)))
     return ShapeBand(level, float(powers[0]), float(powers[1]), tuple(float(t) for t in times), tuple(profile))
 
 
 def coverage(band: ShapeBand, shapes: Sequence[ShapeErrors]) -> float:
-    """The share of frames at which errors are within the band's quantile `NOMINAL`; every shape counts alike."""
+    """The fraction of frames at which errors are within the band's quantile `NOMINAL`; every shape counts alike."""
     times = np.array(band.times)
     inside = [
         np.mean([row <= band.at(size, shape.distance, times)[:, 1] for size, row in shape.rows()]) for shape in shapes
@@ -121,7 +121,7 @@ def _fitted(inputs: Floats, values: Floats, weights: Floats) -> tuple[float, Flo
         kept.pop(int(found[1:].argmin()))
 
 
-def _quantile(values: Floats, weights: Floats, share: float) -> float:
+def _quantile(values: Floats, weights: Floats, fraction: float) -> float:
     order = np.argsort(values)
     reached = np.cumsum(weights[order]) / weights.sum()
-    return float(values[order][min(int(np.searchsorted(reached, share)), len(values) - 1)])
+    return float(values[order][min(int(np.searchsorted(reached, fraction)), len(values) - 1)])

@@ -68,13 +68,13 @@ class _Transferred:
 
 
 def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> Residual:
-    """A share `weight` of the residual of `part`, which has one, for another body."""
+    """A part `weight` of the residual of `part`, which has one, for another body."""
     known, shape = part.residual, Mesh(body.points.astype(np.float32), body.faces)
     assert known is not None
     regression = known.regression
     assert isinstance(regression, PushRegression)
     # a scale belongs to a stiffness, and modes of the same number need not be as stiff in both bodies
-    scale = np.interp(np.log(body.squares), np.log(part.body.squares), regression.scale)
+    scale = np.interp(np.log(body.eigenvalues), np.log(part.body.eigenvalues), regression.scale)
     kept = 1.0 - weight * (1.0 - weight_of(regression.parts, scale))
     standing = standing_offset(shape, part.rest)
     there = Mesh(shape.points + standing.astype(np.float32), shape.faces)

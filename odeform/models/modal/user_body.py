@@ -126,7 +126,7 @@ def _largest(part: ModalModel, own: UserBody) -> list[float]:
 
 
 class UserBodyPredictor(ModalModel):
-    """The learned law of a trained model, with the modes of another body.
+    """The fitted contact parameters of a trained model, with the modes of another body.
 
     Attributes:
         distance: How far the body is from the trained one that it is like, relative to that one's size: see
@@ -177,8 +177,8 @@ class UserBodyPredictor(ModalModel):
         return replace(super().trust, foreign=f"{self.describe_motion()}, {self._describe_error()}")
 
     def describe_motion(self) -> str:
-        """What decides the motion of the body, as the start of a sentence in lower case."""
-        return f"its motion follows from its shape, and from the {self.own.like}'s material and law of contact"
+        """Says what decides the motion of the body, as the start of a sentence in lower case."""
+        return f"its motion follows from its shape, and from the {self.own.like}'s material and contact parameters"
 
     def _describe_error(self) -> str:
         if self._band is None:

@@ -79,7 +79,7 @@ class RollingModel(Model):
     ablations: ClassVar[Mapping[str, str]] = {
         "network": "coefficients of the contact law depend on the material alone",
         "corners": "the body rolls over a smooth floor on a smooth rim",
-        "correction": "what is left unexplained is not regressed",
+        "residual": "what is left unexplained is not regressed",
     }
     resumable = True
 

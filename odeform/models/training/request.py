@@ -8,6 +8,8 @@ from odeform.models.registry import model_class
 
 __all__ = ["TrainRequest"]
 
+OLD_PARTS = {"correction": "residual"}  # as commands that checkpoints record call it
+
 
 @dataclass(frozen=True)
 class TrainRequest:
@@ -35,6 +37,7 @@ class TrainRequest:
     """The objects to train on, of a scene with several; default: all."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "without", tuple(OLD_PARTS.get(name, name) for name in self.without))
         if not 0.0 < self.minutes < math.inf:
             raise InputError(f"minutes: expected a positive number, got {self.minutes:g}")
         if self.steps is not None and self.steps < 1:

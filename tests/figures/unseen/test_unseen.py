@@ -34,7 +34,7 @@ QUALITIES = {name: {"method": "limex", "step": 5e-3, "dtype": "float64"} for nam
 
 
 def part(name: str) -> Checkpoint:
-    """A body with the law as it is before training, and no correction."""
+    """A body with the contact parameters as it is before training, and no correction."""
     body = elastic_body(get_object(name), 12, 8)
     return Checkpoint(
         ModalModel.model,
@@ -42,7 +42,7 @@ def part(name: str) -> Checkpoint:
         {
             "largest": [0.5, 0.1],
             "body": body.to_json(),
-            "law": ContactParameters().__dict__,
+            "law": ContactParameters().to_json(),
             "pulse_s": PULSE,
             "projectile": {"radius": 0.02, "mass": 0.02},
             "qualities": QUALITIES,
@@ -126,7 +126,7 @@ def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: User
     same = transferred_residual(part, body, 0.5)
     np.testing.assert_allclose(same.weight[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
     np.testing.assert_allclose(same.weight[18:], 1.5)  # its other modes are stiffer than all of the trained body
-    stiffer = transferred_residual(part, replace(body, squares=1e9 * body.squares), 0.5)
+    stiffer = transferred_residual(part, replace(body, eigenvalues=1e9 * body.eigenvalues), 0.5)
     np.testing.assert_allclose(stiffer.weight[6:], 1.5)
 
 
@@ -159,10 +159,10 @@ def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, 
 
 
 def test_an_object_that_is_left_out_is_gone_and_the_others_have_one_law(trained: PerObject) -> None:
-    law = ContactParameters(floor_friction=0.123)
-    found = without(trained, "donut", law)
+    contact_parameters = ContactParameters(floor_friction=0.123)
+    found = without(trained, "donut", contact_parameters)
     assert tuple(found.parts) == ("bottle",)
-    assert found.parts["bottle"].law == law  # pyright: ignore[reportAttributeAccessIssue]
+    assert found.parts["bottle"].contact_parameters == contact_parameters  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def test_finished_shapes_are_read_again_and_failed_pushes_are_named(

@@ -23,7 +23,7 @@ def train_latent(run: Run) -> Checkpoint:
     data = run.reduced_data()
     modes = data.space.basis.modes
     checkpoint = _trained_network(run, data)
-    if "correction" not in run.request.without:
+    if "residual" not in run.request.without:
         checkpoint = with_residual(checkpoint, data)
     checkpoint, data = without_modes(checkpoint, data)
     run.report(f"{data.space.basis.modes} of {modes} modes are needed")

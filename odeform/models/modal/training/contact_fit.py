@@ -11,9 +11,9 @@ from odeform.models.modal.training.pushes import Pushes
 from odeform.motion.reduced_space import POSE
 from odeform.types import Floats
 
-__all__ = ["FINE", "described", "fit_law", "relative_errors"]
+__all__ = ["FINE", "described", "fit_contact_parameters", "relative_errors"]
 
-STEP, FINE = 2.5e-3, 1e-3  # s, of the integration while a law is fitted, and of motions by the one that is found
+STEP, FINE = 2.5e-3, 1e-3  # s: steps of the integration during the fit, and of motions by what is found
 RANGE = 30.0  # factor by which a number may differ from where it starts
 EVALUATIONS = 5  # of the errors and their derivatives
 NAMES = tuple(asdict(ContactParameters()))
@@ -29,7 +29,7 @@ def relative_errors(pushes: Pushes, predicted: Floats) -> Floats:
     return error
 
 
-def fit_law(
+def fit_contact_parameters(
     bodies: Sequence[Pushes],
     pulse: float,
     start: ContactParameters,
@@ -37,18 +37,20 @@ def fit_law(
     report: Callable[[str], None] = print,
     evaluations: int | None = None,
 ) -> ContactParameters:
-    """The law with the smallest squared relative errors over all bodies, by Gauss-Newton in logarithms.
+    """The contact parameters with the smallest squared relative errors over all bodies, by Gauss-Newton in logarithms.
 
     Rigid motion and deformation of each body count alike. Errors and their derivatives are evaluated `EVALUATIONS`
     times, or as often as `evaluations` says.
     """
     first = asdict(start)
 
-    def law(x: Floats) -> ContactParameters:
+    def contact_parameters(x: Floats) -> ContactParameters:
         return replace(start, **{name: first[name] * float(np.exp(v)) for name, v in zip(names, x, strict=True)})
 
     def errors(x: Floats) -> Floats:
-        parts = [relative_errors(pushes, pushes.predicted(law(x), pulse, STEP)).ravel() for pushes in bodies]
+        parts = [
+            relative_errors(pushes, pushes.predicted(contact_parameters(x), pulse, STEP)).ravel() for pushes in bodies
+        ]
         return np.nan_to_num(np.concatenate(parts), nan=10.0, posinf=10.0, neginf=-10.0)
 
     limit = np.log(RANGE)
@@ -60,10 +62,11 @@ def fit_law(
         max_nfev=evaluations or EVALUATIONS,
         x_scale=0.3,
     )
-    report(f"law: relative error {np.sqrt(2.0 * found.cost / len(bodies)):.3f}; {described(law(found.x))}")
-    return law(found.x)
+    best = contact_parameters(found.x)
+    report(f"contact parameters: relative error {np.sqrt(2.0 * found.cost / len(bodies)):.3f}; {described(best)}")
+    return best
 
 
-def described(law: ContactParameters) -> str:
-    """In one line."""
-    return ", ".join(f"{name} {value:.3g}" for name, value in asdict(law).items())
+def described(contact_parameters: ContactParameters) -> str:
+    """Returns names and values in one line."""
+    return ", ".join(f"{name} {value:.3g}" for name, value in asdict(contact_parameters).items())

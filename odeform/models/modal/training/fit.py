@@ -1,4 +1,4 @@
-"""The training of the mechanical model: a law of contact and material for all bodies of a data set, then for each."""
+"""The training of the mechanical model: contact parameters for all bodies of a data set, then for each."""
 
 import time
 from collections.abc import Callable
@@ -17,10 +17,10 @@ from odeform.models.modal.body_parameters import schema_of
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.model import EXACT, QUALITIES, ModalModel
 from odeform.models.modal.training import contact_fit
-from odeform.models.modal.training.contact_fit import FINE, described, fit_law, relative_errors
+from odeform.models.modal.training.contact_fit import FINE, described, fit_contact_parameters, relative_errors
 from odeform.models.modal.training.parameter_cache import SHARED, ParameterCache
 from odeform.models.modal.training.pushes import Pushes, read_pushes
-from odeform.models.modal.training.residual_fit import fit_correction
+from odeform.models.modal.training.residual_fit import fit_contact_residual
 from odeform.models.per_object import PerObject, joined
 from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.run import Run
@@ -34,15 +34,16 @@ from odeform.types import Arrays, Floats
 
 __all__ = ["fit_mechanical", "train_modal", "with_measured_qualities"]
 
-SEQUENCES = 8  # of each body, to which the law that all share is fitted; it has ten numbers
-OWN_SEQUENCES, DRAWS = 32, 2  # to which laws of one body are, and how many such draws; the best law is kept
+SEQUENCES = 8  # of each body, to which the contact parameters that all share are fitted; it has ten numbers
+BODY_SEQUENCES, DRAWS = 32, 2  # to which those of one body are, and how many such draws; the best are kept
 FIXED = {"pulse_s", "projectile_radius_m", "projectile_mass_kg"}
 MODES, LEFT_OUT = (120, 400), 0.15  # the second number of modes where the first leaves out more of the deformation
 Checkpointed = tuple[Arrays, dict[str, Any]]
 TOLERANCES = (7e-4, 6e-4, 5e-4, 4e-4, 3.5e-4, 3e-4, 2.5e-4, 2e-4, 1.8e-4, 1.5e-4, 1.2e-4, 1e-4, 8e-5, 6e-5, 4e-5)
 """m, tried for each body."""
-SOLVER_SHARES = {"draft": (1.0, 1.0), "balanced": (0.15, 0.3)}
-"""Of the model's errors, as `odeform.models.training.qualities.SHARES`: this adds one per cent to the total error."""
+SOLVER_FRACTIONS = {"draft": (1.0, 1.0), "balanced": (0.15, 0.3)}
+"""Fractions of the model's errors, as `odeform.models.training.qualities.FRACTIONS`: this adds one per cent to the
+total error."""
 
 
 def train_modal(run: Run) -> Checkpoint:
@@ -56,15 +57,19 @@ def train_modal(run: Run) -> Checkpoint:
     window = dataset.schema.window
     last = (FrameSubsampling(request.window).count(dataset.schema) - 1) / window.rate
     dataset = replace(dataset, schema=replace(dataset.schema, window=replace(window, stop=last)))
-    laws = ParameterCache(run.part, dataset, request.seed, request.resume)
-    return fit_mechanical(dataset, laws, request.seed, run.report, "correction" not in request.without)
+    known_parameters = ParameterCache(run.part, dataset, request.seed, request.resume)
+    return fit_mechanical(dataset, known_parameters, request.seed, run.report, "residual" not in request.without)
 
 
 def fit_mechanical(
-    dataset: Dataset, laws: ParameterCache, seed: int, report: Callable[[str], None], correct: bool = True
+    dataset: Dataset,
+    known_parameters: ParameterCache,
+    seed: int,
+    report: Callable[[str], None],
+    with_residual: bool = True,
 ) -> Checkpoint:
-    """Train on the objects of a data set of the scene `contact-force`; laws that are finished are kept in `laws`, and
-    those that it has are not fitted again.
+    """Train on the objects of a data set of the scene `contact-force`; contact parameters that are finished are kept in
+    `known_parameters`, and those that it has are not fitted again.
 
     Without `correct`, motions are those of the mechanics alone. `InputError` for other data.
     """
@@ -80,14 +85,14 @@ def fit_mechanical(
         each[name] = _training_pushes(dataset, name)
         pushes = each[name]
         report(
-            f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.squares)} modes leave out "
-            f"{100.0 * pushes.share_left_out:.0f} % of the deformation"
+            f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.eigenvalues)} modes leave out "
+            f"{100.0 * pushes.fraction_left_out:.0f} % of the deformation"
         )
-    shared = laws.get(SHARED)
+    shared = known_parameters.get(SHARED)
     if shared is None:
         some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
-        shared = fit_law(some, pulse, ContactParameters(), report=report)
-        laws.add(SHARED, shared)
+        shared = fit_contact_parameters(some, pulse, ContactParameters(), report=report)
+        known_parameters.add(SHARED, shared)
     bodies = [
         _Body(
             schema_of(get_object(name), dataset.of(name).schema),
@@ -95,23 +100,23 @@ def fit_mechanical(
             pushes,
             read_pushes(dataset.of(name), "val", pushes.body),
             shared,
-            laws.get(name),
+            known_parameters.get(name),
             pulse,
             get_object(name).material.young,
             seed,
             contact_fit.EVALUATIONS,
-            correct,
+            with_residual,
         )
         for name, pushes in each.items()
     ]
     found: dict[str, Checkpoint] = {}
     spent, names = time.process_time() - begin, list(each)
     progress = Progress("bodies", len(bodies))
-    for index, (law, part, seconds) in as_completed(_fitted, bodies):
+    for index, (contact_parameters, part, seconds) in as_completed(_fitted, bodies):
         name, spent = names[index], spent + seconds
-        laws.add(name, law)
+        known_parameters.add(name, contact_parameters)
         found[name] = part
-        report(f"{name}: {described(law)}")
+        report(f"{name}: {described(contact_parameters)}")
         progress.advance(note=name)
     progress.close()
     whole = joined(dataset.schema, {name: found[name] for name in names})
@@ -125,7 +130,7 @@ def _inputs(dataset: Dataset, split: str) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """What the fit of one body needs."""
+    """Holds what the fit of one body needs."""
 
     schema: Schema
     theta: dict[str, Floats]
@@ -133,34 +138,38 @@ class _Body:
     train: Pushes
     val: Pushes
     shared: ContactParameters
-    own: ContactParameters | None
-    """Its law, if an interrupted training has finished it."""
+    known: ContactParameters | None
+    """Its contact parameters, if an interrupted training has finished them."""
     pulse: float
     young: float
     """Pa."""
     seed: int
     evaluations: int
-    correct: bool
+    with_residual: bool
 
 
 def _fitted(body: _Body) -> tuple[ContactParameters, Checkpoint, float]:
-    """Its law, its checkpoint, and the seconds of processor time that they took."""
+    """Its contact parameters, its checkpoint, and the seconds of processor time that they took."""
     begin = time.process_time()
-    law = _law(body) if body.own is None else body.own
-    correction = fit_correction(body.train, body.val, law, body.pulse) if body.correct else None
-    checkpoint = _checkpoint(body.schema, body.theta["train"], body.train, law, body.pulse, body.young, correction)
+    contact_parameters = _contact_parameters(body) if body.known is None else body.known
+    residual = (
+        fit_contact_residual(body.train, body.val, contact_parameters, body.pulse) if body.with_residual else None
+    )
+    checkpoint = _checkpoint(
+        body.schema, body.theta["train"], body.train, contact_parameters, body.pulse, body.young, residual
+    )
     checkpoint = _with_qualities(checkpoint, body.theta["val"], body.val)
-    return law, checkpoint, time.process_time() - begin
+    return contact_parameters, checkpoint, time.process_time() - begin
 
 
 def _with_qualities(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
-    """With solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
+    """Chooses solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
 
     Each body has its own: what a solver error does to a motion depends on it.
     """
     known = Validation(theta, val.times, val.reduced, np.ones(val.reduced.shape[:2], dtype=bool))
     candidates = [SolverSettings("limex", tolerance=tolerance, dtype="float64") for tolerance in TOLERANCES]
-    return with_qualities(checkpoint, known, EXACT, [*candidates, QUALITIES["reference"]], SOLVER_SHARES)
+    return with_qualities(checkpoint, known, EXACT, [*candidates, QUALITIES["reference"]], SOLVER_FRACTIONS)
 
 
 def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:
@@ -187,23 +196,23 @@ def _measured(asked: tuple[Checkpoint, Floats, Pushes]) -> Checkpoint:
     return _with_qualities(*asked)
 
 
-def _law(body: _Body) -> ContactParameters:
-    """Of that of all bodies and its own, fitted to several draws of its motions, the one with the smallest error on all
-    training and validation motions.
+def _contact_parameters(body: _Body) -> ContactParameters:
+    """Chooses, of those of all bodies and of its own, fitted to several draws of its motions, the one with the smallest
+    error on all training and validation motions.
 
     Friction and damping of the simulator depend on how mass and vertices are spread in a body. Where a sphere slips off
-    or not, errors jump with the law, and a fit ends in one of many minima.
+    or not, errors jump with the contact parameters, and a fit ends in one of many minima.
     """
-    draws = (body.train.some(OWN_SEQUENCES, body.seed + index) for index in range(DRAWS))
+    draws = (body.train.some(BODY_SEQUENCES, body.seed + index) for index in range(DRAWS))
     own = [
-        fit_law([some], body.pulse, body.shared, report=lambda _: None, evaluations=2 * body.evaluations)
+        fit_contact_parameters([some], body.pulse, body.shared, report=lambda _: None, evaluations=2 * body.evaluations)
         for some in draws
     ]
 
-    def error(law: ContactParameters) -> float:
+    def error(contact_parameters: ContactParameters) -> float:
         total = 0.0
         for pushes in (body.train, body.val):
-            errors = relative_errors(pushes, pushes.predicted(law, body.pulse, FINE))
+            errors = relative_errors(pushes, pushes.predicted(contact_parameters, body.pulse, FINE))
             total += len(pushes.contacts) * float(np.square(errors).sum())
         return total if np.isfinite(total) else np.inf
 
@@ -211,10 +220,10 @@ def _law(body: _Body) -> ContactParameters:
 
 
 def _training_pushes(dataset: Dataset, name: str) -> Pushes:
-    """With as many modes as the body's motions ask for."""
+    """Keeps as many modes as the body's motions ask for."""
     few, many = MODES
     pushes = read_pushes(dataset.of(name), "train", elastic_body(get_object(name), few))
-    if pushes.share_left_out <= LEFT_OUT:
+    if pushes.fraction_left_out <= LEFT_OUT:
         return pushes
     return read_pushes(dataset.of(name), "train", elastic_body(get_object(name), many))
 
@@ -223,12 +232,13 @@ def _checkpoint(
     schema: Schema,
     theta: Floats,
     pushes: Pushes,
-    law: ContactParameters,
+    contact_parameters: ContactParameters,
     pulse: float,
     young: float,
-    correction: Checkpointed | None = None,
+    residual: Checkpointed | None = None,
 ) -> Checkpoint:
-    """That of one body of Young's modulus `young` Pa, trained on `pushes` with inputs `theta` (S, P)."""
+    """Makes the checkpoint of one body of Young's modulus `young` Pa, trained on `pushes` with inputs `theta` (S,
+    P)."""
     body = pushes.body
     largest = [np.linalg.norm(pushes.reduced[..., part], axis=-1).max() for part in (slice(0, 3), slice(POSE, None))]
     return Checkpoint(
@@ -237,15 +247,15 @@ def _checkpoint(
         config={
             "largest": [float(size) for size in largest],
             "body": body.to_json(),
-            "law": asdict(law),
+            "law": contact_parameters.to_json(),
             "pulse_s": pulse,
             "young_kpa": 1e-3 * young,
             "free_from_s": schema.window.stop,
-            **({"correction": correction[1]} if correction else {}),
+            **({"correction": residual[1]} if residual else {}),
             "projectile": asdict(pushes.projectile),
         },
         arrays={
-            **(correction[0] if correction else {}),
+            **(residual[0] if residual else {}),
             **body.arrays(),
             **body.shown(),
             "training.theta": theta.astype(np.float32),

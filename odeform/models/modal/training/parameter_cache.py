@@ -1,8 +1,7 @@
-"""The laws that an interrupted training of the mechanical model has finished."""
+"""The contact parameters that an interrupted training of the mechanical model has finished."""
 
 import hashlib
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 from odeform.dataset.index import Dataset
@@ -13,32 +12,32 @@ from odeform.mechanics.contact_parameters import ContactParameters
 __all__ = ["SHARED", "ParameterCache"]
 
 SHARED = "all objects"
-"""The name of the law that is fitted to all objects together."""
+"""The name of the contact parameters that are fitted to all objects together."""
 
 
 class ParameterCache:
-    """Laws by the name of their object, in a file that is written again whenever one is added."""
+    """Contact parameters by the name of their object, in a file that is written again whenever one is added."""
 
     def __init__(self, path: Path | None, dataset: Dataset, seed: int, resume: bool = False) -> None:
-        """With `resume`, those that the file has; without a `path`, none are kept.
+        """Reads with `resume` those that the file has; without a `path`, none are kept.
 
         `InputError` if it is damaged or of another training.
         """
         self.path = path
         self._training = {"data": _digest(dataset), "window_s": dataset.schema.window.stop, "seed": seed}
-        self._laws = {} if path is None or not resume else self._read(path)
+        self._known = {} if path is None or not resume else self._read(path)
 
     def get(self, name: str) -> ContactParameters | None:
-        """None for a law that is not finished."""
-        return self._laws.get(name)
+        """None for contact parameters that is not finished."""
+        return self._known.get(name)
 
-    def add(self, name: str, law: ContactParameters) -> None:
-        """Keep a finished law."""
-        self._laws[name] = law
+    def add(self, name: str, contact_parameters: ContactParameters) -> None:
+        """Keep finished contact parameters."""
+        self._known[name] = contact_parameters
         if self.path is None:
             return
-        laws = {known: asdict(value) for known, value in self._laws.items()}
-        atomic_write(self.path, json.dumps({"training": self._training, "laws": laws}, indent=1).encode())
+        known_parameters = {known: value.to_json() for known, value in self._known.items()}
+        atomic_write(self.path, json.dumps({"training": self._training, "laws": known_parameters}, indent=1).encode())
 
     def _read(self, path: Path) -> dict[str, ContactParameters]:
         try:
@@ -48,18 +47,15 @@ class ParameterCache:
         try:
             known = parse_json(data, str(path))
             training = known["training"]
-            laws = {
-                name: ContactParameters(**{key: float(value) for key, value in values.items()})
-                for name, values in known["laws"].items()
-            }
+            known_parameters = {name: ContactParameters.from_json(values) for name, values in known["laws"].items()}
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise InputError(f"--resume: {path}: not a state of this training: {error}") from None
         if training != self._training:
             raise InputError(f"--resume: {path}: state of another training: expected {self._training}, got {training}")
-        return laws
+        return known_parameters
 
 
 def _digest(dataset: Dataset) -> str:
-    """Of the motions that are trained on and of those that choose."""
+    """Hashes the motions that are trained on and those that choose."""
     entries = [(entry.name, entry.split, entry.sha256) for entry in dataset.entries if entry.split != "test"]
     return hashlib.sha256(json.dumps(entries).encode()).hexdigest()

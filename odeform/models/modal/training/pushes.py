@@ -51,8 +51,8 @@ class Pushes:
         return scale
 
     @property
-    def share_left_out(self) -> float:
-        """By the basis, of the RMS deformation."""
+    def fraction_left_out(self) -> float:
+        """Fraction of the RMS deformation that the basis leaves out."""
         left = float(self.left_out.mean())
         total = left + float((self.reduced[..., POSE:] ** 2).sum(axis=2).mean())
         return float(np.sqrt(left / max(total, 1e-30)))
@@ -63,9 +63,11 @@ class Pushes:
         names = ("contacts", "normals", "centres", "forces", "reduced", "left_out")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
-    def predicted(self, law: ContactParameters, pulse: float, step: float) -> Float[np.ndarray, "pushes times y"]:
+    def predicted(
+        self, contact_parameters: ContactParameters, pulse: float, step: float
+    ) -> Float[np.ndarray, "pushes times y"]:
         """Their motions by mechanics alone, in steps of `step` seconds, which divide the frames."""
-        mechanics = Mechanics(self.body.reduced(), law, self.projectile)
+        mechanics = Mechanics(self.body.reduced(), contact_parameters, self.projectile)
         push = make_push(mechanics.body, self.body.dynamic, self.contacts, self.centres, self.forces)
         nodes = push_body(mechanics, push, pulse, float(self.times[-1]), step)
         every = round(float(self.times[1] - self.times[0]) / step)
@@ -108,6 +110,6 @@ def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:
 
 
 def _projection(basis: Basis, weights: Perpoint) -> Float[np.ndarray, "entries modes"]:
-    """From displacements (3 N) to the coefficients of a basis (N, 3, K) that fit them best under the weights (N,)."""
+    """Maps displacements (3 N) to the coefficients of a basis (N, 3, K) that fit them best under the weights (N,)."""
     flat, each = basis.reshape(-1, basis.shape[2]), np.repeat(weights, 3)[:, None]
     return np.linalg.solve(flat.T @ (each * flat), (each * flat).T).T

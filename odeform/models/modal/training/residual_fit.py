@@ -14,38 +14,40 @@ from odeform.models.modal.training.pushes import Pushes
 from odeform.motion.reduced_space import POSE
 from odeform.types import Arrays, Floats
 
-__all__ = ["SHARES", "fit_correction"]
+__all__ = ["WEIGHTS", "fit_contact_residual"]
 
-ENERGY = 0.99  # of the deformations that are left to the correction, in the modes of their trajectories
-SHARES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
-"""Of the mechanics' motion, tried for each part. Without any, a part is the regression of whole motions."""
-PRIOR = 0.1  # weight of a gain of one, relative to that of the motions
+ENERGY = 0.99  # of the deformations that are left to the residual, in the modes of their trajectories
+WEIGHTS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.25, 0.0)
+"""Weights of the mechanics' motion, tried for each part. Without any, a part is the regression of whole motions."""
+PRIOR = 0.1  # weight of a scale of one, relative to that of the motions
 
 
-def fit_correction(train: Pushes, val: Pushes, law: ContactParameters, pulse: float) -> tuple[Arrays, dict[str, Any]]:
+def fit_contact_residual(
+    train: Pushes, val: Pushes, contact_parameters: ContactParameters, pulse: float
+) -> tuple[Arrays, dict[str, Any]]:
     """Return arrays and settings of the residual of one body: see `odeform.models.modal.contact_residual`.
 
-    Each coefficient of the deformation has the gain of least squares. Shift, rotation and deformation have the share
-    with the smallest squared error on training motions, each predicted from all others, and validation motions
+    Each coefficient of the deformation has the modal scale of least squares. Shift, rotation and deformation have the
+    weight with the smallest squared error on training motions, each predicted from all others, and validation motions
     together.
     """
     known, asked = (ContactInputs(p.contacts, p.normals, p.forces) for p in (train, val))
-    own, own_val = (p.predicted(law, pulse, FINE) for p in (train, val))
-    gains = _gains(own[..., POSE:], train.reduced[..., POSE:])
-    own[..., POSE:] *= gains
-    own_val[..., POSE:] *= gains
+    motion, motion_val = (p.predicted(contact_parameters, pulse, FINE) for p in (train, val))
+    scales = _modal_scales(motion[..., POSE:], train.reduced[..., POSE:])
+    motion[..., POSE:] *= scales
+    motion_val[..., POSE:] *= scales
     trials = {
-        share: fit_contact_regression(
-            known, asked, train.times, train.reduced - share * own, val.reduced - share * own_val, ENERGY
+        weight: fit_contact_regression(
+            known, asked, train.times, train.reduced - weight * motion, val.reduced - weight * motion_val, ENERGY
         )
-        for share in SHARES
+        for weight in WEIGHTS
     }
-    best = {part: min(SHARES, key=lambda share: trials[share][1]["errors"][part]) for part in PARTS}
-    arrays: Arrays = {"gains": gains.astype(np.float32)}
+    best = {part: min(WEIGHTS, key=lambda weight: trials[weight][1]["errors"][part]) for part in PARTS}
+    arrays: Arrays = {"gains": scales.astype(np.float32)}
     arrays |= {key: value for key, value in trials[best["deformation"]][0].items() if not _part_of(key)}
     settings: dict[str, Any] = {"shares": best, "blend": {}, "trials": []}
-    for part, share in best.items():
-        found, chosen = trials[share]
+    for part, weight in best.items():
+        found, chosen = trials[weight]
         arrays |= {key: value for key, value in found.items() if _part_of(key) == part}
         settings["blend"][part] = chosen["blend"][part]
         settings["trials"] += [
@@ -54,11 +56,11 @@ def fit_correction(train: Pushes, val: Pushes, law: ContactParameters, pulse: fl
     return arrays, settings
 
 
-def _gains(own: Floats, truth: Floats) -> Float[np.ndarray, " coefficients"]:
+def _modal_scales(motion: Floats, truth: Floats) -> Float[np.ndarray, " coefficients"]:
     """(K,) of least squares between deformations (S, T, K) by mechanics and in truth, drawn towards one."""
-    power = (own**2).sum(axis=(0, 1))
+    power = (motion**2).sum(axis=(0, 1))
     prior = PRIOR * power + 1e-4 * power.max() + 1e-30
-    return ((own * truth).sum(axis=(0, 1)) + prior) / (power + prior)
+    return ((motion * truth).sum(axis=(0, 1)) + prior) / (power + prior)
 
 
 def _part_of(key: str) -> str | None:

@@ -90,7 +90,7 @@ def train_rolling(run: Run) -> Checkpoint:
     checkpoint = run.reduced_checkpoint(data, *fit_rolling_body(data, run.request, run.report, run.part))
     schema = replace(checkpoint.schema, window=replace(checkpoint.schema.window, reach=REACH))
     checkpoint = replace(checkpoint, schema=schema)
-    if "correction" not in run.request.without:
+    if "residual" not in run.request.without:
         free = data.first_free
         fading = (free + WHOLE, min(free + RINGING, len(data.times) - 1)) if free else None
         checkpoint = with_residual(checkpoint, data, fading)

@@ -1,4 +1,4 @@
-"""Finished laws of an interrupted training."""
+"""Finished contact parameters of an interrupted training."""
 
 import json
 from dataclasses import replace
@@ -14,16 +14,16 @@ from odeform.simulation.scenes.contact_force import SCENE
 
 ENTRIES = (Entry("one", "train", {"object": "cat"}, "a"), Entry("two", "test", {"object": "cat"}, "b"))
 DATA = Dataset(Path("pushes"), SCENE.schema, ENTRIES, lambda entry: None, {})  # pyright: ignore[reportArgumentType]
-LAW = ContactParameters(floor_friction=0.7)
+PARAMETERS = ContactParameters(floor_friction=0.7)
 
 
 def test_laws_are_known_again(tmp_path: Path) -> None:
-    laws = ParameterCache(tmp_path / "part", DATA, 0)
-    assert laws.get(SHARED) is None
-    laws.add(SHARED, ContactParameters())
-    laws.add("cat", LAW)
+    known_parameters = ParameterCache(tmp_path / "part", DATA, 0)
+    assert known_parameters.get(SHARED) is None
+    known_parameters.add(SHARED, ContactParameters())
+    known_parameters.add("cat", PARAMETERS)
     again = ParameterCache(tmp_path / "part", DATA, 0, resume=True)
-    assert again.get("cat") == LAW
+    assert again.get("cat") == PARAMETERS
     assert again.get(SHARED) == ContactParameters()
     assert again.get("dog") is None
     # a training that starts over knows none
@@ -31,14 +31,16 @@ def test_laws_are_known_again(tmp_path: Path) -> None:
 
 
 def test_those_of_another_training_are_refused(tmp_path: Path) -> None:
-    ParameterCache(tmp_path / "part", DATA, 0).add("cat", LAW)
+    ParameterCache(tmp_path / "part", DATA, 0).add("cat", PARAMETERS)
     window = replace(SCENE.schema, window=replace(SCENE.schema.window, stop=0.1))
     others = (replace(DATA, entries=(replace(ENTRIES[0], sha256="c"),)), replace(DATA, schema=window))
     for data, seed in ((DATA, 1), *((other, 0) for other in others)):
         with pytest.raises(InputError, match="state of another training"):
             ParameterCache(tmp_path / "part", data, seed, resume=True)
     # test motions do not decide anything
-    assert ParameterCache(tmp_path / "part", replace(DATA, entries=ENTRIES[:1]), 0, resume=True).get("cat") == LAW
+    assert (
+        ParameterCache(tmp_path / "part", replace(DATA, entries=ENTRIES[:1]), 0, resume=True).get("cat") == PARAMETERS
+    )
 
 
 @pytest.mark.parametrize(
@@ -53,8 +55,8 @@ def test_damaged_states_are_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
-    laws = ParameterCache(tmp_path / "part", DATA, 0)
-    laws.add("cat", LAW)
+    known_parameters = ParameterCache(tmp_path / "part", DATA, 0)
+    known_parameters.add("cat", PARAMETERS)
     saved = json.loads((tmp_path / "part").read_text())
     saved["laws"]["cat"]["stiffness"] = "soft"
     (tmp_path / "part").write_text(json.dumps(saved))

@@ -9,7 +9,7 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import PushRegression, contact_residual
 from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.modal.training.pushes import Pushes, _projection
-from odeform.models.modal.training.residual_fit import fit_correction
+from odeform.models.modal.training.residual_fit import fit_contact_residual
 from odeform.models.residual import PARTS
 from odeform.motion.reduced_space import POSE
 from odeform.simulation.objects.catalog import get_object
@@ -22,7 +22,7 @@ GAINS = np.array([1.0, 1.0, 2.0])  # by which deformations are larger than mecha
 class Predicted(Pushes):
     """Mechanics is wrong about their shifts, and right about their deformations but for a smooth rest."""
 
-    def predicted(self, law: ContactParameters, pulse: float, step: float) -> Floats:
+    def predicted(self, contact_parameters: ContactParameters, pulse: float, step: float) -> Floats:
         return self.own  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -50,7 +50,7 @@ def pushes(seed: int) -> Predicted:
 
 def test_each_part_is_predicted_by_what_knows_it() -> None:
     train, val = pushes(0), pushes(1)
-    arrays, settings = fit_correction(train, val, ContactParameters(), 0.04)
+    arrays, settings = fit_contact_residual(train, val, ContactParameters(), 0.04)
     assert settings["shares"]["shift"] == 0.0
     assert settings["shares"]["deformation"] == 1.0
     residual = contact_residual({"times": train.times, **arrays}, settings)
@@ -69,7 +69,7 @@ def test_each_part_is_predicted_by_what_knows_it() -> None:
 
 
 def test_a_share_that_is_none_is_refused() -> None:
-    arrays, settings = fit_correction(pushes(0), pushes(1), ContactParameters(), 0.04)
+    arrays, settings = fit_contact_residual(pushes(0), pushes(1), ContactParameters(), 0.04)
     with pytest.raises(ValueError, match="expected ODE weights from 0 to 1"):
         contact_residual(arrays, {**settings, "shares": {**settings["shares"], "shift": 1.5}})
     with pytest.raises(ValueError, match="expected 3 gains"):
