@@ -290,7 +290,8 @@ class Schema:
 
     def outside(self, parameters: Parameters) -> tuple[str, ...]:
         """Names of the parameters outside their trained range."""
-        return tuple(p.name for p in self.parameters if p.role != "azimuth" and p.name in parameters and not p.inside(parameters[p.name]))
+        asked = [p for p in self.parameters if p.role != "azimuth" and p.name in parameters]
+        return tuple(p.name for p in asked if not p.inside(parameters[p.name]))
 
     def vector(self, parameters: Parameters) -> NDArray[np.float64]:
         """(P,) learned parameters, each normalised so that its trained range is [-1, 1]."""
