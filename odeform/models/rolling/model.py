@@ -209,13 +209,13 @@ class RollingModel(Model):
         return motion
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
-        return raised(super().to_body(times, y), self.watched_body.lowest, self._lowest)
+        return raised(super().to_body(times, y), self.checked_body.lowest, self._lowest)
 
     def _restarted(
         self, theta: Floats, corrected: Adjusted, settings: SolverSettings, stop: float, until: float
     ) -> Trajectory:
         """What is solved from `stop` seconds on, from where the corrected motion is, and as it moves there."""
-        solved = corrected.own
+        solved = corrected.inner
         assert isinstance(solved, SolvedTrajectory)
         start, readout = self._resumed(theta, solved, corrected, stop)
         problem = Problem(self._field(theta), start.astype(settings.dtype), readout, stop)
@@ -224,7 +224,7 @@ class RollingModel(Model):
     def _restarted_batch(
         self, theta: Floats, corrected: AdjustedBatch, settings: SolverSettings, stop: float, until: float
     ) -> BatchTrajectory:
-        solved = corrected.own
+        solved = corrected.inner
         assert isinstance(solved, SolvedBatch)
         start, readout = self._resumed(theta, solved, corrected, stop)
         problem = BatchProblem(self._together(theta), start.astype(settings.dtype), readout, stop)

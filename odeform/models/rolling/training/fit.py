@@ -33,7 +33,7 @@ from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.request import TrainRequest
 from odeform.models.training.residual_fit import with_residual
 from odeform.models.training.run import Run
-from odeform.motion.body import watched_body
+from odeform.motion.body import checked_body
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.solver.integrate import SolverSettings
@@ -200,7 +200,7 @@ def _clearance(data: TrainingData) -> float:
 def _lowest(data: TrainingData) -> float:
     """m: the height of the lowest point in all frames of the training motions."""
     space = data.space
-    body = watched_body(PointCloud(data.rest + space.anchor), space, float("-inf"))
+    body = checked_body(PointCloud(data.rest + space.anchor), space, float("-inf"))
     known = (space.with_modes(motion) for motion in data.reduced["train"])
     return min(float(body.sample(y, np.ones(len(y))).lowest.min()) for y in known)
 
