@@ -267,7 +267,8 @@ class Predictor(ABC):
 
     @property
     def own_values(self) -> dict[str, float]:
-        """What a body has of the scene's parameters where they are not given, in a scene with several bodies."""
+        """Returns what a body has of the scene's parameters where they are not given, in a scene with several
+        bodies."""
         return {}
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:

@@ -116,7 +116,7 @@ class ReducedModel(Predictor):
         )
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
-        """What is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
+        """Returns what is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
         if self.space.rolling is None:
             return y
         return self.space.with_modes(y.reshape(-1, y.shape[-1])).reshape(*y.shape[:-1], -1)

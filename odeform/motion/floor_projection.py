@@ -44,7 +44,7 @@ class FloorProjection:
         return _moved_up(y, self._between(times, y, self._grid))
 
     def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
-        """Of each motion, from the changes on the grid."""
+        """Interpolates the changes of each motion on the grid."""
         by = np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
         by = by.reshape(y.shape[:-1])
         if len(later := np.flatnonzero(times > grid[-1])):

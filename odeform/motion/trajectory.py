@@ -21,7 +21,7 @@ Adjustment = Callable[[Times, Floats], Floats]
 
 @runtime_checkable
 class Moving(Protocol):
-    """What has reduced coordinates over time: one motion, or many."""
+    """Has reduced coordinates over time: one motion, or many."""
 
     def reduced(self, times: Times) -> Float[np.ndarray, "*batch times y"]:
         """(T,) seconds -> (T, 6 + K), or (B, T, 6 + K)."""
