@@ -40,7 +40,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     body, fit = models[checkpoint].rest, None
     if geometry is not None:
         fit = shape_from(geometry, body, None if models[checkpoint].rescales_input else Similarity())
-        print(describe_fit(fit, geometry, models[checkpoint].trust.likeness(fit.geometry)))
+        print(describe_fit(fit, geometry, models[checkpoint].validity.similarity(fit.geometry)))
     return [
         Column(_label(model, fit), model, fit.geometry if fit else model.rest, origin=name, fit=fit)
         for name, model in ((name, models[name]) for name in (checkpoint, *compare))

@@ -7,10 +7,10 @@ from typing import Any
 
 from odeform.errors import InputError
 from odeform.formats.bundled import read_shape
-from odeform.geometry.likeness import Likeness
 from odeform.geometry.parts import most_visible
 from odeform.geometry.region import Region, region_from_json, region_to_json
 from odeform.geometry.shape import FittedShape, fit_to
+from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.geometry.similarity import Similarity
 from odeform.types import GaussianSplats, Geometry, Mesh
 
@@ -57,7 +57,7 @@ def fit_from_json(raw: Mapping[str, Any], body: Mesh) -> FittedShape:
     return replace(fit_to(fit.source, body, region, transform=Similarity.from_json(raw["place"])), origin=fit.origin)
 
 
-def describe_fit(fit: FittedShape, name: str, likeness: Likeness | None) -> str:
+def describe_fit(fit: FittedShape, name: str, similarity: ShapeSimilarity | None) -> str:
     """One line: points, scale, how similar the shape is to the trained body, if that is known, and notes of the
     reader."""
     text = f"{Path(name).name}: {len(fit.geometry.points):,} points"
@@ -66,6 +66,6 @@ def describe_fit(fit: FittedShape, name: str, likeness: Likeness | None) -> str:
     text += f", scaled by {fit.transform.factor:.4g} to the trained size"
     if fit.upright:
         text += f"; {fit.upright}"
-    if likeness is not None:
-        text += f"; {likeness.describe()}"
+    if similarity is not None:
+        text += f"; {similarity.describe()}"
     return "; ".join([text, *fit.source.notes])

@@ -42,7 +42,7 @@ def describe_user_body(body: UserBody) -> str:
 
 def user_body_of(predictor: Predictor | None) -> UserBody | None:
     """The user's own body that a model moves; None for trained bodies."""
-    return predictor.own if isinstance(predictor, UserBodyPredictor) else None
+    return predictor.user_body if isinstance(predictor, UserBodyPredictor) else None
 
 
 def with_user_body(columns: Sequence[Column], body: UserBody) -> list[Column]:

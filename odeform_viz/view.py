@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from odeform.geometry.likeness import Likeness
+from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.limits import DEPTH
+from odeform.motion.plausibility import Stop
 from odeform.motion.recorded import RecordedMotion
-from odeform.motion.watch import Stop
 from odeform.schema import Window
 from odeform.types import Floats, Geometry, Perpoint, Times, Vector
 from odeform_viz.columns import Column
@@ -138,22 +138,22 @@ class ColumnFrame:
         return self.motion.stats
 
     @property
-    def likeness(self) -> Likeness | None:
+    def similarity(self) -> ShapeSimilarity | None:
         """How similar the shape is to the bodies that the model was trained on; None where these are not known."""
         if not isinstance(self.motion, Motion):
             return None
         predictor = self.column.predictor
-        return self.motion.likeness or (predictor.trust.likeness(self.column.geometry) if predictor else None)
+        return self.motion.similarity or (predictor.validity.similarity(self.column.geometry) if predictor else None)
 
     @property
-    def foreign(self) -> bool:
+    def untrained(self) -> bool:
         """Whether the model was not trained on this shape: figures of its errors on trained shapes do not hold."""
-        return self.likeness is not None and not self.likeness.same
+        return self.similarity is not None and not self.similarity.same
 
     def error_band(self, times: Times) -> Floats | None:
         """(T, 2) mm at (T,) seconds: the model error that half, and 90 %, of motions stay below; None if not known."""
         predictor = self.column.predictor
-        if predictor is None or (self.foreign and not predictor.knows_foreign_errors):
+        if predictor is None or (self.untrained and not predictor.knows_untrained_errors):
             return None
         return predictor.error_band(self.motion.parameters, times)
 
@@ -164,7 +164,7 @@ class ColumnFrame:
     @property
     def below_floor(self) -> bool:
         """Whether the body is visibly below the floor: deeper than the simulator's contacts let it sink."""
-        return self.depth > 1.001 * DEPTH  # a motion that is held is at this depth, up to rounding
+        return self.depth > 1.001 * DEPTH  # a motion that is clamped is at this depth, up to rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,7 +139,7 @@ def test_predict_stops_a_motion_that_sinks(tmp_path: Path, capsys: pytest.Captur
     assert (stopped := re.search(r"status stopped at t = ([23]\.\d+) s", said.out)) is not None
     assert f"the motion stops at t = {stopped[1]} s, because it sinks into the floor" in said.err
     with np.load(tmp_path / "a.npz", allow_pickle=False) as arrays:
-        assert arrays["vertices"][..., 2].min() > -load("kick/gp").trust.limits.depth
+        assert arrays["vertices"][..., 2].min() > -load("kick/gp").validity.limits.depth
         assert "sinks into the floor" in str(arrays["notes"])
 
 

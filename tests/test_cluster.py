@@ -20,7 +20,7 @@ from odeform.cluster import on_cluster
 from odeform.errors import InputError
 from odeform.parallel import as_completed
 from odeform.simulation.runner import simulate
-from odeform.stress.watched import check_shown
+from odeform.stress.shown import check_shown
 from odeform_figures.tables.runs import Run, complete_runs
 
 pytest.importorskip("distributed")

@@ -22,7 +22,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def describe_body(body: "Mesh") -> dict[str, Any]:
     """Vertices, size in metres, and the distance up to which another shape counts as this one: scores hold for no other
     shape."""
-    from odeform.geometry.likeness import compare_shapes
+    from odeform.geometry.shape_similarity import compare_shapes
 
     size = (body.points.max(axis=0) - body.points.min(axis=0)).tolist()
     return {"vertices": len(body.points), "size_m": size, "tolerance_m": compare_shapes(body, [body]).tolerance}

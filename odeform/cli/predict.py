@@ -68,8 +68,8 @@ def run(args: argparse.Namespace) -> None:
         _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
     elif args.geometry is not None and takes_user_bodies(predictor):
         predictor = UserBodyPredictor(predictor, user_body(read_shape(args.geometry)[0], Path(args.geometry).name))
-        fit, settings = predictor.own.fit, {**predictor.parameters_like(), **settings}
-        _note(f"{args.geometry}: its material and forces are those of the {predictor.own.like}")
+        fit, settings = predictor.user_body.fit, {**predictor.parameters_like(), **settings}
+        _note(f"{args.geometry}: its material and forces are those of the {predictor.user_body.like}")
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
         as_it_is = None if predictor.rescales_input else Similarity(rotation=UPRIGHT[shape.up or "+z"])

@@ -63,8 +63,8 @@ def _depth(predictor: Predictor, dataset: Dataset) -> Arrays:
     count = SEQUENCES if isinstance(predictor, ReducedModel) else FEW
     for recorded in itertools.islice(dataset.sequences("train"), count):
         given = observations(predictor.schema, recorded.until(window.stop))
-        watch = predictor.solve(None, recorded.parameters, observed=given).watch
-        if watch is None:
+        plausibility = predictor.solve(None, recorded.parameters, observed=given).plausibility
+        if plausibility is None:
             return {}
-        depth = max(depth, -float(watch.sample(window.times).lowest.min()))
+        depth = max(depth, -float(plausibility.sample(window.times).lowest.min()))
     return {"trained.depth_m": np.array([depth], dtype=np.float32)}

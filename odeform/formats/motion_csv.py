@@ -77,7 +77,7 @@ def _rotation(motion: Motion, times: Times) -> Floats:
 
 def _status(motion: Motion, time: float) -> str:
     flags = {
-        "untrained-shape": motion.foreign,
+        "untrained-shape": motion.untrained,
         "outside-parameters": bool(motion.outside),
         "outside-window": motion.extrapolates(time),
         "stopped": motion.stop_at(time) is not None,

@@ -49,7 +49,7 @@ def rotation_from_vector(vector: Vectors) -> Rotations:
 
 
 def _sinc(x: Floats) -> Floats:
-    """As `np.sinc`, sin(pi x) / (pi x): exact where x vanishes."""
+    """Computes `np.sinc`, sin(pi x) / (pi x): exact where x vanishes."""
     angle = np.pi * x
     safe = np.where(angle, angle, 1e-20)
     return np.sin(safe) / safe

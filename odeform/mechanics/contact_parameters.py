@@ -45,5 +45,5 @@ class ContactParameters:
         return cls(**{names.get(key, key): float(value) for key, value in data.items()})
 
     def to_json(self) -> dict[str, float]:
-        """As files have it."""
+        """Names and values as files have them."""
         return {KEYS.get(name, name): value for name, value in asdict(self).items()}

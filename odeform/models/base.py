@@ -20,7 +20,7 @@ from odeform.models.solve import solved, solved_batch
 from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.motion_batch import MotionBatch
-from odeform.motion.trust import Trust
+from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.contacts import complete_push
 from odeform.simulation.scenes.registry import surroundings_of
@@ -79,8 +79,8 @@ class Predictor(ABC):
     accurate: SolverSettings = SolverSettings("dopri5", tolerance=1e-9, dtype="float64")
     """Settings whose errors are far below those of single precision: what derivatives are taken of."""
     rescales_input: bool = True
-    """Whether a foreign shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
-    knows_foreign_errors: bool = False
+    """Whether an untrained shape is moved and scaled to fit `rest`; otherwise it is taken as it is, in metres."""
+    knows_untrained_errors: bool = False
     """Whether `error_band` holds for shapes that were not trained."""
     extrapolates: bool = True
     """Whether motions continue beyond the trained window; otherwise only the window can be scored."""
@@ -267,7 +267,8 @@ class Predictor(ABC):
 
     @property
     def own_values(self) -> dict[str, float]:
-        """What a body has of the scene's parameters where they are not given, in a scene with several bodies."""
+        """Returns what a body has of the scene's parameters where they are not given, in a scene with several
+        bodies."""
         return {}
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
@@ -304,17 +305,17 @@ class Predictor(ABC):
         return tuple(self._rests.values()) or (self.rest,)
 
     @cached_property
-    def trust(self) -> Trust:
+    def validity(self) -> Validity:
         """The trained bodies, and the limits of motions in the scene. Nothing is known of an imported scene."""
-        trust = Trust(self.bodies, error_band=self.error_band, knows_foreign_errors=self.knows_foreign_errors)
+        validity = Validity(self.bodies, error_band=self.error_band, knows_untrained_errors=self.knows_untrained_errors)
         around = self.surroundings
         if around is None:
-            return replace(trust, limits=Limits(energy=np.inf))
+            return replace(validity, limits=Limits(energy=np.inf))
         trained = self.checkpoint.arrays.get("trained.depth_m", np.zeros(1))
         limits = Limits(around.floor, max(DEPTH, DEEPER * float(trained.max())), around.gravity)
         if limits.floor is not None and self.rest.points[:, 2].min() < limits.floor - limits.depth:
             limits = Limits(None, gravity=around.gravity)
-        return replace(trust, limits=limits)
+        return replace(validity, limits=limits)
 
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         """A body at rest in the scene, in the frame in which `solve` expects it: here the scene's own."""

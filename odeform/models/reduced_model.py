@@ -19,7 +19,7 @@ from odeform.models.continuation import (
 )
 from odeform.models.solve import solved
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
-from odeform.motion.body import WatchedBody, watched_body
+from odeform.motion.body import CheckedBody, checked_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import InUse, geometry_key
@@ -112,11 +112,11 @@ class ReducedModel(Predictor):
         trajectory = self._continued(self.inputs(parameters), evaluated, settings, until)
         shown = Shown(trajectory, self.to_body)
         return ReducedMotion(
-            self.schema, parameters, geometry, self.space, evaluated, shown, self.trust, self.watched_body
+            self.schema, parameters, geometry, self.space, evaluated, shown, self.validity, self.checked_body
         )
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
-        """What is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
+        """Returns what is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
         if self.space.rolling is None:
             return y
         return self.space.with_modes(y.reshape(-1, y.shape[-1])).reshape(*y.shape[:-1], -1)
@@ -133,12 +133,12 @@ class ReducedModel(Predictor):
     ) -> MotionBatch:
         if not self.together or settings is None or not can_batch(settings):
             return super()._solve_batch(geometry, sets, settings, until)
-        given, limits, window = settings, self.trust.limits, self.schema.window
+        given, limits, window = settings, self.validity.limits, self.schema.window
 
         def part(some: Sequence[Parameters]) -> BatchPart:
             azimuths = np.array([self.schema.azimuth(each) for each in some])
             trajectory = self._continued_batch(geometry, some, given, until)
-            return BatchPart(trajectory, self.watched_body, limits, window, azimuths)
+            return BatchPart(trajectory, self.checked_body, limits, window, azimuths)
 
         parts = [part(sets[first : first + self.together]) for first in range(0, len(sets), self.together)]
         return ReducedBatch(
@@ -161,8 +161,8 @@ class ReducedModel(Predictor):
         return AdjustedBatch(trajectory, self.to_body)
 
     @cached_property
-    def watched_body(self) -> WatchedBody:
+    def checked_body(self) -> CheckedBody:
         """The trained body, for the checks of motions."""
-        limits = self.trust.limits
+        limits = self.validity.limits
         lowest = float("-inf") if limits.floor is None else limits.floor - limits.depth
-        return watched_body(self.rest, self.space, lowest)
+        return checked_body(self.rest, self.space, lowest)

@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.geometry.likeness import Likeness
+from odeform.geometry.shape_similarity import ShapeSimilarity
+from odeform.motion.plausibility import PlausibilityCheck, Stop
 from odeform.motion.remade import Remade
-from odeform.motion.trust import UNKNOWN, Trust
-from odeform.motion.watch import Stop, Watch
+from odeform.motion.validity import UNKNOWN, Validity
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, Geometry, Matrices, Points, Pose, Times
 
@@ -67,7 +67,7 @@ class Motion(Remade, ABC):
 
     A rigid motion T follows a local deformation D of the N points P0. Any time can be evaluated, in any order; the
     result does not depend on earlier calls. Points are in scene axes. From where a motion is not physically possible
-    (`odeform.motion.watch`), the last sound moment is shown, as `status` says.
+    (`odeform.motion.plausibility`), the last valid moment is shown, as `status` says.
 
     One that a predictor solved can be pickled, for other processes of one's own: it is solved again where it is read,
     to the same bits.
@@ -76,7 +76,7 @@ class Motion(Remade, ABC):
         schema: That of the predictor.
         parameters: All of them, by name.
         geometry: The shape at rest.
-        trust: What is known of how far motions of the predictor can be trusted.
+        validity: What is known of how far motions of the predictor can be trusted.
         only_at: Seconds of the one moment that is predicted, and shown at all others; None for whole motions.
 
     Examples:
@@ -96,15 +96,15 @@ class Motion(Remade, ABC):
     schema: Schema
     parameters: Parameters
     geometry: Geometry
-    trust: Trust = UNKNOWN
+    validity: Validity = UNKNOWN
     only_at: float | None = None
 
     @cached_property
-    def watch(self) -> Watch | None:
+    def plausibility(self) -> PlausibilityCheck | None:
         """Checks that the motion is physically possible; None for motions that are not checked."""
-        return self._make_watch()
+        return self._make_check()
 
-    def _make_watch(self) -> Watch | None:
+    def _make_check(self) -> PlausibilityCheck | None:
         return None
 
     @property
@@ -150,31 +150,31 @@ class Motion(Remade, ABC):
         """(T,) root-mean-square local displacement over the surface in metres, at (T,) seconds."""
 
     @cached_property
-    def likeness(self) -> Likeness | None:
+    def similarity(self) -> ShapeSimilarity | None:
         """How similar the shape is to the trained bodies; None where the checkpoint does not hold them."""
-        return self.trust.likeness(self.geometry)
+        return self.validity.similarity(self.geometry)
 
     @property
-    def foreign(self) -> bool:
+    def untrained(self) -> bool:
         """Whether the shape is none that was trained. No error is known for the motion of such a shape."""
-        likeness = self.likeness
-        return likeness is not None and not likeness.same
+        similarity = self.similarity
+        return similarity is not None and not similarity.same
 
     def error_band(self, times: Times) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions stay within. None where it is
         not known, as for most shapes that were not trained."""
-        known = not self.foreign or self.trust.knows_foreign_errors
-        return self.trust.error_band(self.parameters, times) if known else None
+        known = not self.untrained or self.validity.knows_untrained_errors
+        return self.validity.error_band(self.parameters, times) if known else None
 
     def stop_at(self, time: float) -> Stop | None:
         """Says what is shown in place of `time` in seconds, and why; None where that moment itself is shown."""
         clock = float(self.schema.window.soft_clamped(np.array(time)))
-        return None if self.watch is None else self.watch.stop_at(clock)
+        return None if self.plausibility is None else self.plausibility.stop_at(clock)
 
     def first_stop(self, until: float = np.inf) -> Stop | None:
         """The first moment before `until` in seconds from which on an earlier one is shown; checks all of it."""
         clock = float(self.schema.window.soft_clamped(np.array(min(until, LATEST * self.schema.window.stop))))
-        return None if self.watch is None else self.watch.first_stop(clock)
+        return None if self.plausibility is None else self.plausibility.first_stop(clock)
 
     @cached_property
     def status(self) -> str:
@@ -190,7 +190,7 @@ class Motion(Remade, ABC):
         body rests."""
         window = self.schema.window
         clock = window.soft_clamped(np.maximum(checked_times(t), min(window.start, 0.0)))
-        return clock if self.watch is None else self.watch.held(clock)
+        return clock if self.plausibility is None else self.plausibility.clamped(clock)
 
     @property
     def outside(self) -> tuple[str, ...]:

@@ -38,48 +38,48 @@ class BatchTrajectory(Protocol):
 class AdjustedBatch:
     """Adjusts many motions as `Adjusted` does one: the adjustment is that of coordinates (B, T, n)."""
 
-    def __init__(self, own: BatchTrajectory, adjust: Adjustment) -> None:
-        self.own, self._adjust = own, adjust
+    def __init__(self, inner: BatchTrajectory, adjust: Adjustment) -> None:
+        self.inner, self._adjust = inner, adjust
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:
-        """(B,) of `own`."""
-        return self.own.ok
+        """(B,) of `inner`."""
+        return self.inner.ok
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) of `own`."""
-        return self.own.stats
+        """(B,) of `inner`."""
+        return self.inner.stats
 
     def reduced(self, times: Times) -> Coordinates:
         """(T,) s -> (B, T, 6 + K)."""
-        return self._adjust(times, self.own.reduced(times))
+        return self._adjust(times, self.inner.reduced(times))
 
 
 class PiecewiseBatch:
     """Joins pieces of many motions as `Piecewise` does of one."""
 
-    def __init__(self, own: BatchTrajectory, stop: float, make_later: Callable[[], BatchTrajectory]) -> None:
+    def __init__(self, inner: BatchTrajectory, stop: float, make_later: Callable[[], BatchTrajectory]) -> None:
         """`make_later` is called at most once; what it returns is asked for times after `stop` only."""
-        self.own, self._stop, self._make_later = own, stop, make_later
+        self.inner, self._stop, self._make_later = inner, stop, make_later
         self._later: BatchTrajectory | None = None
         self._lock = Lock()
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:
-        """(B,) of `own`, and of what follows it where that was asked for."""
-        return self.own.ok if self._later is None else self.own.ok & self._later.ok
+        """(B,) of `inner`, and of what follows it where that was asked for."""
+        return self.inner.ok if self._later is None else self.inner.ok & self._later.ok
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) of `own`."""
-        return self.own.stats
+        """(B,) of `inner`."""
+        return self.inner.stats
 
     def reduced(self, times: Times) -> Coordinates:
         """(T,) s -> (B, T, 6 + K)."""
         later = times > self._stop
         if not later.any():
-            return self.own.reduced(times)
+            return self.inner.reduced(times)
         with self._lock:
             if self._later is None:
                 self._later = self._make_later()
@@ -87,5 +87,5 @@ class PiecewiseBatch:
         if later.all():
             return after
         y = np.empty((len(after), len(times), after.shape[2]))
-        y[:, ~later], y[:, later] = self.own.reduced(times[~later]), after
+        y[:, ~later], y[:, later] = self.inner.reduced(times[~later]), after
         return y

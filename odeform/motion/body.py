@@ -7,19 +7,19 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.plausibility import Sample
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import POSE, ReducedSpace, rotation_of
-from odeform.motion.watch import Sample
 from odeform.types import Floats, Mesh, PointCloud, Points, Rotations, Times, Vectors
 
-__all__ = ["WatchedBody", "watched_body"]
+__all__ = ["CheckedBody", "checked_body"]
 
 OUTERMOST = 256  # points that represent the body; every point of the bundled ball is within 1.5 mm of them in height
 NEAR = 2e-3  # m above the floor's limit from which on all points are looked at
 
 
 @dataclass(frozen=True, eq=False)
-class WatchedBody:
+class CheckedBody:
     """A few of its outermost points, all of them, and the height in metres below which no point may be."""
 
     few: EvaluatedBasis
@@ -73,12 +73,12 @@ def _lowest(evaluated: EvaluatedBasis, y: Floats, rotation: Rotations, shift: Ve
     return heights.min(axis=1).astype(float) + shift[:, 2] + evaluated.space.anchor[2]
 
 
-def watched_body(rest: Mesh | PointCloud, space: ReducedSpace, limit: float) -> WatchedBody:
+def checked_body(rest: Mesh | PointCloud, space: ReducedSpace, limit: float) -> CheckedBody:
     """Evaluate the basis on the trained body at rest."""
     points = np.asarray(rest.points, dtype=float)
     outermost = points[np.unique((_directions(OUTERMOST) @ (points - points.mean(axis=0)).T).argmax(axis=1))]
     few, every = (evaluate_basis(PointCloud(some), space, 0.0) for some in (outermost, points))
-    return WatchedBody(few, every, limit)
+    return CheckedBody(few, every, limit)
 
 
 def _directions(count: int) -> Points:

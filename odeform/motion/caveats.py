@@ -10,7 +10,7 @@ __all__ = ["caveats"]
 
 def caveats(motion: Motion, times: Times) -> tuple[str, ...]:
     """One sentence each: a shape that was not trained, parameters and (T,) `times` in seconds outside the trained
-    range, and where the motion is held because it is not physically possible. Empty if there is none of them."""
+    range, and where the motion is clamped because it is not physically possible. Empty if there is none of them."""
     return (
         *_shape(motion),
         *_parameters(motion),
@@ -21,10 +21,10 @@ def caveats(motion: Motion, times: Times) -> tuple[str, ...]:
 
 
 def _shape(motion: Motion) -> list[str]:
-    likeness = motion.likeness
-    if likeness is None or likeness.same:
+    similarity = motion.similarity
+    if similarity is None or similarity.same:
         return []
-    return [f"{likeness.describe()}; {motion.trust.foreign}"]
+    return [f"{similarity.describe()}; {motion.validity.untrained}"]
 
 
 def _parameters(motion: Motion) -> list[str]:

@@ -23,28 +23,28 @@ class FloorProjection:
 
     def __init__(
         self,
-        own: Moving,
+        inner: Moving,
         lowest: Callable[[Floats], Floats],
         limit: float,
         grid: Float[np.ndarray, " grid"] | None = None,
         most: float = MOST,
     ) -> None:
-        """`lowest` maps coordinates (R, 6 + K) of `own` to the height of the lowest point (R,) in m, which may be
+        """`lowest` maps coordinates (R, 6 + K) of `inner` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
         A moment that would have to be raised by more than `most` m stays as it is. With `grid`, in s, the change is
         linear between these times; after them, each moment has its own.
         """
-        self._own, self._lowest, self._limit, self._grid, self._most = own, lowest, limit, grid, most
+        self._inner, self._lowest, self._limit, self._grid, self._most = inner, lowest, limit, grid, most
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
-        """Coordinates (T, 6 + K) of `own` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
+        """Coordinates (T, 6 + K) of `inner` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
         if self._grid is None or times.min() > self._grid[-1]:
             return raised(y, self._lowest, self._limit, self._most)
         return _moved_up(y, self._between(times, y, self._grid))
 
     def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
-        """Of each motion, from the changes on the grid."""
+        """Interpolates the changes of each motion on the grid."""
         by = np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
         by = by.reshape(y.shape[:-1])
         if len(later := np.flatnonzero(times > grid[-1])):
@@ -55,7 +55,7 @@ class FloorProjection:
     def _on_grid(self) -> Floats:
         """(G,) m at the times of the grid, or (B, G)."""
         assert self._grid is not None
-        return self._missing(self._own.reduced(self._grid))
+        return self._missing(self._inner.reduced(self._grid))
 
     def _missing(self, y: Floats) -> Floats:
         return _missing(y, self._lowest, self._limit, self._most)

@@ -20,9 +20,9 @@ from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid, rotation_z
 from odeform.geometry.shape import surface_weights
 from odeform.motion.base import Motion, SolveStats
+from odeform.motion.plausibility import PlausibilityCheck, Sample
 from odeform.motion.reduced_space import to_canonical
-from odeform.motion.trust import UNKNOWN, Trust
-from odeform.motion.watch import Sample, Watch
+from odeform.motion.validity import UNKNOWN, Validity
 from odeform.schema import Parameters, Schema, soft_clip
 from odeform.types import Frames, Geometry, Matrices, Mesh, Points, Pose, Times, Vector, Vectors
 
@@ -137,11 +137,11 @@ class PointMotion(Motion):
         probes: Probes,
         shape: PointTrajectory,
         body: PointTrajectory,
-        trust: Trust = UNKNOWN,
+        validity: Validity = UNKNOWN,
     ) -> None:
         self.schema, self.parameters, self.geometry = schema, parameters, geometry
         self._frame, self._mean, self._probes, self._shape, self._body = frame, mean, probes, shape, body
-        self.trust = trust
+        self.validity = validity
         self._points = np.asarray(geometry.points, dtype=np.float32)
         self._turn = rotation_z(schema.azimuth(parameters))
         self._last: tuple[float, Points] | None = None
@@ -207,8 +207,8 @@ class PointMotion(Motion):
         """(T, N, 3) metres, canonical, float32; (1, N, 3) for a single time."""
         return _predicted(trajectory, self._mean, self._frame, self._clock(t))
 
-    def _make_watch(self) -> Watch | None:
-        if self.trust is UNKNOWN:
+    def _make_check(self) -> PlausibilityCheck | None:
+        if self.validity is UNKNOWN:
             return None
         body, probes, mean, frame = self._body, self._probes, self._mean, self._frame
 
@@ -218,7 +218,7 @@ class PointMotion(Motion):
             moved = probes.points + _predicted(body, mean, frame, times) + np.array(frame.anchor)
             return Sample(moved[..., 2].min(axis=1), np.zeros(len(times)), moved.mean(axis=1))
 
-        return Watch(self.trust.limits, self.schema.window, sample)
+        return PlausibilityCheck(self.validity.limits, self.schema.window, sample)
 
 
 def _predicted(trajectory: PointTrajectory, mean: MeanMotion, frame: PointFrame, times: Times) -> Frames:

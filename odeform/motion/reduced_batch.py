@@ -7,14 +7,14 @@ import numpy as np
 from jaxtyping import Bool
 
 from odeform.motion.base import LATEST, Motion, SolveStats
+from odeform.motion.batch_plausibility import BatchPlausibility
 from odeform.motion.batch_trajectory import BatchTrajectory, Coordinates
-from odeform.motion.batch_watch import BatchWatch
-from odeform.motion.body import WatchedBody
+from odeform.motion.body import CheckedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.limits import Limits
 from odeform.motion.motion_batch import BatchPoses, BatchVertices, MotionBatch
+from odeform.motion.plausibility import Sample
 from odeform.motion.reduced_motion import moved_points, placements, poses_of
-from odeform.motion.watch import Sample
 from odeform.schema import Parameters, Window
 from odeform.types import Floats, Ints, Times
 
@@ -25,12 +25,12 @@ class BatchPart:
     """Some of the motions of a batch, in their order."""
 
     def __init__(
-        self, trajectory: BatchTrajectory, body: WatchedBody, limits: Limits, window: Window, azimuths: Times
+        self, trajectory: BatchTrajectory, body: CheckedBody, limits: Limits, window: Window, azimuths: Times
     ) -> None:
-        """`body` is the trained one, by which motions are watched over, `azimuths` (B,) are in radians."""
+        """`body` is the trained one, by which motions are checked for plausibility, `azimuths` (B,) are in radians."""
         self.trajectory, self.azimuths = trajectory, azimuths
         self._body, self._window = body, window
-        self.watch = BatchWatch(
+        self.plausibility = BatchPlausibility(
             limits, window, len(azimuths), lambda times: self._sample(times, trajectory.reduced(times))
         )
 
@@ -38,15 +38,16 @@ class BatchPart:
         return self._body.sample(y.reshape(-1, y.shape[-1]), np.tile(self._window.passed(times), len(y)))
 
     def reduced(self, times: Times) -> tuple[Coordinates, Bool[np.ndarray, " batch"]]:
-        """(B, T, 6 + K) at (T,) seconds of the clock, bounded, and which motions (B,) are sound there."""
+        """(B, T, 6 + K) at (T,) seconds of the clock, bounded, and which motions (B,) are valid there."""
         y = self.trajectory.reduced(times)
-        sound = self.watch.sound(times, self._sample(times, y)) & self.trajectory.ok
+        valid = self.plausibility.valid(times, self._sample(times, y)) & self.trajectory.ok
         windows = np.tile(self._window.passed(times), len(y))
-        return self._body.all.space.bounded(y.reshape(-1, y.shape[-1]), windows).reshape(y.shape), sound
+        return self._body.all.space.bounded(y.reshape(-1, y.shape[-1]), windows).reshape(y.shape), valid
 
 
 class ReducedBatch(MotionBatch):
-    """Motions that are solved in parts. One that is held at its last sound moment, or whose solver failed, is asked by
+    """Motions that are solved in parts. One that is clamped at its last valid moment, or whose solver failed, is asked
+    by
     itself: it is as `Predictor.solve` has it."""
 
     def __init__(
@@ -78,7 +79,7 @@ class ReducedBatch(MotionBatch):
     def status(self) -> tuple[str, ...]:
         """(B,) as `Motion.status`: that of the solver, and from where on a motion is not physically possible."""
         latest = float(self._window.soft_clamped(np.array(LATEST * self._window.stop)))
-        good = [part.watch.sound_throughout(latest) & part.trajectory.ok for part in self._parts]
+        good = [part.plausibility.valid_throughout(latest) & part.trajectory.ok for part in self._parts]
         return tuple("ok" if ok else self[index].status for index, ok in enumerate(np.concatenate(good)))
 
     def vertices(self, t: float | Times) -> BatchVertices:
@@ -118,11 +119,11 @@ class ReducedBatch(MotionBatch):
         clock = self._window.soft_clamped(times)
         out, first = np.empty((len(self), len(times), *shape), dtype), 0
         for part in self._parts:
-            y, sound = part.reduced(clock)
-            for azimuth in np.unique(part.azimuths[sound]):
-                members = np.flatnonzero(sound & (part.azimuths == azimuth))
+            y, valid = part.reduced(clock)
+            for azimuth in np.unique(part.azimuths[valid]):
+                members = np.flatnonzero(valid & (part.azimuths == azimuth))
                 together(float(azimuth), y[members], out, first + members)
-            for index in np.flatnonzero(~sound):
+            for index in np.flatnonzero(~valid):
                 out[first + index] = alone(self[int(first + index)], times)
             first += len(y)
         return out[:, 0] if np.ndim(t) == 0 else out

@@ -7,14 +7,14 @@ from jaxtyping import Float
 
 from odeform.errors import InputError
 from odeform.motion.base import Motion, SolveStats
-from odeform.motion.body import WatchedBody
+from odeform.motion.body import CheckedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
+from odeform.motion.plausibility import PlausibilityCheck, Sample
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
 from odeform.motion.threads import thread_map
 from odeform.motion.trajectory import Trajectory
-from odeform.motion.trust import UNKNOWN, Trust
-from odeform.motion.watch import Sample, Watch
+from odeform.motion.validity import UNKNOWN, Validity
 from odeform.schema import Parameters, Schema
 from odeform.types import Floats, Frames, GaussianSplats, Geometry, Matrices, Points, Pose, Rotations, Times, Vectors
 
@@ -29,7 +29,7 @@ MANY = 16  # from this number on, blocks are shared among the cores
 class ReducedMotion(Motion):
     """T(t) and D(t) separately: a pose, and coefficients of a basis. `evaluated` is the basis on the geometry.
 
-    `body` is the trained body, whose motion is watched over: it is the same for every shape.
+    `body` is the trained body, whose motion is checked for plausibility: it is the same for every shape.
     """
 
     schema: Schema
@@ -38,10 +38,10 @@ class ReducedMotion(Motion):
     space: ReducedSpace
     evaluated: EvaluatedBasis
     trajectory: Trajectory
-    trust: Trust = UNKNOWN
-    body: WatchedBody | None = None
+    validity: Validity = UNKNOWN
+    body: CheckedBody | None = None
 
-    def _make_watch(self) -> Watch | None:
+    def _make_check(self) -> PlausibilityCheck | None:
         body, trajectory, window = self.body, self.trajectory, self.schema.window
         if body is None:
             return None
@@ -50,7 +50,7 @@ class ReducedMotion(Motion):
         def sample(times: Times) -> Sample:
             return body.sample(trajectory.reduced(times), window.passed(times))
 
-        return Watch(self.trust.limits, window, sample)
+        return PlausibilityCheck(self.validity.limits, window, sample)
 
     @property
     def stats(self) -> SolveStats:

@@ -21,7 +21,7 @@ Adjustment = Callable[[Times, Floats], Floats]
 
 @runtime_checkable
 class Moving(Protocol):
-    """What has reduced coordinates over time: one motion, or many."""
+    """Has reduced coordinates over time: one motion, or many."""
 
     def reduced(self, times: Times) -> Float[np.ndarray, "*batch times y"]:
         """(T,) seconds -> (T, 6 + K), or (B, T, 6 + K)."""
@@ -50,30 +50,30 @@ class Trajectory(Protocol):
 class Adjusted:
     """The coordinates of another trajectory, changed moment by moment."""
 
-    def __init__(self, own: Trajectory, adjust: Adjustment) -> None:
-        self.own, self._adjust = own, adjust
+    def __init__(self, inner: Trajectory, adjust: Adjustment) -> None:
+        self.inner, self._adjust = inner, adjust
 
     @property
     def stats(self) -> SolveStats:
-        """How `own` was computed."""
-        return self.own.stats
+        """How `inner` was computed."""
+        return self.inner.stats
 
     @property
     def last_good(self) -> float:
-        """Seconds up to which `own` is valid."""
-        return self.own.last_good
+        """Seconds up to which `inner` is valid."""
+        return self.inner.last_good
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K)."""
-        return self._adjust(times, self.own.reduced(times))
+        return self._adjust(times, self.inner.reduced(times))
 
 
 class Shown(Adjusted):
     """An adjusted trajectory whose last results are kept: pose, deformation and gradient of a time are evaluated one
     after the other. They are read-only."""
 
-    def __init__(self, own: Trajectory, adjust: Adjustment) -> None:
-        super().__init__(own, adjust)
+    def __init__(self, inner: Trajectory, adjust: Adjustment) -> None:
+        super().__init__(inner, adjust)
         self._recent: Recent[Floats] = Recent(RECENT)
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
@@ -91,32 +91,32 @@ class Shown(Adjusted):
 class Piecewise:
     """One trajectory up to `stop` seconds, and from there on another, which is made when it is first asked for."""
 
-    def __init__(self, own: Trajectory, stop: float, make_later: Callable[[], Trajectory]) -> None:
-        """`make_later` is called at most once, and not if `own` fails before `stop`: it then stays at its last state.
+    def __init__(self, inner: Trajectory, stop: float, make_later: Callable[[], Trajectory]) -> None:
+        """`make_later` is called at most once, and not if `inner` fails before `stop`: it then stays at its last state.
 
         The later trajectory is asked for times after `stop` only.
         """
-        self.own, self._stop, self._make_later = own, stop, make_later
+        self.inner, self._stop, self._make_later = inner, stop, make_later
         self._later: Trajectory | None = None
         self._lock = Lock()
 
     @property
     def stats(self) -> SolveStats:
-        """How `own` was computed."""
-        return self.own.stats
+        """How `inner` was computed."""
+        return self.inner.stats
 
     @property
     def last_good(self) -> float:
         """Seconds up to which it is valid, as far as it is known."""
-        good = self.own.last_good
+        good = self.inner.last_good
         return good if good < self._stop or self._later is None else self._later.last_good
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
         """(T,) s -> (T, 6 + K)."""
         times = np.asarray(times, dtype=float)
         later = times > self._stop
-        if not later.any() or self.own.last_good < self._stop:
-            return self.own.reduced(np.minimum(times, self._stop))
+        if not later.any() or self.inner.last_good < self._stop:
+            return self.inner.reduced(np.minimum(times, self._stop))
         with self._lock:
             if self._later is None:
                 self._later = self._make_later()
@@ -124,5 +124,5 @@ class Piecewise:
         if later.all():
             return after
         y = np.empty((len(times), after.shape[1]))
-        y[~later], y[later] = self.own.reduced(times[~later]), after
+        y[~later], y[later] = self.inner.reduced(times[~later]), after
         return y

@@ -49,7 +49,7 @@ class Together:
         self.fields = fields
 
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
-        """As `BatchField`."""
+        """See `BatchField`."""
         each = zip(rows.tolist(), times.tolist(), states, strict=True)
         return np.stack([self.fields[row](time, state) for row, time, state in each])
 

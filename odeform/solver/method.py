@@ -1,4 +1,4 @@
-"""What `integrate` knows of a method, explicit or implicit."""
+"""Defines what `integrate` knows of a method, explicit or implicit."""
 
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable

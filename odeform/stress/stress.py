@@ -24,8 +24,8 @@ from odeform.stress.check import Check, Checks
 from odeform.stress.consistency import check_consistency
 from odeform.stress.convergence import check_orders, check_refining
 from odeform.stress.physics import check_physics
+from odeform.stress.shown import DRAWS, check_shown
 from odeform.stress.solvers import check_calibration, check_field, check_sensitivities
-from odeform.stress.watched import DRAWS, check_shown
 from odeform.types import Floats, Geometry, Times
 
 __all__ = ["Outcome", "report", "run_case", "stress"]

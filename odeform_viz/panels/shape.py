@@ -102,8 +102,8 @@ class ShapePanel(Panel):
 
     def _show(self) -> None:
         predictor, fit = self._page.model.predictor, self._fit
-        likeness = predictor.trust.likeness(fit.geometry) if predictor and fit else None
-        self._text.content = describe_fit(fit, self._name, likeness) if fit else TRAINED
+        similarity = predictor.validity.similarity(fit.geometry) if predictor and fit else None
+        self._text.content = describe_fit(fit, self._name, similarity) if fit else TRAINED
         self._back.visible = self._fit is not None
         self._keep.visible = self._fit is not None and bool(self._fit.upright)
         self._region.show(self._fit)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from odeform.geometry.likeness import Likeness
+from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.user_bodies import UserBodyPredictor
@@ -13,15 +13,15 @@ __all__ = ["ShapeWarningPanel", "shape_warning"]
 STYLE = "margin:0.4em 0.8em;padding:0.5em 0.8em;border-radius:0.4em;background:#b54708;color:#fff;font-size:0.85em"
 
 
-def shape_warning(likenesses: Iterable[Likeness | None], model: UserBodyPredictor | None = None) -> str:
+def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBodyPredictor | None = None) -> str:
     """HTML; empty if all shapes were trained, or nothing is known of the trained ones.
 
     `model` is a mechanical model that has made a body of the shape.
     """
-    foreign = [likeness for likeness in likenesses if likeness is not None and not likeness.same]
-    if not foreign:
+    untrained = [similarity for similarity in similarities if similarity is not None and not similarity.same]
+    if not untrained:
         return ""
-    worst = max(foreign, key=lambda likeness: likeness.mean)
+    worst = max(untrained, key=lambda similarity: similarity.mean)
     return (
         f'<div style="{STYLE}"><b>⚠ Shape not trained</b><br>Its surface is on average {1e3 * worst.mean:.0f} mm from '
         f"the trained body's, at most {1e3 * worst.distance:.0f} mm. {_motion(model)}.</div>"
@@ -32,10 +32,10 @@ def _motion(model: UserBodyPredictor | None) -> str:
     if model is None:
         return "It moves as the trained body would; no error is known"
     motion = model.describe_motion().capitalize()
-    if not model.knows_foreign_errors:
+    if not model.knows_untrained_errors:
         return f"{motion}; no error is known"
     away = f"{100.0 * model.distance:.1f} % of its size"
-    return f"{motion}. Its error is estimated from other unseen shapes: it is {away} from the {model.own.like}"
+    return f"{motion}. Its error is estimated from other unseen shapes: it is {away} from the {model.user_body.like}"
 
 
 class ShapeWarningPanel(Panel):
@@ -49,12 +49,12 @@ class ShapeWarningPanel(Panel):
 
     def describe(self, description: Description) -> None:
         # in a scene with several objects, the parameters select the trained body
-        self._show(shape_warning((shown.likeness for shown in description.frame.columns), self._user_model))
+        self._show(shape_warning((shown.similarity for shown in description.frame.columns), self._user_model))
 
     def _refresh(self) -> None:
         columns = [c for c in self._page.columns.all if c.visible and c.predictor]
-        likenesses = (c.predictor.trust.likeness(c.geometry) for c in columns if c.predictor)
-        self._show(shape_warning(likenesses, self._user_model))
+        similarities = (c.predictor.validity.similarity(c.geometry) for c in columns if c.predictor)
+        self._show(shape_warning(similarities, self._user_model))
 
     @property
     def _user_model(self) -> UserBodyPredictor | None:

@@ -48,7 +48,7 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
     only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
     if only is not None and abs(time - only) > 1e-6:
         return [f"⚠ **only t = {only:.3g} s is predicted**: that state is shown, not this moment's"]
-    if shown.foreign and not predictor.knows_foreign_errors:
+    if shown.untrained and not predictor.knows_untrained_errors:
         return ["model error: unknown, this shape was not trained"]
     band = shown.error_band(np.array([time]))
     if band is None:
@@ -56,7 +56,7 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
     else:
         rough = " (extrapolated: rough)" if shown.motion.extrapolates(time) or shown.motion.outside else ""
         lines = [f"model error here ≈ RMSE {band[0, 0]:.2f} mm, 90 % below {band[0, 1]:.2f} mm{rough}"]
-    if shown.foreign:
+    if shown.untrained:
         return [*lines, "as measured on other shapes that were not trained"]
     score = predictor.checkpoint.scores.get("rmse_pooled_mm")
     return lines if score is None else [*lines, f"test error of the checkpoint: RMSE {score:.2f} mm"]

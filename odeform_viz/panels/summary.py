@@ -14,7 +14,7 @@ ON_FRAME = 0.02  # frames; closer times count as on the frame
 
 def summarize(frame: Frame) -> str:
     """Markdown: inside the trained range or extrapolated, stopped, below the floor, to be computed, or refused."""
-    lines = [*_push(frame), _trust(frame)]
+    lines = [*_push(frame), _validity(frame)]
     for column in frame.columns:
         if stop := column.stop_at(frame.request.time):
             lines.append(f"⚠ **{column.column.label} stopped at {stop.time:.3f} s**: {stop.reason} afterwards")
@@ -31,7 +31,7 @@ def _push(frame: Frame) -> list[str]:
     return [] if found is None else [describe_push(*found)]
 
 
-def _trust(frame: Frame) -> str:
+def _validity(frame: Frame) -> str:
     models = [c for c in frame.columns if c.column.predictor]
     if not models:
         return "only the truth is visible" if frame.columns else "no column is visible"
@@ -39,11 +39,11 @@ def _trust(frame: Frame) -> str:
     outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
     if motion.extrapolates(time):
         outside.insert(0, "time")
-    foreign = "⚠ **shape not trained**; " if any(c.foreign for c in models) else ""
+    untrained = "⚠ **shape not trained**; " if any(c.untrained for c in models) else ""
     if outside:
-        return f"{foreign or '⚠ '}**extrapolated**: {', '.join(outside)} outside the trained range"
-    if foreign:
-        return f"{foreign}parameters and time inside the trained range"
+        return f"{untrained or '⚠ '}**extrapolated**: {', '.join(outside)} outside the trained range"
+    if untrained:
+        return f"{untrained}parameters and time inside the trained range"
     window = motion.schema.window
     phase = (time - window.start) * window.rate
     on_frame = abs(phase - round(phase)) < ON_FRAME

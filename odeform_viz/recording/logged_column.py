@@ -163,8 +163,8 @@ class LoggedColumn:
 
     def _log_status(self, shown: ColumnFrame, time: float) -> None:
         problems = [shown.stats.status] if shown.stats.status != "ok" else []
-        if shown.foreign and shown.likeness:
-            problems.append(shown.likeness.describe())
+        if shown.untrained and shown.similarity:
+            problems.append(shown.similarity.describe())
         if stop := shown.stop_at(time):
             problems.append(f"stopped at t = {stop.time:.3f} s: {stop.reason} afterwards")
         status = f"{self.column.label}: {shown.stats.solver}, {'; '.join(problems) or 'ok'}"

@@ -51,9 +51,9 @@ def provenance_of(column: Column) -> dict[str, Any]:
         return {**common, "truth": False, "parameters": dict(column.source.parameters)}
     assert column.predictor is not None
     checkpoint = column.predictor.checkpoint
-    likeness = column.predictor.trust.likeness(column.geometry)
-    foreign = likeness is not None and not likeness.same
-    scores = {} if foreign else {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"}
+    similarity = column.predictor.validity.similarity(column.geometry)
+    untrained = similarity is not None and not similarity.same
+    scores = {} if untrained else {k: v for k, v in checkpoint.scores.items() if k != "per_frame_rmse_mm"}
     return {
         **common,
         "truth": False,
@@ -62,7 +62,7 @@ def provenance_of(column: Column) -> dict[str, Any]:
         "schema": checkpoint.schema.to_json(),
         "provenance": checkpoint.provenance,
         "scores": scores,
-        "likeness": likeness and {"trained": likeness.same, **asdict(likeness)},
+        "likeness": similarity and {"trained": similarity.same, **asdict(similarity)},
     }
 
 

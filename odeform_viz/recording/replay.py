@@ -124,8 +124,8 @@ def _load_columns(recording: Recording) -> tuple[dict[str, Column], dict[str, Ch
             continue
         if column.predictor is not None:
             result.problem = _changed(column, str(facts["sha256"]))
-            likeness = column.predictor.trust.likeness(column.geometry)
-            result.note = "" if likeness is None or likeness.same else likeness.describe()
+            similarity = column.predictor.validity.similarity(column.geometry)
+            result.note = "" if similarity is None or similarity.same else similarity.describe()
         if not result.problem:
             columns[name] = column
     return columns, checked

@@ -80,7 +80,7 @@ def test_motions_go_on_after_the_window_as_each_alone(name: str) -> None:
 def test_a_motion_that_is_held_is_held_as_alone() -> None:
     predictor = load("kick")
     # bodies that may deform less than the trained ones do: some motions end early, others do not
-    predictor.trust = replace(predictor.trust, limits=replace(predictor.trust.limits, deformation=0.4))
+    predictor.validity = replace(predictor.validity, limits=replace(predictor.validity.limits, deformation=0.4))
     given = {"mass": np.geomspace(0.4, 1.5, 6), "force": np.linspace(160.0, 90.0, 6)}
     batch = predictor.solve_batch(given, "draft")
     times = predictor.schema.window.times[::12]

@@ -64,9 +64,9 @@ def test_another_body_is_pushed_where_and_as_hard_as_suits_it(trained: PerObject
     moved = motion.vertices(0.04)
     assert motion.stats.status == "ok"
     assert np.abs(moved - bottle.fit.geometry.points).max() > 1e-3
-    likeness = predictor.trust.likeness(bottle.fit.geometry)
-    assert likeness is not None
-    assert not likeness.same
+    similarity = predictor.validity.similarity(bottle.fit.geometry)
+    assert similarity is not None
+    assert not similarity.same
     assert predictor.error_band(given, np.zeros(1)) is None
 
 

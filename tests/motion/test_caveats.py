@@ -53,7 +53,7 @@ def test_a_motion_that_stops(sinking: Predictor) -> None:
     assert motion.status == f"stopped at t = {stop.time:.4g} s: it sinks into the floor"
     assert f"the motion stops at t = {stop.time:.4g} s" in caveats(motion, np.array([3.5]))[-1]
     assert all("stops" not in said for said in caveats(motion, np.array([2.0])))
-    assert motion.vertices(3.5)[:, 2].min() == pytest.approx(2.5e-4 - sinking.trust.limits.depth, abs=1e-5)
+    assert motion.vertices(3.5)[:, 2].min() == pytest.approx(2.5e-4 - sinking.validity.limits.depth, abs=1e-5)
     assert np.array_equal(motion.vertices(3.9), motion.vertices(3.5))
     assert np.array_equal(motion.pose(3.9), motion.pose(3.5))
 
@@ -61,6 +61,6 @@ def test_a_motion_that_stops(sinking: Predictor) -> None:
 def test_another_shape_stops_with_the_trained_body(sinking: Predictor) -> None:
     egg = replace(sinking.rest, points=sinking.rest.points * np.float32([1.0, 1.0, 0.7]))
     motion, trained = sinking.solve(egg, SINKING), sinking.solve(None, SINKING)
-    assert motion.foreign
+    assert motion.untrained
     assert motion.first_stop() == trained.first_stop()
     assert caveats(motion, np.array([0.5]))[0].startswith("this shape was not trained")

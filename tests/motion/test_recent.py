@@ -53,10 +53,10 @@ def test_a_shape_that_was_changed_in_place_moves_as_it_is_now(name: str) -> None
     mesh = Mesh(predictor.rest.points.copy(), predictor.rest.faces)
     first = predictor.solve(mesh, until=0.1)
     before = first.vertices(0.1).copy()
-    assert not first.foreign
+    assert not first.untrained
     mesh.points[:] += np.float32([0.01, 0.0, 0.05])
     again, other = predictor.solve(mesh, until=0.1), predictor.solve(Mesh(mesh.points.copy(), mesh.faces), until=0.1)
     np.testing.assert_array_equal(again.vertices(0.1), other.vertices(0.1))
     np.testing.assert_array_equal(again.vertices(0.0), mesh.points)
-    assert again.foreign == other.foreign
+    assert again.untrained == other.untrained
     np.testing.assert_array_equal(first.vertices(0.1), before)

@@ -170,7 +170,7 @@ def test_non_finite_frames_are_not_shown_but_counted_without_the_watch(
     outcomes = _outcomes(model, cases)
     assert [outcome.non_finite for outcome in outcomes] == [0] * len(cases)
     assert all("stopped: it is not finite" in outcome.status for outcome in outcomes)
-    monkeypatch.setattr(ReducedMotion, "_make_watch", lambda _: None)
+    monkeypatch.setattr(ReducedMotion, "_make_check", lambda _: None)
     assert [outcome.non_finite for outcome in _outcomes(model, cases)] == [3] * len(cases)
 
 

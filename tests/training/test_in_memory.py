@@ -110,8 +110,8 @@ def test_arrays_of_a_scene_of_ones_own_may_have_a_floor(tmp_path: Path) -> None:
     odeform.fit(dataset, "nearest", report=quiet).save(tmp_path / "moon.safetensors")
     moon, unknown = odeform.load(tmp_path / "moon.safetensors"), odeform.fit(balls(), "nearest", report=quiet)
     assert moon.surroundings == around
-    assert (moon.trust.limits.floor, moon.trust.limits.gravity) == (around.floor, 1.6)
-    assert (unknown.surroundings, unknown.trust.limits.floor) == (None, None)
+    assert (moon.validity.limits.floor, moon.validity.limits.gravity) == (around.floor, 1.6)
+    assert (unknown.surroundings, unknown.validity.limits.floor) == (None, None)
 
 
 def test_nothing_is_written_unless_it_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,7 +32,7 @@ class Predictions:
 
 def predictions(predictor: UserBodyPredictor, nearest: Predictor, truth: MotionSequence) -> Predictions:
     """All of one push. `nearest` is the trained model whose own object is carried over to the shape."""
-    like = predictor.own.like
+    like = predictor.user_body.like
     given = {**truth.parameters, **predictor.parameters_like()}
     motion = predictor.solve(None, given, until=float(truth.times[-1]))
     rest, times = truth.rest.points.astype(float), truth.times

@@ -1,4 +1,4 @@
-"""What is learned of a rolling body: how the floor pushes it, as functions of its material and its motion.
+"""Holds what is learned of a rolling body: how the floor pushes it, as functions of its material and its motion.
 
 Each coefficient is the exponential of a quadratic function of the material. A small network of the depth and the
 velocities of the contact adds to some of the exponents. It changes how strong forces are, never which way they point:
@@ -55,9 +55,9 @@ class RollingContact:
     """The numbers of one law."""
 
     terms: Float[np.ndarray, "coefficients terms"]
-    """Of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
+    """Coefficients of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
     settled: Float[np.ndarray, "places linear"]
-    """Of linear functions of the material: mm by which the body stands higher at each of `PLACES`."""
+    """Coefficients of linear functions of the material: mm by which the body stands higher at each of `PLACES`."""
     first: Float[np.ndarray, "inputs hidden"]
     bias: Float[np.ndarray, " hidden"]
     last: Float[np.ndarray, "hidden adjusted"]

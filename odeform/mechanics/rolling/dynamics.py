@@ -55,10 +55,10 @@ SPIN = 1.0  # rad/s, from which on rolling is braked fully
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """What the floor does at one moment to the bodies that touch it, (C,) each."""
+    """Describes what the floor does at one moment to the bodies that touch it, (C,) each."""
 
     rows: Ints
-    """Of all motions."""
+    """Indices among all motions."""
     angle: Floats
     moving: Float[np.ndarray, "3 contacts"]
     """Speed ahead and up, and spin."""
@@ -74,7 +74,7 @@ class Contacts:
     """cm."""
     sliding: Floats
     inputs: Float[np.ndarray, "contacts inputs"]
-    """Of the network."""
+    """Inputs of the network."""
     hidden: Float[np.ndarray, "contacts hidden"]
     exponents: Float[np.ndarray, "contacts adjusted"]
     strong: Float[np.ndarray, "contacts adjusted"]

@@ -42,8 +42,8 @@ LAST, HEIGHTS = INPUTS * HIDDEN, (INPUTS + STRONG) * HIDDEN
 
 
 def units_of(radius: float) -> Float[np.ndarray, "8"]:
-    """What the entries of a state are multiplied by to be integrated: angle and spin become the way and the speed of
-    the rim, so that a solver bounds errors in m and m/s alike."""
+    """Factors by which the entries of a state are multiplied to be integrated: angle and spin become the way and the
+    speed of the rim, so that a solver bounds errors in m and m/s alike."""
     units = np.ones(STATE)
     units[[2, 5]] = radius
     return units
@@ -64,7 +64,7 @@ def make_field(law: RollingContact, support: Support, radius: float, material: F
 
 
 def shared_numbers(law: RollingContact, support: Support) -> Float[np.ndarray, " numbers"]:
-    """What all motions under a law have in common, as `_slope` is given it."""
+    """Collects what all motions have in common, as `_slope` is given it."""
     return np.concatenate([law.first[:INPUTS].ravel(), law.last.ravel(), support.heights, support.slopes])
 
 

@@ -36,14 +36,15 @@ class Support:
         return (self.slopes[index + 1] - self.slopes[index]) * (len(self.slopes) - 1) / (2.0 * np.pi)
 
     def _place(self, angles: Floats) -> tuple[Ints, Floats]:
-        """Of angles (...) in the tables: the entry before, and how far on towards the next one."""
+        """Finds angles (...) in the tables: the entry before, and how far on towards the next one."""
         place = np.mod(angles / (2.0 * np.pi), 1.0) * (len(self.heights) - 1)
         index = np.minimum(place.astype(int), len(self.heights) - 2)
         return index, place - index
 
 
 def support_of(points: Points, axis: Vector) -> Support:
-    """Of a body's points (N, 3) in m about its anchor, which turns about the level unit vector `axis`."""
+    """Makes the support of a body's points (N, 3) in m about its anchor, which turns about the level unit vector
+    `axis`."""
     angles = np.linspace(0.0, 2.0 * np.pi, ANGLES + 1)
     ahead = points @ np.cross(axis, UP)
     # a positive angle turns the direction ahead downwards

@@ -37,7 +37,7 @@ from odeform.motion.recent import Recent, geometry_key
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
-from odeform.motion.trust import Trust
+from odeform.motion.validity import Validity
 from odeform.schema import Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, Times, Vectors
@@ -130,10 +130,10 @@ class ModalModel(Model):
     # these take a moment, and not every object of a checkpoint is looked at
 
     @cached_property
-    def trust(self) -> Trust:
+    def validity(self) -> Validity:
         # mechanics loses energy by itself; that of the centre alone may grow, as when a body falls over
-        trust = super().trust
-        return replace(trust, limits=replace(trust.limits, energy=float("inf")))
+        validity = super().validity
+        return replace(validity, limits=replace(validity.limits, energy=float("inf")))
 
     @property
     def mechanics(self) -> Mechanics:
@@ -299,6 +299,6 @@ class ModalModel(Model):
         return AdjustedBatch(motion, self._projection(motion))
 
     def _projection(self, motion: Moving) -> FloorProjection:
-        body, window = self.watched_body, self.schema.window
+        body, window = self.checked_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
         return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid, SUNK)

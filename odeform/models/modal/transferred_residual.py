@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.geometry.contact import nearest_on
-from odeform.geometry.likeness import compare_shapes
+from odeform.geometry.shape_similarity import compare_shapes
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import PushRegression
 from odeform.models.modal.coordinates import coordinates_of

@@ -21,7 +21,7 @@ from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
 from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
 from odeform.models.per_object import PerObject
 from odeform.motion.recent import Recent
-from odeform.motion.trust import Trust
+from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Points, Times
@@ -112,16 +112,16 @@ def _part_of(predictor: Predictor, like: str = "") -> ModalModel | None:
     return predictor if isinstance(predictor, ModalModel) else None
 
 
-def _largest(part: ModalModel, own: UserBody) -> list[float]:
+def _largest(part: ModalModel, user_body: UserBody) -> list[float]:
     """m: the largest shift and deformation that motions of a body are bounded by, softly.
 
     At least those of the trained body. A lighter one may fly as far as the strongest pulse throws it, a larger one may
     deform more.
     """
     shift, deformation = part.checkpoint.config["largest"]
-    solid, window = own.body.solid, part.schema.window
-    thrown = own.item.forces[1] * part.pulse / solid.mass * window.stop
-    sizes = [float(np.ptp(body.points, axis=0).max()) for body in (own.body, part.body)]
+    solid, window = user_body.body.solid, part.schema.window
+    thrown = user_body.item.forces[1] * part.pulse / solid.mass * window.stop
+    sizes = [float(np.ptp(body.points, axis=0).max()) for body in (user_body.body, part.body)]
     return [max(shift, thrown), deformation * max(sizes[0] / sizes[1], 1.0)]
 
 
@@ -133,14 +133,14 @@ class UserBodyPredictor(ModalModel):
             `odeform.models.modal.transferred_residual.shape_distance`.
     """
 
-    def __init__(self, trained: Predictor, own: UserBody) -> None:
+    def __init__(self, trained: Predictor, user_body: UserBody) -> None:
         """`InputError` for a model that `takes_user_bodies` is false for."""
         trained = trained.trained if isinstance(trained, UserBodyPredictor) else trained
-        part = _part_of(trained, own.like)
+        part = _part_of(trained, user_body.like)
         if part is None:
             raise InputError(f"{trained.model}: knows its trained bodies only; expected a mechanical model")
-        self.trained, self.own = trained, own
-        body, checkpoint = own.body, part.checkpoint
+        self.trained, self.user_body = trained, user_body
+        body, checkpoint = user_body.body, part.checkpoint
         self.distance = shape_distance(Mesh(body.points.astype(np.float32), body.faces), part.rest)
         # a residual is that of the trained body: what similar shapes get of it is added below; and so are solver
         # errors, which were not measured on this one
@@ -149,12 +149,12 @@ class UserBodyPredictor(ModalModel):
         super().__init__(
             replace(
                 checkpoint,
-                schema=schema_of(own.item, trained.schema),
+                schema=schema_of(user_body.item, trained.schema),
                 config={
                     **kept,
                     "body": body.to_json(),
-                    "largest": _largest(part, own),
-                    "young_kpa": 1e-3 * own.item.material.young,
+                    "largest": _largest(part, user_body),
+                    "young_kpa": 1e-3 * user_body.item.material.young,
                 },
                 arrays={**body.shown(), **body.arrays()},
             )
@@ -163,30 +163,30 @@ class UserBodyPredictor(ModalModel):
             self.residual = transferred_residual(part, body, transfer_weight(self.distance))
         band = trained.checkpoint.config.get(SHAPE_BAND)
         self._band = None if band is None else ShapeBand.from_json(band)
-        self.knows_foreign_errors = self._band is not None
+        self.knows_untrained_errors = self._band is not None
         self._sizes: Recent[float] = Recent(SIZES)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return UserBodyPredictor, (self.trained, self.own)
+        return UserBodyPredictor, (self.trained, self.user_body)
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
-        return self.own.item.forces
+        return self.user_body.item.forces
 
     @cached_property
-    def trust(self) -> Trust:
-        return replace(super().trust, foreign=f"{self.describe_motion()}, {self._describe_error()}")
+    def validity(self) -> Validity:
+        return replace(super().validity, foreign=f"{self.describe_motion()}, {self._describe_error()}")
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
-        return f"its motion follows from its shape, and from the {self.own.like}'s material and contact parameters"
+        return (
+            f"its motion follows from its shape, and from the {self.user_body.like}'s material and contact parameters"
+        )
 
     def _describe_error(self) -> str:
         if self._band is None:
             return "with an unknown error"
         away = 100.0 * self.distance
-        return (
-            f"with an error as measured on other unseen shapes; its distance from the {self.own.like} is {away:.1f} %"
-        )
+        return f"with an error as measured on other unseen shapes; it is {away:.1f} % from the {self.user_body.like}"
 
     @property
     def bodies(self) -> tuple[Mesh, ...]:
@@ -211,4 +211,4 @@ class UserBodyPredictor(ModalModel):
 
     def parameters_like(self) -> dict[str, str]:
         """The object to name in parameters: the one that the body is like, if it was trained."""
-        return {OBJECT: self.own.like} if self.own.like in self.schema.objects else {}
+        return {OBJECT: self.user_body.like} if self.user_body.like in self.schema.objects else {}

@@ -59,7 +59,7 @@ class PointPredictor(Predictor):
         rest = to_canonical(geometry.points, np.array(self.frame.anchor), self.schema.azimuth(parameters))
         moved, body = self._trajectories((rest, self._probes.points), parameters, observed)
         frame, mean, probes = self.frame, self.mean, self._probes
-        motion = PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.trust)
+        motion = PointMotion(self.schema, parameters, geometry, frame, mean, probes, moved, body, self.validity)
         motion.only_at = self.schema.window.stop if self.final_only else None
         return motion
 

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["UNTURNED", "RollingModel", "axes_of"]
 
 FINER = {SolverSettings("dopri5", tolerance=1e-9, dtype="float64"): 0.0}
-"""What errors of the solver are measured against, and the mm from which on that suffices: a landing that comes a moment
-later on a corner amplifies what coarser solutions leave."""
+"""Settings that errors of the solver are measured against, and the mm from which on that suffices: a landing that comes
+a moment later on a corner amplifies what coarser solutions leave."""
 UP = np.array([0.0, 0.0, 1.0])
 UNTURNED = np.array([0.0, 1.0, 0.0])
 """The axis of a body that does not turn: any level one."""
@@ -210,13 +210,13 @@ class RollingModel(Model):
         return motion
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
-        return raised(super().to_body(times, y), self.watched_body.lowest, self._lowest)
+        return raised(super().to_body(times, y), self.checked_body.lowest, self._lowest)
 
     def _restarted(
         self, theta: Floats, corrected: Adjusted, settings: SolverSettings, stop: float, until: float
     ) -> Trajectory:
-        """What is solved from `stop` seconds on, from where the corrected motion is, and as it moves there."""
-        solved = corrected.own
+        """Solves from `stop` seconds on, from where the corrected motion is, and as it moves there."""
+        solved = corrected.inner
         assert isinstance(solved, SolvedTrajectory)
         start, readout = self._resumed(theta, solved, corrected, stop)
         problem = Problem(self._field(theta), start, readout, stop)
@@ -225,7 +225,7 @@ class RollingModel(Model):
     def _restarted_batch(
         self, theta: Floats, corrected: AdjustedBatch, settings: SolverSettings, stop: float, until: float
     ) -> BatchTrajectory:
-        solved = corrected.own
+        solved = corrected.inner
         assert isinstance(solved, SolvedBatch)
         start, readout = self._resumed(theta, solved, corrected, stop)
         problem = BatchProblem(self._together(theta), start, readout, stop)
@@ -251,8 +251,8 @@ class RollingModel(Model):
         return start, readout
 
     def _added(self, solved: Moving, corrected: Moving, time: float) -> Float[np.ndarray, "*batch 8"]:
-        """What the residual adds to the state at `time` seconds. Its rate is that of the last frame: a contact may be
-        so short that corrected frames do not tell the velocity."""
+        """Returns what the residual adds to the state at `time` seconds. Its rate is that of the last frame: a contact
+        may be so short that corrected frames do not tell the velocity."""
         rate = self.schema.window.rate
         times = np.array([time - 1.0 / rate, time])
         added = corrected.reduced(times)[..., :POSE] - solved.reduced(times)[..., :POSE]

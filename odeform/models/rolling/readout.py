@@ -22,7 +22,7 @@ SIZE = 192
 def inputs_of(
     states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, "#rows"], material: Float[np.ndarray, "#rows q"]
 ) -> Float[np.ndarray, "rows inputs"]:
-    """What the deformation follows from: depths now and before, how the contact moves, and which side is down.
+    """Computes what the deformation follows from: depths now and before, how the contact moves, and which side is down.
 
     States (8, R), the heights in m below which the floor is touched (R,), and the material (R, Q) -> (R, 39 + Q).
     """
@@ -50,7 +50,7 @@ class Readout:
     """Amplitudes of patterns from inputs (R, I): three linear layers, with SiLU between them."""
 
     mean: Float[np.ndarray, " inputs"]
-    """Of the training inputs."""
+    """Mean of the training inputs."""
     scale: Float[np.ndarray, " inputs"]
     """Their standard deviation."""
     first: Float[np.ndarray, "inputs hidden"]

@@ -20,7 +20,7 @@ PREFIX = "start."
 Vector6 = Float[np.ndarray, "6"]
 UNIT = 100.0  # m/s^2
 TRUSTED = 0.6
-"""Of the strongest trained push: beyond, spin is chance to the regression, and follows in proportion."""
+"""Fraction of the strongest trained push: beyond, spin is chance to the regression, and follows in proportion."""
 LIFTING = (0.15, 0.45)
 """Elevations in rad between which a push begins to lift the body off the floor."""
 STRAIGHT, TURNED = [0, 1, 3, 4], [2, 5]  # of the six numbers
@@ -97,7 +97,7 @@ class Start:
         return out
 
     def _scaled(self, asked: Floats, strongest: float) -> Vector6:
-        """That of a push no stronger than `strongest`, scaled."""
+        """Returns the state after a push no stronger than `strongest`, scaled."""
         times = max(float(np.linalg.norm(asked[-2:])) / strongest, 1.0)
         return times * self._regression(np.concatenate([asked[:-2], asked[-2:] / times])[None])[0]
 

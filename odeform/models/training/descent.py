@@ -33,7 +33,7 @@ class Budget:
 
 @runtime_checkable
 class Learner(Protocol):
-    """What is trained step by step."""
+    """Describes what is trained step by step."""
 
     done: int
     """Steps."""

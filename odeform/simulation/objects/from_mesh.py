@@ -1,4 +1,4 @@
-"""Soft objects of foreign meshes, such as scans."""
+"""Soft objects of untrained meshes, such as scans."""
 
 import contextlib
 from dataclasses import dataclass

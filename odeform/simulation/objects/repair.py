@@ -1,4 +1,4 @@
-"""Closed surfaces of foreign meshes: scans, open, self-intersecting, non-manifold, in parts or with texture seams.
+"""Closed surfaces of untrained meshes: scans, open, self-intersecting, non-manifold, in parts or with texture seams.
 
 fTetWild (Hu et al. 2020) needs none of these defects mended: it fills what the winding number calls inside.
 """

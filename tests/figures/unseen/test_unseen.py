@@ -70,7 +70,7 @@ def donut(trained: PerObject) -> UserBodyPredictor:
 
 def motions(predictor: UserBodyPredictor, count: int) -> tuple[MotionSequence, ...]:
     """Some pushes, as the predictor itself has them."""
-    item, times, found = predictor.own.item, np.arange(5) / 100.0, []
+    item, times, found = predictor.user_body.item, np.arange(5) / 100.0, []
     for given in pushes_of(item, count, 0):
         vertices = predictor.solve(None, {**given, **predictor.parameters_like()}).vertices(times)
         found.append(MotionSequence(times, vertices, item.faces, item.weights, given))
@@ -78,7 +78,7 @@ def motions(predictor: UserBodyPredictor, count: int) -> tuple[MotionSequence, .
 
 
 def test_a_model_that_is_the_truth_has_no_error_and_deforms_as_much_as_it_should(donut: UserBodyPredictor) -> None:
-    shape = UnseenShape("ring", INSTANCE, "donut", donut.own.item, motions(donut, 2))
+    shape = UnseenShape("ring", INSTANCE, "donut", donut.user_body.item, motions(donut, 2))
     found = measure(donut, donut.trained, shape)
     row = found.to_json({"rmse_pooled_mm": 0.5, "relative": 0.1})
     assert found.distance < 1e-3
@@ -122,7 +122,7 @@ def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: User
     gains, times = np.linspace(1.0, 2.0, 12), np.arange(3) / 100.0
     part = PerObject(_corrected(checkpoint, gains, times), ModalModel).parts["donut"]
     assert isinstance(part, ModalModel)
-    body = donut.own.body
+    body = donut.user_body.body
     same = transferred_residual(part, body, 0.5)
     np.testing.assert_allclose(same.weight[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
     np.testing.assert_allclose(same.weight[18:], 1.5)  # its other modes are stiffer than all of the trained body
@@ -142,19 +142,19 @@ def _corrected(checkpoint: Checkpoint, gains: Floats, times: Floats) -> Checkpoi
 
 
 def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, donut: UserBodyPredictor) -> None:
-    assert not donut.knows_foreign_errors
+    assert not donut.knows_untrained_errors
     band = {"level": 0.0, "by_size": 1.0, "by_distance": 1.0, "times": [0.1, 0.19], "profile": [[0.0, 1.0]] * 2}
     told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": band}), ModalModel)
     near, far = (UserBodyPredictor(told, replace(donut.own, like=like)) for like in NAMES)
-    given = pushes_of(donut.own.item, 1, 0)[0]
+    given = pushes_of(donut.user_body.item, 1, 0)[0]
     found = near.error_band(given, np.array([0.0, 0.1, 0.19]))
-    assert near.knows_foreign_errors
+    assert near.knows_untrained_errors
     assert found is not None
     assert (found[1:, 0] < found[1:, 1]).all()
     wider = far.error_band(given, np.array([0.1]))
     assert wider is not None
     assert wider[0, 1] > found[1, 1]
-    assert "with an error as measured" in near.trust.foreign
+    assert "with an error as measured" in near.validity.untrained
     assert NOMINAL == 0.9
 
 
@@ -172,7 +172,7 @@ def test_finished_shapes_are_read_again_and_failed_pushes_are_named(
     answers = iter([truth, "2 of 5 tetrahedra are inside out at the end"])
     monkeypatch.setattr("odeform_figures.unseen.shapes._run", lambda item, given: next(answers))
     path = shape_file(tmp_path, "ring", 2, 0)
-    one = simulated(path, lambda: UnseenShape("ring", INSTANCE, "donut", donut.own.item), 2, 0, 1)
+    one = simulated(path, lambda: UnseenShape("ring", INSTANCE, "donut", donut.user_body.item), 2, 0, 1)
     again = simulated(path, lambda: pytest.fail("it is finished"), 2, 0, 1)
     assert one.failed == again.failed == ("2 of 5 tetrahedra are inside out at the end",)
     assert np.array_equal(again.motions[0].vertices, truth.vertices)

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 from stubs import StubPredictor
 
-from odeform.geometry.likeness import Likeness
 from odeform.geometry.shape import FittedShape, fit_to
+from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.models.base import Predictor
 from odeform.types import Mesh
 from odeform_figures.viewer_benchmark.client import LoopbackClient
@@ -48,7 +48,7 @@ def shown(kick: Predictor, name: str, time: float = 0.05) -> Frame:
 def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predictor, name: str) -> None:
     frame = shown(kick, name)
     (column,) = frame.columns
-    assert column.foreign
+    assert column.untrained
     assert column.error_band(np.array([0.5])) is None
     curves = Session(kick.schema).curves(column, frame.request)
     assert curves.error is None
@@ -65,14 +65,18 @@ def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predicto
 def test_the_same_shape_keeps_its_figures(kick: Predictor) -> None:
     frame = shown(kick, "ball")
     (column,) = frame.columns
-    assert not column.foreign
+    assert not column.untrained
     assert "model error here ≈" in describe_column(column, 0.05)
     assert "inside the trained range" in summarize(frame)
     assert "not trained" not in summarize(frame) + title_of(column, 1e3)
 
 
 def test_the_warning_gives_the_distance_and_is_empty_without_a_reason() -> None:
-    same, near, far = Likeness(1e-3, 1e-3, 4e-3), Likeness(0.03, 0.012, 4e-3), Likeness(0.128, 0.071, 4e-3)
+    same, near, far = (
+        ShapeSimilarity(1e-3, 1e-3, 4e-3),
+        ShapeSimilarity(0.03, 0.012, 4e-3),
+        ShapeSimilarity(0.128, 0.071, 4e-3),
+    )
     assert shape_warning([None, same]) == ""
     text = shape_warning([near, same, far, None])
     assert "on average 71 mm" in text
@@ -85,7 +89,7 @@ def test_it_is_there_before_a_frame_of_the_shape_and_goes_with_it(stubbed: tuple
     assert not panel._box.visible
     app.panel(ShapePanel).set(replace(fitted("torus", app.page.body), origin="torus.obj"))
     assert panel._box.visible  # at once: the worker has not even been told of the shape
-    assert client.until(lambda: app.presenter.frame is not None and app.presenter.frame.columns[0].foreign)
+    assert client.until(lambda: app.presenter.frame is not None and app.presenter.frame.columns[0].untrained)
     assert client.until(lambda: app.presenter.settled)
     assert panel._box.visible
     assert "Shape not trained" in panel._box.content

@@ -44,7 +44,7 @@ class Motions:
     """s that a step of their integration takes at most."""
 
     def some(self, rows: Ints) -> "Motions":
-        """Of the motions with the indices `rows` (R,) only."""
+        """Selects the motions with the indices `rows` (R,) only."""
         material, start = self.material[rows], self.start[:, rows]
         return replace(self, material=material, start=start, moved=self.moved[:, rows], seen=self.seen[:, rows])
 
@@ -91,7 +91,8 @@ def law_error_mm(law: RollingContact, support: Support, radius: float, motions: 
 
 @dataclass
 class _Normal:
-    """Of the errors at a law: their mean square, and with their Jacobian J of E rows, J^T J / E and J^T errors / E."""
+    """Collects the errors at one set of coefficients: their mean square, and with their Jacobian J of E rows, J^T J / E
+    and J^T errors / E."""
 
     cost: float
     square: Float[np.ndarray, "free free"]

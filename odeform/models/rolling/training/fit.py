@@ -33,7 +33,7 @@ from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.request import TrainRequest
 from odeform.models.training.residual_fit import with_residual
 from odeform.models.training.run import Run
-from odeform.motion.body import watched_body
+from odeform.motion.body import checked_body
 from odeform.motion.reduced_space import POSE, small_motion
 from odeform.schema import REACH
 from odeform.solver.integrate import SolverSettings
@@ -56,7 +56,7 @@ class Stage:
     step: float = STEP
     """s."""
     damping: float = 1e-2
-    """Of the first step; see `fit_law`."""
+    """Damping of the first step; see `fit_law`."""
 
 
 COARSE = 50.0  # mm
@@ -154,7 +154,8 @@ def fit_rolling_body(
 
 
 def _steps(stages: Sequence[Stage], total: int | None) -> list[int]:
-    """Those of each stage: in the same shares where they are `total` together, the first ones first."""
+    """Splits the steps over the stages: in the same proportions where they are `total` together, the first ones
+    first."""
     ends = np.cumsum([stage.steps for stage in stages])
     ends = ends if total is None else np.ceil(total * ends / ends[-1] - 1e-9).astype(int)
     return np.diff(ends, prepend=0).tolist()
@@ -200,7 +201,7 @@ def _clearance(data: TrainingData) -> float:
 def _lowest(data: TrainingData) -> float:
     """m: the height of the lowest point in all frames of the training motions."""
     space = data.space
-    body = watched_body(PointCloud(data.rest + space.anchor), space, float("-inf"))
+    body = checked_body(PointCloud(data.rest + space.anchor), space, float("-inf"))
     known = (space.with_modes(motion) for motion in data.reduced["train"])
     return min(float(body.sample(y, np.ones(len(y))).lowest.min()) for y in known)
 
@@ -211,7 +212,8 @@ def _begin(data: TrainingData) -> float:
 
 
 def motions_of(data: TrainingData, split: str, axis: Floats, materials: list[int]) -> Motions:
-    """Those of a split, of a body that turns about `axis` (3,); `materials` are the indices of its Q parameters."""
+    """Takes the motions of a split, of a body that turns about `axis` (3,); `materials` are the indices of its Q
+    parameters."""
     y, first = data.reduced[split], data.first_free
     frame = float(data.times[1] - data.times[0])
     along = np.cross(axis, [0.0, 0.0, 1.0])
@@ -271,7 +273,8 @@ def _free(law: RollingContact, without: Sequence[str], linear: bool) -> Ints:
 
 
 def _rows(data: TrainingData, law: RollingContact, support: Support, radius: float, motions: Motions) -> ReadoutRows:
-    """Those of motions under the law, so that what is read out of them knows what the law is wrong about."""
+    """Rolls out motions under the contact parameters, so that what is read out of them knows what the law is wrong
+    about."""
     states = roll_out(law, support, radius, motions)
     count = len(states)
     flat = states.transpose(1, 2, 0).reshape(STATE, -1)

@@ -24,7 +24,7 @@ class ReadoutRows:
 
     inputs: Float[np.ndarray, "rows inputs"]
     patterns: Float[np.ndarray, "rows patterns"]
-    """What they are to become."""
+    """Values that they are to become."""
     weights: Float[np.ndarray, " rows"]
 
 

@@ -5,9 +5,9 @@ import pytest
 import trimesh
 
 from odeform.formats.bundled import read_shape
-from odeform.geometry.likeness import Likeness, compare_shapes
 from odeform.geometry.primitives import octasphere
 from odeform.geometry.shape import fit_to
+from odeform.geometry.shape_similarity import ShapeSimilarity, compare_shapes
 from odeform.types import Mesh, PointCloud, Points
 
 BALL = octasphere(0.1, segments=24)
@@ -18,7 +18,7 @@ def sphere(subdivisions: int = 4, scale: tuple[float, float, float] = (1.0, 1.0,
     return Mesh(np.asarray(ball.vertices * scale, np.float32), np.asarray(ball.faces, np.int32))
 
 
-def to_body(shape: Mesh | PointCloud) -> Likeness:
+def to_body(shape: Mesh | PointCloud) -> ShapeSimilarity:
     return compare_shapes(fit_to(shape, BALL).geometry, [BALL])
 
 

@@ -1,4 +1,4 @@
-"""A motion that leaves the physical shows its last sound moment, however it is asked."""
+"""A motion that leaves the physical shows its last valid moment, however it is asked."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from odeform.motion.limits import Limits
-from odeform.motion.watch import SLACK, Sample, Stop, Watch
+from odeform.motion.plausibility import SLACK, PlausibilityCheck, Sample, Stop
 from odeform.schema import Window
 from odeform.types import Floats, Times
 
@@ -15,9 +15,9 @@ LIMITS = Limits(floor=0.0)
 Curve = Callable[[Times], Floats]
 
 
-def watch(
+def plausibility(
     lowest: Curve = np.zeros_like, deformation: Curve = np.zeros_like, height: Curve = np.zeros_like
-) -> tuple[Watch, list[Times]]:
+) -> tuple[PlausibilityCheck, list[Times]]:
     """A watch over a motion given by formulas, and the times that it looked at."""
     asked: list[Times] = []
 
@@ -27,7 +27,7 @@ def watch(
         centre[:, 2] = height(times)
         return Sample(lowest(times), deformation(times), centre)
 
-    return Watch(LIMITS, WINDOW, sample), asked
+    return PlausibilityCheck(LIMITS, WINDOW, sample), asked
 
 
 def falling(times: Times) -> Floats:
@@ -41,17 +41,17 @@ def dipping(times: Times) -> Floats:
 
 
 def test_a_sound_motion_is_shown_as_it_is() -> None:
-    sound, _ = watch(lowest=lambda t: np.full_like(t, -0.0047))
+    valid, _ = plausibility(lowest=lambda t: np.full_like(t, -0.0047))
     times = np.linspace(0.0, 1.55, 40)
-    assert np.array_equal(sound.held(times), times)
-    assert sound.stop_at(1.5) is None
-    assert sound.first_stop(1.55) is None
+    assert np.array_equal(valid.clamped(times), times)
+    assert valid.stop_at(1.5) is None
+    assert valid.first_stop(1.55) is None
 
 
 def test_after_the_window_it_ends_where_it_first_sinks() -> None:
-    sinking, _ = watch(lowest=falling)
+    sinking, _ = plausibility(lowest=falling)
     times = np.array([0.3, 1.1, 1.199, 1.3, 1.5])
-    shown = sinking.held(times)
+    shown = sinking.clamped(times)
     assert np.array_equal(shown[:3], times[:3])
     assert shown[3] == shown[4] == pytest.approx(1.2, abs=2e-5)
     assert falling(shown).min() >= -0.005
@@ -61,10 +61,10 @@ def test_after_the_window_it_ends_where_it_first_sinks() -> None:
 
 
 def test_in_the_window_each_moment_is_checked_by_itself() -> None:
-    dip, asked = watch(lowest=dipping)
-    assert dip.held(np.array([0.7])).tolist() == [0.7]
+    dip, asked = plausibility(lowest=dipping)
+    assert dip.clamped(np.array([0.7])).tolist() == [0.7]
     assert [len(times) for times in asked] == [1]  # nothing else had to be looked at
-    shown = dip.held(np.array([0.41, 0.45, 0.499, 0.51]))
+    shown = dip.clamped(np.array([0.41, 0.45, 0.499, 0.51]))
     assert shown[:3] == pytest.approx(np.full(3, 0.4), abs=2e-5)
     assert shown[3] == 0.51
     assert dip.first_stop(1.5) == dip.stop_at(0.45)
@@ -73,43 +73,43 @@ def test_in_the_window_each_moment_is_checked_by_itself() -> None:
 @pytest.mark.parametrize("lowest", [falling, dipping, lambda t: np.where(t > 0.98, -0.01, 0.0)])
 def test_the_result_depends_neither_on_the_order_nor_on_the_grid(lowest: Curve) -> None:
     times = np.random.default_rng(0).uniform(0.0, 1.55, 200)
-    whole, _ = watch(lowest)
-    expected = whole.held(times)
-    one_by_one, backwards = watch(lowest)[0], watch(lowest)[0]
-    assert [float(one_by_one.held(np.array([time]))[0]) for time in times] == expected.tolist()
+    whole, _ = plausibility(lowest)
+    expected = whole.clamped(times)
+    one_by_one, backwards = plausibility(lowest)[0], plausibility(lowest)[0]
+    assert [float(one_by_one.clamped(np.array([time]))[0]) for time in times] == expected.tolist()
     descending = np.argsort(times)[::-1]
-    assert np.array_equal(backwards.held(times[descending]), expected[descending])
-    late, _ = watch(lowest)
-    late.held(np.array([1.55]))
-    assert np.array_equal(late.held(times), expected)
+    assert np.array_equal(backwards.clamped(times[descending]), expected[descending])
+    late, _ = plausibility(lowest)
+    late.clamped(np.array([1.55]))
+    assert np.array_equal(late.clamped(times), expected)
 
 
 def test_numbers_that_are_not_finite_stop_it() -> None:
-    lost, _ = watch(lowest=lambda t: np.where(t > 1.3, np.nan, 0.0))
+    lost, _ = plausibility(lowest=lambda t: np.where(t > 1.3, np.nan, 0.0))
     stop = lost.stop_at(1.5)
     assert stop is not None
     assert (stop.time, stop.reason) == (pytest.approx(1.3, abs=2e-5), "it is not finite")
-    assert lost.held(np.array([1.5]))[0] <= 1.3
+    assert lost.clamped(np.array([1.5]))[0] <= 1.3
 
 
 def test_impossible_deformations_stop_it() -> None:
-    wild, _ = watch(deformation=lambda t: np.where(t > 0.6, 1.4, 1.2))
+    wild, _ = plausibility(deformation=lambda t: np.where(t > 0.6, 1.4, 1.2))
     stop = wild.stop_at(0.9)
     assert stop is not None
     assert (stop.time, stop.reason) == (pytest.approx(0.6, abs=2e-5), "it deforms more than the body can")
 
 
 def test_energy_from_nowhere_stops_it() -> None:
-    """A ball that bounces is sound; one that rises higher than it ever was, without any contact, is not."""
+    """A ball that bounces is valid; one that rises higher than it ever was, without any contact, is not."""
 
-    def sound(times: Times) -> Floats:
+    def valid(times: Times) -> Floats:
         return 0.5 * np.abs(np.cos(3.0 * times)) * np.exp(-0.5 * times)
 
     def driven(times: Times) -> Floats:
-        return np.where(times > 1.2, sound(np.array([1.2])) + 3.0 * (times - 1.2), sound(times))
+        return np.where(times > 1.2, valid(np.array([1.2])) + 3.0 * (times - 1.2), valid(times))
 
-    assert watch(height=sound)[0].first_stop(1.5) is None
-    stop = watch(height=driven)[0].first_stop(1.5)
+    assert plausibility(height=valid)[0].first_stop(1.5) is None
+    stop = plausibility(height=driven)[0].first_stop(1.5)
     assert stop is not None
     assert stop.time + 1.0 / 60.0 >= 1.2
     assert stop.time < 1.35
@@ -122,7 +122,7 @@ def test_energy_is_compared_with_a_tenth_more_than_the_largest_in_the_window() -
     def lifted(times: Times) -> Floats:
         return np.where(times > 1.0, 0.5 + 0.2 * (times - 1.0), 0.5 * np.cos(np.pi * times) ** 2)
 
-    stop = watch(height=lifted)[0].first_stop(1.5)
+    stop = plausibility(height=lifted)[0].first_stop(1.5)
     assert stop is not None
     assert stop.reason == "it gains energy"
     # the largest energy is looked up a sixteenth of the window before its end: 4.89 of 4.905 J/kg
@@ -130,20 +130,22 @@ def test_energy_is_compared_with_a_tenth_more_than_the_largest_in_the_window() -
 
 
 def test_a_scene_without_a_floor_has_none_to_sink_into() -> None:
-    free = Watch(Limits(None), WINDOW, lambda t: Sample(np.full(len(t), -9.0), np.zeros(len(t)), np.zeros((len(t), 3))))
+    free = PlausibilityCheck(
+        Limits(None), WINDOW, lambda t: Sample(np.full(len(t), -9.0), np.zeros(len(t)), np.zeros((len(t), 3)))
+    )
     assert free.first_stop(1.5) is None
 
 
 def test_a_motion_that_never_was_sound_stays_at_rest() -> None:
-    broken, _ = watch(lowest=lambda t: np.where(t > 0.0, -1.0, 0.0))
-    assert broken.held(np.array([0.0, 0.2, 1.0, 1.5])) == pytest.approx(np.zeros(4), abs=1e-4)
+    broken, _ = plausibility(lowest=lambda t: np.where(t > 0.0, -1.0, 0.0))
+    assert broken.clamped(np.array([0.0, 0.2, 1.0, 1.5])) == pytest.approx(np.zeros(4), abs=1e-4)
 
 
 @pytest.mark.parametrize("step", [1, 2, 40, *range(42, 49), 57])
 def test_after_the_window_no_moment_of_the_grid_is_left_out(step: int) -> None:
     """It sinks for the length of one interval, wherever that is among those that are checked at once."""
     moment = 1.0 + step / 120.0
-    brief, _ = watch(lowest=lambda t: np.where(np.abs(t - moment) < 0.4 / 120.0, -0.01, 0.0))
+    brief, _ = plausibility(lowest=lambda t: np.where(np.abs(t - moment) < 0.4 / 120.0, -0.01, 0.0))
     stop = brief.stop_at(1.55)
     assert stop is not None
     assert stop.time == pytest.approx(moment - 0.4 / 120.0, abs=2e-5)

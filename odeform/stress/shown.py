@@ -40,7 +40,7 @@ def shown(predictor: Predictor, parameters: Parameters, seed: int = 0) -> Shown:
     motion = predictor.solve(None, parameters)
     heights = motion.vertices(times)[..., 2]
     finite = np.isfinite(heights).all(axis=1)
-    floor = motion.trust.limits.floor
+    floor = motion.validity.limits.floor
     depth = 0.0 if floor is None or not finite.any() else floor - float(heights[finite].min())
     stop = motion.first_stop()
     return Shown(max(depth, 0.0), int((~finite).sum()), None if stop is None else stop.time)
@@ -53,7 +53,7 @@ def check_shown(checkpoint: str, count: int = DRAWS, seed: int = 0) -> tuple[Che
     found = parallel_map("motions inside the box", partial(_shown_from, checkpoint), draws, batch_size=BATCH)
     stopped = [one.stopped for one in found if one.stopped is not None]
     checks = {
-        "shown_below_floor_mm": Check(1e3 * max(one.depth for one in found), 1e3 * predictor.trust.limits.depth),
+        "shown_below_floor_mm": Check(1e3 * max(one.depth for one in found), 1e3 * predictor.validity.limits.depth),
         "shown_non_finite_frames": Check(sum(one.non_finite for one in found), 0),
     }
     return checks, {

@@ -1,4 +1,5 @@
-"""Finds which of many motions are physically possible up to a time; the others are watched one by one (`watch.py`)."""
+"""Finds which of many motions are physically possible up to a time; the others are checked one by one
+(`plausibility.py`)."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -7,48 +8,48 @@ import numpy as np
 from jaxtyping import Bool
 
 from odeform.motion.limits import Limits
-from odeform.motion.watch import CHUNK, COARSE, FINER, SOUND, Sample, energy_of, faults_of
+from odeform.motion.plausibility import CHUNK, COARSE, FINER, VALID, Sample, energy_of, faults_of
 from odeform.schema import Window
 from odeform.types import Floats, Times
 
-__all__ = ["BatchWatch"]
+__all__ = ["BatchPlausibility"]
 
-Sound = Bool[np.ndarray, " batch"]
+Valid = Bool[np.ndarray, " batch"]
 
 
-class BatchWatch:
-    """Looks at the same times as `Watch` does for one motion, at many motions at once."""
+class BatchPlausibility:
+    """Looks at the same times as `PlausibilityCheck` does for one motion, at many motions at once."""
 
     def __init__(self, limits: Limits, window: Window, count: int, sample: Callable[[Times], Sample]) -> None:
         """`sample` evaluates `count` motions at (T,) seconds of the model's clock: entries of its `Sample` are those of
         all motions (B T,), one motion after the other."""
         self._limits, self._window, self._count, self._sample = limits, window, count, sample
         self._step = 1.0 / (FINER * window.rate)
-        self._steps = 0  # after the window, up to which it is known where motions are sound
+        self._steps = 0  # after the window, up to which it is known where motions are valid
         self._later = np.ones(count, dtype=bool)
 
-    def sound(self, times: Times, sample: Sample) -> Sound:
+    def valid(self, times: Times, sample: Sample) -> Valid:
         """(B,) whether motions may be shown as they are at all of `times` (T,), where they are as in `sample`. What is
-        false may still be sound, at times between those that are looked at."""
+        false may still be valid, at times between those that are looked at."""
         inside = (times <= self._window.stop) & (times > self._window.start)
         wrong = self._wrong(sample)[:, inside].any(axis=1)
         latest = float(times.max(initial=self._window.start))
-        return ~wrong & self.sound_until(latest)
+        return ~wrong & self.valid_until(latest)
 
-    def sound_throughout(self, latest: float) -> Sound:
-        """(B,) whether motions are sound at all times of the grid, up to `latest` seconds of the clock."""
+    def valid_throughout(self, latest: float) -> Valid:
+        """(B,) whether motions are valid at all times of the grid, up to `latest` seconds of the clock."""
         count = round((self._window.stop - self._window.start) / self._step)
         grid = self._window.start + self._step * np.arange(1, count + 1)
-        return ~self._wrong(self._sample(grid)).any(axis=1) & self.sound_until(latest)
+        return ~self._wrong(self._sample(grid)).any(axis=1) & self.valid_until(latest)
 
-    def sound_until(self, latest: float) -> Sound:
-        """(B,) whether motions are sound after the window, up to `latest` seconds of the clock."""
+    def valid_until(self, latest: float) -> Valid:
+        """(B,) whether motions are valid after the window, up to `latest` seconds of the clock."""
         while self._window.stop + self._steps * self._step < latest:
             self._check_on()
         return self._later
 
     def _wrong(self, sample: Sample) -> Bool[np.ndarray, "batch times"]:
-        return (faults_of(sample, self._limits) != SOUND).reshape(self._count, -1)
+        return (faults_of(sample, self._limits) != VALID).reshape(self._count, -1)
 
     def _check_on(self) -> None:
         stop = self._window.stop

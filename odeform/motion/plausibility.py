@@ -1,8 +1,8 @@
-"""Watches over a motion: where it leaves what is physically possible, the last sound moment is shown instead.
+"""Checks a motion: where it leaves what is physically possible, the last valid moment is shown instead.
 
 Within the trained window a model predicts each moment by itself, so each is checked by itself: a moment that is not
-sound shows the last sound one before it. After the window each frame follows from the ones before, so the motion ends
-where it is first not sound. Both follow from the motion on fixed grids of times, whose intervals are refined where
+valid shows the last valid one before it. After the window each frame follows from the ones before, so the motion ends
+where it is first not valid. Both follow from the motion on fixed grids of times, whose intervals are refined where
 needed: never from the times that are asked for, nor from their order.
 """
 
@@ -18,7 +18,7 @@ from odeform.motion.recent import Recent
 from odeform.schema import Window
 from odeform.types import Floats, Ints, Times
 
-__all__ = ["CHUNK", "COARSE", "FINER", "SOUND", "Sample", "Stop", "Watch", "energy_of", "faults_of"]
+__all__ = ["CHUNK", "COARSE", "FINER", "VALID", "PlausibilityCheck", "Sample", "Stop", "energy_of", "faults_of"]
 
 FINER = 2  # grid times per trained frame: a body that falls at 3 m/s moves by 12 mm between them
 REFINED = 32  # parts of a grid interval, which are divided once more: 4 microseconds at 120 Hz
@@ -27,7 +27,7 @@ CHUNK = 44  # grid times after the window that are checked at once
 COARSE = 16  # times in the window at which the energy is looked up
 RECENT = 4  # results that are kept: pose, points and gradient of a time are evaluated one after the other
 
-SOUND, NON_FINITE, SUNK, DEFORMED, DRIVEN = range(5)
+VALID, NON_FINITE, SUNK, DEFORMED, DRIVEN = range(5)
 REASONS = {
     NON_FINITE: "it is not finite",
     SUNK: "it sinks into the floor",
@@ -51,51 +51,52 @@ class Sample:
 
 @dataclass(frozen=True)
 class Stop:
-    """The last sound moment in seconds, which is shown in place of later ones, and what is wrong with them."""
+    """The last valid moment in seconds, which is shown in place of later ones, and what is wrong with them."""
 
     time: float
     reason: str
 
 
-class Watch:
-    """Times at which a motion is sound, and the times that are shown in place of others."""
+class PlausibilityCheck:
+    """Times at which a motion is valid, and the times that are shown in place of others."""
 
     def __init__(self, limits: Limits, window: Window, sample: Callable[[Times], Sample]) -> None:
-        """`sample` evaluates the motion at (T,) seconds of the model's clock, in any order and without this watch."""
+        """`sample` evaluates the motion at (T,) seconds of the model's clock, in any order and without this check."""
         self._limits, self._window, self.sample = limits, window, sample
         self._step = 1.0 / (FINER * window.rate)
-        self._steps = 0  # after the window, up to which the motion is known to be sound
+        self._steps = 0  # after the window, up to which the motion is known to be valid
         self._end: Stop | None = None
         self._recent: Recent[Times] = Recent(RECENT)
 
-    def held(self, times: Times) -> Times:
-        """(T,) seconds of the clock -> the seconds that are shown; the same where the motion is sound."""
-        return self._recent.get(times.tobytes(), lambda: self._held(times))
+    def clamped(self, times: Times) -> Times:
+        """(T,) seconds of the clock -> the seconds that are shown; the same where the motion is valid."""
+        return self._recent.get(times.tobytes(), lambda: self._clamped(times))
 
     def stop_at(self, time: float) -> Stop | None:
         """Says what is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
         if time > self._window.stop:
             return self._after_window(time)
-        return self._last_sound(time) if time > self._window.start and self._faults(np.array([time]))[0] else None
+        return self._last_valid(time) if time > self._window.start and self._faults(np.array([time]))[0] else None
 
     def first_stop(self, until: float) -> Stop | None:
-        """The first moment before `until` seconds of the clock from which on the motion is held; checks all of it."""
+        """The first moment before `until` seconds of the clock from which on the motion is clamped; checks all of
+        it."""
         grid = self._grid[self._grid <= until]
         wrong = np.flatnonzero(self._faults(grid))
         if len(wrong):
-            return self._last_sound(float(grid[wrong[0]]))
+            return self._last_valid(float(grid[wrong[0]]))
         return self._after_window(until) if until > self._window.stop else None
 
-    def _held(self, times: Times) -> Times:
+    def _clamped(self, times: Times) -> Times:
         latest = float(times.max(initial=self._window.start))
         end = self._after_window(latest) if latest > self._window.stop else None
         out = times if end is None else np.where(times > self._window.stop, np.minimum(times, end.time), times)
         inside = (out <= self._window.stop) & (out > self._window.start)
         # all are evaluated, also those that cannot be wrong: they are what is asked for next
-        wrong = np.flatnonzero(inside & (self._faults(out) != SOUND)) if inside.any() else []
+        wrong = np.flatnonzero(inside & (self._faults(out) != VALID)) if inside.any() else []
         if len(wrong):
             out = out.copy()
-            out[wrong] = [self._last_sound(float(time)).time for time in out[wrong]]
+            out[wrong] = [self._last_valid(float(time)).time for time in out[wrong]]
         return out
 
     @cached_property
@@ -105,26 +106,26 @@ class Watch:
         return self._window.start + self._step * np.arange(1, count + 1)
 
     def _faults(self, times: Times) -> Ints:
-        """(T,) what is wrong, energy aside; `SOUND` where nothing is."""
+        """(T,) what is wrong, energy aside; `VALID` where nothing is."""
         if not len(times):
             return np.zeros(0, dtype=int)
         return faults_of(self.sample(times), self._limits)
 
-    def _last_sound(self, time: float) -> Stop:
-        """The last sound moment in the window before `time`, which is not sound."""
+    def _last_valid(self, time: float) -> Stop:
+        """The last valid moment in the window before `time`, which is not valid."""
         grid = self._grid[self._grid < time]
-        sound = np.flatnonzero(self._faults(grid) == SOUND)
-        index = int(sound[-1]) + 1 if len(sound) else 0
+        valid = np.flatnonzero(self._faults(grid) == VALID)
+        index = int(valid[-1]) + 1 if len(valid) else 0
         begin = float(grid[index - 1]) if index else self._window.start
         return self._refined(begin, float(grid[index]) if index < len(grid) else time)
 
     def _refined(self, begin: float, end: float) -> Stop:
-        """The last sound moment between a sound one and one that is not."""
-        fault = SOUND
+        """The last valid moment between a valid one and one that is not."""
+        fault = VALID
         for _ in range(2):
             times = np.linspace(begin, end, REFINED + 1)
             faults = self._faults(times[1:])
-            first = int((faults != SOUND).argmax())
+            first = int((faults != VALID).argmax())
             begin, end, fault = float(times[first]), float(times[first + 1]), int(faults[first])
         return Stop(begin, REASONS.get(fault, ""))
 
@@ -137,15 +138,15 @@ class Watch:
     def _check_on(self) -> None:
         """Check the next times after the window; for any request they are the same, in the same order."""
         steps, stop = self._steps, self._window.stop
-        if not steps and self._faults(np.array([stop]))[0] != SOUND:
-            self._end = self._last_sound(stop)
+        if not steps and self._faults(np.array([stop]))[0] != VALID:
+            self._end = self._last_valid(stop)
             return
         times = stop + self._step * np.arange(steps - 1, steps + CHUNK + 2)
         sample = self.sample(times)
         faults = faults_of(sample, self._limits)[1:-1]
         driven = self._energy(times, sample) > self._limits.energy * self._most_energy
-        faults[(faults == SOUND) & driven] = DRIVEN
-        wrong = np.flatnonzero(faults[1:] != SOUND)
+        faults[(faults == VALID) & driven] = DRIVEN
+        wrong = np.flatnonzero(faults[1:] != VALID)
         if not len(wrong):
             self._steps = steps + CHUNK
             return
@@ -184,9 +185,9 @@ def energy_of(
 
 
 def faults_of(sample: Sample, limits: Limits) -> Ints:
-    """(T,) what is wrong with each moment, energy aside; `SOUND` where nothing is."""
+    """(T,) what is wrong with each moment, energy aside; `VALID` where nothing is."""
     finite = np.isfinite(sample.lowest) & np.isfinite(sample.deformation) & np.isfinite(sample.centre).all(axis=1)
-    out = np.where(finite, SOUND, NON_FINITE)
+    out = np.where(finite, VALID, NON_FINITE)
     with np.errstate(invalid="ignore"):
         out[finite & (sample.deformation > limits.deformation)] = DEFORMED
         if limits.floor is not None:

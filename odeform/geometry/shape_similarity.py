@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from odeform.types import Floats, Geometry, Mesh, Points
 
-__all__ = ["TOLERANCE", "Likeness", "compare_shapes"]
+__all__ = ["TOLERANCE", "ShapeSimilarity", "compare_shapes"]
 
 TOLERANCE = 0.02
 """Fraction of the body's size within which a surface counts as the body's own. Coarser meshes, points and splats of the
@@ -22,7 +22,7 @@ NEAREST = 4  # samples whose triangles are tried for the nearest point of a mesh
 
 
 @dataclass(frozen=True)
-class Likeness:
+class ShapeSimilarity:
     """The distance between two surfaces: 99 % of either lie within `distance` of the other, `mean` is their mean.
 
     Both in metres, the larger of both ways. Up to `tolerance`, in metres, shapes count as the same.
@@ -47,18 +47,18 @@ class Likeness:
         )
 
 
-def compare_shapes(geometry: Geometry, bodies: Sequence[Mesh]) -> Likeness:
-    """The likeness of a shape to the most similar of `bodies`, as all of them lie in the scene."""
-    return min((_compare(geometry, body) for body in bodies), key=lambda likeness: likeness.distance)
+def compare_shapes(geometry: Geometry, bodies: Sequence[Mesh]) -> ShapeSimilarity:
+    """The similarity of a shape to the most similar of `bodies`, as all of them lie in the scene."""
+    return min((_compare(geometry, body) for body in bodies), key=lambda similarity: similarity.distance)
 
 
-def _compare(geometry: Geometry, body: Mesh) -> Likeness:
+def _compare(geometry: Geometry, body: Mesh) -> ShapeSimilarity:
     tolerance = TOLERANCE * float(np.ptp(body.points, axis=0).max())
     if geometry is body:
-        return Likeness(0.0, 0.0, tolerance)
+        return ShapeSimilarity(0.0, 0.0, tolerance)
     widest = WIDEST / TOLERANCE * tolerance
     ways = _distances(_samples(geometry)[0], body, widest), _distances(_samples(body)[0], geometry, widest)
-    return Likeness(
+    return ShapeSimilarity(
         max(float(np.quantile(way, FRACTION)) for way in ways), max(float(way.mean()) for way in ways), tolerance
     )
 

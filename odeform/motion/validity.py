@@ -3,42 +3,44 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from odeform.geometry.likeness import Likeness, compare_shapes
+from odeform.geometry.shape_similarity import ShapeSimilarity, compare_shapes
 from odeform.motion.limits import Limits
 from odeform.motion.recent import Recent, geometry_key
 from odeform.schema import Parameters
 from odeform.types import Floats, Geometry, Mesh, Times
 
-__all__ = ["UNKNOWN", "Trust"]
+__all__ = ["UNKNOWN", "Validity"]
 
-COMPARED = 8  # shapes whose likeness is kept
+COMPARED = 8  # shapes whose similarity is kept
 
 
 @dataclass(frozen=True, eq=False)
-class Trust:
+class Validity:
     """`bodies` are the trained ones where they rest in the scene; none: the checkpoint does not hold them."""
 
     bodies: tuple[Mesh, ...] = ()
     limits: Limits = field(default_factory=Limits)
-    foreign: str = "it moves as the trained body would, with an unknown error"
+    untrained: str = "it moves as the trained body would, with an unknown error"
     """How a shape that was not trained moves, and how wrong that is."""
     error_band: Callable[[Parameters, Times], Floats | None] = lambda parameters, times: None
     """(T, 2) mm at (T,) seconds: the RMSE that half, and nine in ten, of unseen motions stay below, or None."""
-    knows_foreign_errors: bool = False
+    knows_untrained_errors: bool = False
     """Whether `error_band` holds for shapes that were not trained."""
-    _likeness: Recent[tuple[Geometry, Likeness]] = field(default_factory=lambda: Recent(COMPARED), repr=False)
+    _similarities: Recent[tuple[Geometry, ShapeSimilarity]] = field(
+        default_factory=lambda: Recent(COMPARED), repr=False
+    )
 
-    def likeness(self, geometry: Geometry) -> Likeness | None:
+    def similarity(self, geometry: Geometry) -> ShapeSimilarity | None:
         """How similar a shape is to the trained bodies; None where they are not known. The last few are kept."""
         if not self.bodies:
             return None
 
-        def compared() -> tuple[Geometry, Likeness]:
+        def compared() -> tuple[Geometry, ShapeSimilarity]:
             return geometry, compare_shapes(geometry, self.bodies)
 
         # an entry holds its geometry, whose id therefore stays its own
-        return self._likeness.get(geometry_key(geometry), compared)[1]
+        return self._similarities.get(geometry_key(geometry), compared)[1]
 
 
-UNKNOWN = Trust()
-"""Nothing is known, and nothing watched over."""
+UNKNOWN = Validity()
+"""Nothing is known, and nothing checked for plausibility."""
