@@ -16,7 +16,6 @@ MARGIN = 1e-3
 SLIP = 1e-4
 AHEAD = 0.02
 MOST = 64
-SOFT = 5e-3
 SHORTEST = 1e-9
 SMALL = 1e-18
 
@@ -152,7 +151,7 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
 
 @compiled
 @no_type_check
-def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps, springs):
+def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps):
     """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
     points, rows = c.points[b], c.rows[b]
     motion, place, centre, axes, turned = np.empty(6), np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
@@ -165,10 +164,8 @@ def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps, sprin
         i = chosen[j]
         _turn(rows, i, z, size, motion)
         square, once, twice = _bent(points, i, motion, place)
-        springs[j] = c.stiffness[b, i]
         if j < floor:
             gaps[j] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
-            springs[j] *= max(-gaps[j] / SOFT, 1.0)
             for axis in range(3):
                 axes[0, axis], axes[1, axis], axes[2, axis] = z[9 + axis], z[3 + axis], z[6 + axis]
         else:
@@ -297,7 +294,7 @@ def _drag(c, b, j, i, floor, force, r1, r2):
 
 @compiled
 @no_type_check
-def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps, springs, matrix, out):
+def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps, matrix, out):
     """The state after one step of first order; false where it cannot be solved for."""
     width = 6 + size + (1 if pushed else 0)
     v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
@@ -327,10 +324,10 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
                 r2 += t[k] * v[k]
             i = chosen[j]
             time = step + (c.floor_damping if j < floor else c.push_damping)
-            force = springs[j] * (-gaps[j] - time * r0)
+            force = c.stiffness[b, i] * (-gaps[j] - time * r0)
             if force <= 0.0:
                 continue
-            active = step * springs[j]
+            active = step * c.stiffness[b, i]
             drag = step * _drag(c, b, j, i, floor, force, r1, r2)
             normal, impulse = time * active, -active * gaps[j]
             for i in range(width):
@@ -367,17 +364,17 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
 def _step(c, b, z, pushed, step, out, work):
     """The state after a step of second order; returns its error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, springs, jacobian, whole, half, matrix = work
+    chosen, gaps, jacobian, whole, half, matrix = work
     floor, count = _near(c, b, z, size, pushed, step, chosen, gaps)
     good, begin = True, z
     # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
     for part in range(3):
         if part != 1:
-            _contacts(c, b, begin, size, pushed, chosen, floor, count, jacobian, gaps, springs)
+            _contacts(c, b, begin, size, pushed, chosen, floor, count, jacobian, gaps)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
             end = out
-        good &= _implicit(c, b, begin, size, pushed, length, chosen, floor, count, jacobian, gaps, springs, matrix, end)
+        good &= _implicit(c, b, begin, size, pushed, length, chosen, floor, count, jacobian, gaps, matrix, end)
         if part == 1:
             begin = half
     if not good:
@@ -446,7 +443,6 @@ def _work(c):
     return (
         np.empty(2 * MOST, np.int64),
         np.empty(max(c.points.shape[2], 2 * MOST)),
-        np.empty(2 * MOST),
         np.empty((2 * MOST, 3, width)),
         np.empty(state),
         np.empty(state),
@@ -481,13 +477,13 @@ def advance_all(c, rows, times, states, steps, out, slopes, errors):
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, springs, jacobian, _, _, matrix = _work(c)
+    chosen, gaps, jacobian, _, _, matrix = _work(c)
     start = 13 + size
     for row in range(len(rows)):
         b, z, pushed = rows[row], states[row], times[row] < c.pulse
         width = 6 + size + (1 if pushed else 0)
         floor, count = _near(c, b, z, size, pushed, 0.0, chosen, gaps)
-        _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps, springs)
+        _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps)
         v, momentum, rate = np.empty(width), np.empty(width), np.empty(width)
         _local(z, size, v)
         _free(c, b, z, size, pushed, v, momentum, rate)
@@ -501,7 +497,7 @@ def slope_of(c, rows, times, states, out):
                 r1 += s[k] * v[k]
                 r2 += t[k] * v[k]
             i = chosen[j]
-            force = springs[j] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
+            force = c.stiffness[b, i] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
             if force <= 0.0:
                 continue
             drag = _drag(c, b, j, i, floor, force, r1, r2)

@@ -18,9 +18,6 @@ __all__ = ["Near", "Touching"]
 
 MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
 FLOOR, PUSH = 64, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
-SOFT = (
-    5e-3  # m of depth in the floor from which on its springs stiffen: what lands on an edge sinks no deeper than that
-)
 UP_FIRST = [2, 0, 1]  # the scene's axes, as those of contacts with the floor
 
 
@@ -61,9 +58,7 @@ class Near:
             out[:, :floor, :, -1] = 0.0
             guides = self.push.guides[:, None] @ state.rotation
             np.matmul(axes[:, floor:], -guides[..., None], out=out[:, floor:, :, state.body :])
-        springs = self.springs.copy()
-        springs[0, :, :floor] *= np.maximum(-gap[:, :floor] / SOFT, 1.0)
-        return Contacts(out, gap, *springs)
+        return Contacts(out, gap, *self.springs)
 
 
 class Touching:

@@ -29,7 +29,7 @@ class Free:
 
     def __init__(self, block: Block, parameters: ContactParameters, step: float) -> None:
         self.mechanics, self.push = Mechanics(block.body, parameters, SPHERE), pushed_at_the_side(block, 0.0)
-        self.steps, self.step = Steps(self.mechanics, self.push), step
+        self.steps, self.step = Steps(self.mechanics, self.push, self.mechanics.preload(self.push)), step
 
     def state(self, shift: Vector, turn: Vector, speed: Vector, spin: Vector, bent: Floats | None = None) -> State:
         size = self.push.eigenvalues.shape[1]

@@ -72,7 +72,7 @@ def test_compiled_motions_are_those_of_numpy(
     found = moved()
     monkeypatch.setattr(fields, "compiles", lambda: False)
     expected = moved()
-    assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
     assert expected[:, 1].min() < 0.0
 
 

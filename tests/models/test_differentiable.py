@@ -120,7 +120,7 @@ def test_a_jacobian_is_computed_at_once() -> None:
         ({"mass": torch.ones(2)}, [0.1], None, "mass: expected a tensor of one number"),
         ({"weight": torch.ones(())}, [0.1], None, "unknown parameter 'weight'"),
         ({}, torch.zeros(1, requires_grad=True), None, "times: expected numbers"),
-        ({}, [], None, "time: expected seconds"),
+        ({}, [[0.1]], None, "time: expected seconds"),
         ({}, [0.1], torch.zeros(4, 2), "geometry: expected points"),
     ],
 )

@@ -37,7 +37,7 @@ def pushed(name: str) -> Pushes:
 def trained() -> PerObject:
     """A model of the donut, with the contact parameters as it is before training."""
     schema = replace(SCENE.schema, objects=("donut",))
-    part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE)
+    part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE, 3e4)
     part = replace(part, config={**part.config, "largest": (0.5, 0.1)})
     return PerObject(joined(schema, {"donut": part}), model_class(part.model))
 

@@ -28,8 +28,8 @@ from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.model import Model
 from odeform.models.solved import Problem
-from odeform.models.solved_batch import BatchProblem
-from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
+from odeform.models.solved_batch import BatchProblem, SolvedBatch
+from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.motion_batch import MotionBatch
@@ -253,17 +253,18 @@ class ModalModel(Model):
     def batch_problem(
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
     ) -> Callable[[], BatchProblem]:
-        def make() -> BatchProblem:
-            push = self._push(theta)
-            bodies = pushed_bodies(self.mechanics, push, self.pulse)
-            readouts = [self._readout(modes) for modes in push.modes]
+        return lambda: self._together(theta)[0]
 
-            def readout(times: Times, states: Floats) -> Floats:
-                return np.stack([read(times, each) for read, each in zip(readouts, states, strict=True)])
+    def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[BatchProblem, list[_Readout]]:
+        """The problem of many pushes, and the readout of each."""
+        push = self._push(theta)
+        bodies = pushed_bodies(self.mechanics, push, self.pulse)
+        readouts = [self._readout(modes) for modes in push.modes]
 
-            return BatchProblem(bodies, bodies.start, readout)
+        def readout(times: Times, states: Floats) -> Floats:
+            return np.stack([read(times, each) for read, each in zip(readouts, states, strict=True)])
 
-        return make
+        return BatchProblem(bodies, bodies.start, readout), readouts
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -295,8 +296,31 @@ class ModalModel(Model):
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
     ) -> BatchTrajectory:
-        motion = super().batch_trajectory(geometry, sets, settings, until)
+        motion = self._motions(geometry, sets, settings, until)
         return AdjustedBatch(motion, self._projection(motion))
+
+    def _motions(
+        self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
+    ) -> BatchTrajectory:
+        residual, free, least = self.residual, self.free_from, 1.0 / self.schema.window.rate
+        if residual is None or free is None:
+            return super().batch_trajectory(geometry, sets, settings, until)
+        theta = np.stack([self.inputs(each) for each in sets])
+        inputs = self.residual_inputs(theta)
+        first = SolvedBatch(lambda: self._together(theta)[0], settings, free, least)
+        corrected = AdjustedBatch(first, residual.adjustment(first, inputs))
+
+        def later() -> BatchTrajectory:
+            times = before(free)
+            rows = first.states(times), corrected.reduced(times)
+            starts = np.stack([read.released(*row) for read, *row in zip(self._together(theta)[1], *rows, strict=True)])
+
+            def onward() -> BatchProblem:
+                return self._together(theta)[0]._replace(start=starts, begin=free)
+
+            return AdjustedBatch(SolvedBatch(onward, settings, until, least), residual.deformation_adjustment(inputs))
+
+        return PiecewiseBatch(corrected, free, later)
 
     def _projection(self, motion: Moving) -> FloorProjection:
         body, window = self.checked_body, self.schema.window
