@@ -174,7 +174,7 @@ class UserBodyPredictor(ModalModel):
 
     @cached_property
     def validity(self) -> Validity:
-        return replace(super().validity, foreign=f"{self.describe_motion()}, {self._describe_error()}")
+        return replace(super().validity, untrained=f"{self.describe_motion()}, {self._describe_error()}")
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
