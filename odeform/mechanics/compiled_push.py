@@ -28,6 +28,9 @@ class Constants(NamedTuple):
 
     points: ndarray  # (B, 3, S) m
     rows: ndarray  # (B, 6, S, K)
+    extents: (
+        ndarray  # (B, S) m per root kg m: no sample is displaced by more than that times the norm of all amplitudes
+    )
     stiffness: ndarray  # (B, S) N/m of each sample
     grip: ndarray  # (B, S) N s/m
     level: ndarray  # (F,) m of the first F samples, which may touch the floor
@@ -124,8 +127,15 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
     spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
     down = min(z[v + 2] - spin * c.reach, 0.0)
     margin = MARGIN - (2.0 * step + c.floor_damping) * down
-    floor = 0
+    floor, most = 0, 0.0
+    for k in range(size):
+        most += z[12 + k] * z[12 + k]
+    most = np.sqrt(most)
     for i in range(len(c.level)):
+        # most samples are so far away that their displacement need not be known
+        height = z[9] * points[0, i] + z[10] * points[1, i] + z[11] * points[2, i] + z[2] + c.level[i]
+        if height - most * c.extents[b, i] >= margin:
+            continue
         _turn(rows, i, z, size, motion)
         _bent(points, i, motion, place)
         gaps[i] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
@@ -141,6 +151,9 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
     margin = c.radius + MARGIN + (2.0 * step + c.push_damping) * np.sqrt(speed)
     count = floor
     for i in range(len(c.level), points.shape[1]):
+        d0, d1, d2 = points[0, i] - centre[0], points[1, i] - centre[1], points[2, i] - centre[2]
+        if np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - most * c.extents[b, i] >= margin:
+            continue
         _turn(rows, i, z, size, motion)
         _bent(points, i, motion, place)
         gaps[i] = np.sqrt((place[0] - centre[0]) ** 2 + (place[1] - centre[1]) ** 2 + (place[2] - centre[2]) ** 2)

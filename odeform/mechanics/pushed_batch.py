@@ -112,6 +112,7 @@ class CompiledBodies:
         return Constants(
             points=push.points,
             rows=push.rows,
+            extents=np.sqrt((push.rows[:, :3] ** 2).sum(axis=(1, 3))),
             stiffness=stiffness,
             grip=grip,
             level=floor.level,
