@@ -16,7 +16,7 @@ from odeform.types import Mesh, MotionSequence
 __all__ = ["NAMES", "PushedMotion", "PushedPredictor", "pushed_truth"]
 
 NAMES = ("donut", "pillow")
-SCHEMA = replace(SCENE.schema, objects=NAMES)
+SCHEMA = replace(SCENE.schema, objects=NAMES, parameters=SCENE.schema.learned)
 SHIFT, DENT, WIDTH = 0.005, 0.002, 0.03  # m per N, m per N, m
 
 

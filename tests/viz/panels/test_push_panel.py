@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pushed import NAMES, PushedPredictor
 
+import odeform
 from odeform.errors import InputError
 from odeform.geometry.contact import nearest_on
 from odeform.geometry.push import push_of
@@ -141,3 +142,21 @@ def test_parameters_are_kept_exactly_until_a_slider_moves(pushed: View) -> None:
         panel.set({"object": "brick"})
     client.set("force (N)", 4.0)
     assert client.until(lambda: np.linalg.norm(vector_of(app.request().parameters, "force")) == pytest.approx(4.0))
+
+
+def test_mass_and_stiffness_are_sliders_of_the_object(serve) -> None:
+    model = odeform.load("contact-force")
+    app, client = serve(Column("odeform", model, model.rest, origin="contact-force"), moment=0.02)
+    own = app.request().parameters
+    before = app.request().columns[0].geometry
+    client.set("mass (kg)", 1.4)
+    assert client.until(lambda: app.request().parameters["mass"] == 1.4)
+    assert app.request().parameters == {**own, "mass": 1.4}, "nothing else changes"
+    heavy = app.request().columns[0].geometry
+    assert heavy is not before, "it rests anew"
+    assert heavy.points[:, 2].max() < before.points[:, 2].max()
+    client.set("stiffness (kPa)", 150.0)
+    assert client.until(lambda: app.request().parameters["young"] == 150.0)
+    client.set("object", "chip")
+    assert client.until(lambda: app.request().parameters["object"] == "chip")
+    assert app.request().parameters["mass"] == pytest.approx(0.0041, rel=0.02)
