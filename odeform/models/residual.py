@@ -75,8 +75,11 @@ class Residual:
         return adjust
 
     def deformation_adjustment(self, inputs: Any) -> Adjustment:
-        """Adds it to the deformation alone. After the last frame it fades away, linearly over `FADES` seconds: where a
-        body comes to rest, it is as its ODE says."""
+        """Adds it to the deformation alone of coordinates (T, 6 + K).
+
+        After the last frame it fades away, linearly over `FADES` seconds: where a body comes to rest, it is as its ODE
+        says.
+        """
         added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:

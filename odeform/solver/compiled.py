@@ -51,7 +51,7 @@ class CompiledField:
 
     @property
     def given(self) -> tuple[Any, Floats, Ints]:
-        """Holds what the compiled loop is given of all motions."""
+        """Holds what the compiled loop is given of all motions: the code of the slope, `shared` (M,), `sizes` (S,)."""
         return machine_code(self._slope, self.dtype.name), self._shared, self._sizes
 
     def __call__(self, time: float, state: Any) -> Any:

@@ -16,7 +16,7 @@ class CheckedColumn:
     label: str
     frames: int = 0
     """Frames that were compared."""
-    off: float = 0.0
+    error: float = 0.0
     """The largest distance of a point, in m; it occurs at `vertex` in `frame`, at `time` in s."""
     frame: int = 0
     time: float = 0.0

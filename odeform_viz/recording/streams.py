@@ -20,9 +20,9 @@ def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None
     native = rerun_bindings.new_blueprint(
         stream.get_application_id() or "", make_default=False, make_thread_default=False
     )
-    stream = rr.RecordingStream._from_native(native)
-    stream.set_time("blueprint", sequence=0)
-    blueprint._log_to_stream(stream)
-    storage = stream.memory_recording().storage
+    layout = rr.RecordingStream._from_native(native)
+    layout.set_time("blueprint", sequence=0)
+    blueprint._log_to_stream(layout)
+    storage = layout.memory_recording().storage
     rerun_bindings.send_blueprint(storage, make_active=True, make_default=True, recording=stream.to_native())
-    stream.disconnect()
+    layout.disconnect()

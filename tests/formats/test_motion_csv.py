@@ -61,11 +61,11 @@ def test_turns_are_counted_between_distant_rows(kick: Predictor, tmp_path: Path)
 
 
 def test_what_is_outside_is_in_its_rows(kick: Predictor, tmp_path: Path) -> None:
-    motion = kick.solve(parameters={"mass": 7.0})
+    motion = kick.solve(parameters={"mass": 1.9})
     inside, late = read(tmp_path / "a.csv", motion, np.array([0.5, 1.2]))
     assert inside["status"].split() == ["outside-parameters"]
     assert late["status"].split()[:2] == ["outside-parameters", "outside-window"]
-    assert "mass = 7 kg is outside the trained range" in inside["notes"]
+    assert "mass = 1.9 kg is outside the trained range" in inside["notes"]
     assert "t = 1.2 s is outside the trained window" in late["notes"]
     assert "outside the trained window" not in inside["notes"]
 

@@ -231,7 +231,7 @@ def test_spin_is_energy() -> None:
 
 @pytest.mark.usefixtures("unchecked")
 def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    plot = stability_map(model, ("force", "mass"), reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
+    plot = stability_map(model, ("force", "mass"), scale=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")
     assert plot.values.shape == plot.sound.shape == (3, 3, 3)
     force, mass = (next(p for p in model.schema.parameters if p.name == name) for name in plot.names)
@@ -246,7 +246,7 @@ def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, m
     picture = np.asarray(map_image(plot))
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 5
     monkeypatch.setattr(SolvedTrajectory, "last_good", property(lambda _: 0.9))
-    failed = stability_map(model, reach=1.0, count=3, moments=(0.5, 1.0, 10.0))
+    failed = stability_map(model, scale=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert failed.sound[:2].any()
     assert not failed.sound[2].any()
     assert not np.array_equal(picture, np.asarray(map_image(failed)))

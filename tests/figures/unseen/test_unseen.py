@@ -145,7 +145,7 @@ def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, 
     assert not donut.knows_untrained_errors
     band = {"level": 0.0, "by_size": 1.0, "by_distance": 1.0, "times": [0.1, 0.19], "profile": [[0.0, 1.0]] * 2}
     told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": band}), ModalModel)
-    near, far = (UserBodyPredictor(told, replace(donut.own, like=like)) for like in NAMES)
+    near, far = (UserBodyPredictor(told, replace(donut.user_body, like=like)) for like in NAMES)
     given = pushes_of(donut.user_body.item, 1, 0)[0]
     found = near.error_band(given, np.array([0.0, 0.1, 0.19]))
     assert near.knows_untrained_errors
