@@ -1,6 +1,5 @@
 """A body as reduced mechanics knows it: inertia, modes, and the points of its surface that may touch something."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,7 +13,6 @@ __all__ = ["ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
 
 SUPPORT = 96  # points spread over the surface that may touch the floor
 NEAR_FLOOR, NEAREST = 0.004, 40  # metres, and how many of the vertices below that may, too
-ALL = 256  # with those that are added where these leave most room: what falls over lies on them
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +93,9 @@ class ReducedBody:
         return self.surface.tree.query(points, min(count, len(self.surface.points)))[1].reshape(len(points), -1)
 
 
-def spread(points: Points, count: int, first: Sequence[int]) -> Ints:
-    """Indices of `count` points (or all), those of `first` to begin with, each as far as possible from those before."""
-    chosen, distance = list(first), np.full(len(points), np.inf)
-    for index in chosen[:-1]:
-        distance = np.minimum(distance, ((points - points[index]) ** 2).sum(axis=1))
+def spread(points: Points, count: int, first: int) -> Ints:
+    """Choose `count` points (or all), each as far as possible from those before it; returns their indices."""
+    chosen, distance = [first], np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
         distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
         chosen.append(int(distance.argmax()))
@@ -134,9 +130,8 @@ def reduce_body(
 def _support(points: Points, rows: Floats, mass: float) -> Samples:
     low = int(points[:, 2].argmin())
     bottom = np.flatnonzero(points[:, 2] < points[low, 2] + NEAR_FLOOR)
-    kept = bottom[spread(points[bottom], NEAREST, [int(np.flatnonzero(bottom == low)[0])])]
-    chosen = np.unique(np.concatenate([spread(points, SUPPORT, [low]), kept]))
-    chosen = np.unique(spread(points, ALL, chosen.tolist()))
+    kept = bottom[spread(points[bottom], NEAREST, int(np.flatnonzero(bottom == low)[0]))]
+    chosen = np.unique(np.concatenate([spread(points, SUPPORT, low), kept]))
     owner = KDTree(points[chosen]).query(points)[1]
     masses = mass * np.bincount(owner, minlength=len(chosen)) / len(points)
     return Samples(points[chosen], rows[:, chosen], masses)

@@ -49,7 +49,6 @@ __all__ = ["EXACT", "QUALITIES", "ModalModel"]
 
 HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
 SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
-SOFTEST = 2.0  # times the deformation of training motions, that of the softest body that the sliders reach
 SETTLED = 4  # bodies of another mass and stiffness that are kept
 SUNK = 0.03  # m by which a body is raised at most: one that falls over lands on few samples, whose springs give way
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
@@ -157,7 +156,7 @@ class ModalModel(Model):
     def space(self) -> ReducedSpace:
         """Reads the space of its coordinates."""
         # mechanics knows how far a body moves; only its deformation may get lost
-        return space_of(self.body, self._coordinates[1], (float("inf"), SOFTEST * self._largest[1]))
+        return space_of(self.body, self._coordinates[1], (float("inf"), self._largest[1]))
 
     @property
     def own_values(self) -> dict[str, float]:
@@ -178,6 +177,11 @@ class ModalModel(Model):
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
+        # a softer body deforms more before it is lost
+        largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
+        out.space = replace(self.space, largest=largest)
+        every = replace(self.checked_body.all, space=out.space)
+        out.checked_body = replace(self.checked_body, all=every)
         out.settled_body = None
         if (mass, stiffness) != (1.0, 1.0):
             coordinates, basis = self._coordinates
