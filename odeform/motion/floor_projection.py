@@ -27,20 +27,18 @@ class FloorProjection:
         lowest: Callable[[Floats], Floats],
         limit: float,
         grid: Float[np.ndarray, " grid"] | None = None,
-        most: float = MOST,
     ) -> None:
         """`lowest` maps coordinates (R, 6 + K) of `inner` to the height of the lowest point (R,) in m, which may be
         `limit`.
 
-        A moment that would have to be raised by more than `most` m stays as it is. With `grid`, in s, the change is
-        linear between these times; after them, each moment has its own.
+        With `grid`, in s, the change is linear between these times; after them, each moment has its own.
         """
         self._inner, self._lowest, self._limit, self._grid, self._most = inner, lowest, limit, grid, most
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Coordinates (T, 6 + K) of `inner` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
         if self._grid is None or times.min() > self._grid[-1]:
-            return raised(y, self._lowest, self._limit, self._most)
+            return raised(y, self._lowest, self._limit)
         return _moved_up(y, self._between(times, y, self._grid))
 
     def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
@@ -58,14 +56,12 @@ class FloorProjection:
         return self._missing(self._inner.reduced(self._grid))
 
     def _missing(self, y: Floats) -> Floats:
-        return _missing(y, self._lowest, self._limit, self._most)
+        return _missing(y, self._lowest, self._limit)
 
 
-def raised(
-    y: Floats, lowest: Callable[[Floats], Floats], limit: float, most: float = MOST
-) -> Float[np.ndarray, "*batch times y"]:
+def raised(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Float[np.ndarray, "*batch times y"]:
     """Coordinates (..., T, 6 + K), each moment raised by itself; the others as of `FloorProjection`."""
-    return _moved_up(y, _missing(y, lowest, limit, most))
+    return _moved_up(y, _missing(y, lowest, limit))
 
 
 def _moved_up(y: Floats, by: Floats) -> Floats:
@@ -75,7 +71,7 @@ def _moved_up(y: Floats, by: Floats) -> Floats:
     return y
 
 
-def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float, most: float) -> Floats:
+def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Floats:
     """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
     deeper = limit - lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
-    return np.where((deeper > 0.0) & (deeper <= most), deeper, 0.0)  # false for what is not finite
+    return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite

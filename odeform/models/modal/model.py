@@ -50,7 +50,6 @@ __all__ = ["EXACT", "QUALITIES", "ModalModel"]
 HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
 SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
 SETTLED = 4  # bodies of another mass and stiffness that are kept
-SUNK = 0.03  # m by which a body is raised at most: one that falls over lands on few samples, whose springs give way
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
 QUALITIES = {
@@ -329,4 +328,4 @@ class ModalModel(Model):
     def _projection(self, motion: Moving) -> FloorProjection:
         body, window = self.checked_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid, SUNK)
+        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)
