@@ -33,7 +33,7 @@ class FloorProjection:
 
         With `grid`, in s, the change is linear between these times; after them, each moment has its own.
         """
-        self._inner, self._lowest, self._limit, self._grid, self._most = inner, lowest, limit, grid, most
+        self._inner, self._lowest, self._limit, self._grid = inner, lowest, limit, grid
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Coordinates (T, 6 + K) of `inner` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
