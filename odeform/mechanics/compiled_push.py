@@ -2,6 +2,7 @@
 
 The formulas are those of the NumPy code, which is the reference and says what they mean; the tests compare both to
 rounding. Loops in place of arrays save what leads there: the overhead of some hundred small array operations a step.
+All of it is in one file: Numba's cache of a function does not notice that one in another file has changed.
 """
 
 from typing import NamedTuple, no_type_check
@@ -299,6 +300,33 @@ def _free(c, b, z, size, pushed, v, momentum, rate):
 
 @compiled
 @no_type_check
+def _masses(c, b, size, pushed, stiff, matrix):
+    """Set the lower half of the matrix to the masses, and those of modes to one and `stiff` times their eigenvalues."""
+    for i in range(6 + size + (1 if pushed else 0)):
+        for k in range(i + 1):
+            matrix[i, k] = 0.0
+    for axis in range(3):
+        matrix[axis, axis] = c.mass
+        for other in range(axis + 1):
+            matrix[3 + axis, 3 + other] = c.inertia[axis, other]
+    for k in range(size):
+        matrix[6 + k, 6 + k] = 1.0 + stiff * c.eigenvalues[b, k]
+    if pushed:
+        matrix[6 + size, 6 + size] = c.projectile
+
+
+@compiled
+@no_type_check
+def _along(row, v):
+    """A row of the Jacobian times the velocities."""
+    total = 0.0
+    for k in range(len(v)):
+        total += row[k] * v[k]
+    return total
+
+
+@compiled
+@no_type_check
 def _drag(c, b, j, i, floor, force, r1, r2):
     """Friction by the speed of sliding under a normal force, N s/m."""
     limit = (c.floor_friction if j < floor else c.push_friction) * force
@@ -316,26 +344,11 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
     for k in range(width):
         momentum[k] += step * rate[k]
     for _ in range(2):
-        for i in range(width):
-            for k in range(i + 1):
-                matrix[i, k] = 0.0
-            right[i] = momentum[i]
-        for axis in range(3):
-            matrix[axis, axis] = c.mass
-            for other in range(axis + 1):
-                matrix[3 + axis, 3 + other] = c.inertia[axis, other]
-        for k in range(size):
-            matrix[6 + k, 6 + k] = 1.0 + step * (step + c.relaxation) * c.eigenvalues[b, k]
-        if pushed:
-            matrix[6 + size, 6 + size] = c.projectile
+        _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
+        _copy(momentum, right)
         for j in range(count):
-            n, s, t = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2]
-            r0, r1, r2 = 0.0, 0.0, 0.0
-            for k in range(width):
-                r0 += n[k] * v[k]
-                r1 += s[k] * v[k]
-                r2 += t[k] * v[k]
-            i = chosen[j]
+            n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
+            r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
             time = step + (c.floor_damping if j < floor else c.push_damping)
             force = c.stiffness[b, i] * (-gaps[j] - time * r0)
             if force <= 0.0:
@@ -503,30 +516,15 @@ def slope_of(c, rows, times, states, out):
         for k in range(size):
             rate[6 + k] -= c.relaxation * c.eigenvalues[b, k] * v[6 + k]
         for j in range(count):
-            n, s, t = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2]
-            r0, r1, r2 = 0.0, 0.0, 0.0
-            for k in range(width):
-                r0 += n[k] * v[k]
-                r1 += s[k] * v[k]
-                r2 += t[k] * v[k]
-            i = chosen[j]
+            n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
+            r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
             force = c.stiffness[b, i] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
             if force <= 0.0:
                 continue
             drag = _drag(c, b, j, i, floor, force, r1, r2)
             for k in range(width):
                 rate[k] += force * n[k] - drag * (r1 * s[k] + r2 * t[k])
-        for k in range(width):
-            for other in range(k + 1):
-                matrix[k, other] = 0.0
-        for axis in range(3):
-            matrix[axis, axis] = c.mass
-            for other in range(axis + 1):
-                matrix[3 + axis, 3 + other] = c.inertia[axis, other]
-        for k in range(size):
-            matrix[6 + k, 6 + k] = 1.0
-        if pushed:
-            matrix[6 + size, 6 + size] = c.projectile
+        _masses(c, b, size, pushed, 0.0, matrix)
         if not _solve(matrix, rate):
             for k in range(width):
                 rate[k] = np.nan

@@ -284,6 +284,10 @@ class Predictor(ABC):
         """The trained body at rest that `parameters` select in a scene with objects; `rest` in all other scenes."""
         return self._rests.get(parameters.get(OBJECT, ""), self.rest)
 
+    def is_changed(self, parameters: Mapping[str, Any]) -> bool:
+        """Whether the body has another mass or stiffness than its own, at which no error was measured."""
+        return any(not np.isclose(parameters.get(name, own), own, rtol=1e-3) for name, own in self.own_values.items())
+
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         """The body where it rests under these parameters: where motions start. Contacts are places on `rest_of`, and
         move with its surface."""
@@ -291,7 +295,10 @@ class Predictor(ABC):
 
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
-        within. None where the checkpoint holds errors of too few validation sequences for that."""
+        within. None where the checkpoint holds errors of too few validation sequences for that, and for a body of
+        another mass or stiffness than its own."""
+        if self.model_of(parameters).is_changed(parameters):
+            return None
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
         return None if band is None else band.at(self.schema.vector(parameters), times)
 

@@ -10,10 +10,12 @@ from odeform.geometry.push import TOWARDS, Push, default_contact, push_of
 from odeform.schema import Parameters
 from odeform.types import Mesh, Vector
 
-__all__ = ["CONTACT", "FORCE", "complete_push", "contact_parameters", "push_from", "vector_of"]
+__all__ = ["CONTACT", "FORCE", "MASS", "YOUNG", "complete_push", "contact_parameters", "push_from", "vector_of"]
 
 MIDDLING = 0.7  # from the weakest to the strongest force of an object: that of a push that is not given
 CONTACT, FORCE = "contact", "force"
+MASS, YOUNG = "mass", "young"
+"""Of the body in kg and kPa, where they are parameters; otherwise it has its own."""
 
 
 def complete_push(given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float]) -> dict[str, Any]:

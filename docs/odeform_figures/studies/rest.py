@@ -14,9 +14,10 @@ from jaxtyping import Float
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.schema import Parameters
+from odeform.simulation.contacts import MASS, YOUNG
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import OBJECTS, get_object
-from odeform.simulation.scenes.contact_force import MASS, YOUNG, sample, simulate_object
+from odeform.simulation.scenes.contact_force import sample, simulate_object
 from odeform.types import Floats, Frames, Perpoint
 from odeform_figures.output import write_or_print
 

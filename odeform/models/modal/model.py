@@ -20,7 +20,6 @@ from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.base import Predictor
 from odeform.models.contact.inputs import ContactInputs
-from odeform.models.modal.body_parameters import MASS, YOUNG
 from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.modal.elastic_body import ElasticBody
@@ -39,6 +38,7 @@ from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
 from odeform.motion.validity import Validity
 from odeform.schema import Parameters
+from odeform.simulation.contacts import MASS, YOUNG
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, Times, Vectors
 

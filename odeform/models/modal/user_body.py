@@ -149,7 +149,7 @@ class UserBodyPredictor(ModalModel):
         super().__init__(
             replace(
                 checkpoint,
-                schema=schema_of(user_body.item, trained.schema),
+                schema=schema_of([user_body.item], trained.schema) if part.own_values else trained.schema,
                 config={
                     **kept,
                     "body": body.to_json(),
@@ -195,7 +195,7 @@ class UserBodyPredictor(ModalModel):
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
         """(T, 2) mm at `times` (T,) s, as that of trained bodies, from errors on other shapes that were not trained: it
         widens with `distance`. None where the checkpoint has no such errors."""
-        if self._band is None:
+        if self._band is None or self.is_changed(parameters):
             return None
         given = self.complete({**self.parameters_like(), **parameters})
         size = self._sizes.get(tuple(given.items()), lambda: self._size_of(given))

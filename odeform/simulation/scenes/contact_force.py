@@ -9,7 +9,7 @@ import numpy as np
 from odeform.geometry.contact import RADIUS, checked_contact
 from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
 from odeform.simulation.contact_draws import contact_draws
-from odeform.simulation.contacts import vector_of
+from odeform.simulation.contacts import MASS, YOUNG, vector_of
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.objects.catalog import OBJECTS, get_object
@@ -28,7 +28,6 @@ STEP = 5e-4  # s, until the projectile has been gone for a while; twice that aft
 COARSE_FROM = 0.050  # s
 UNTIL = 1.0  # s, of a motion on demand
 REST = Rest(speed=1e-3, time=0.05)
-MASS, YOUNG = "mass", "young"
 
 
 def _contact(axis: str, low: float, high: float, default: float) -> Parameter:
@@ -41,11 +40,6 @@ def _force(axis: str, default: float) -> Parameter:
     return Parameter(f"force_{axis}", "N", -25.0, 25.0, default, description=f"{axis} of the force on the sphere")
 
 
-def of_body(name: str, unit: str, low: float, high: float, default: float, description: str) -> Parameter:
-    """A property of the body itself: each object has its own, from half to twice of which it may be changed."""
-    return Parameter(name, unit, low, high, default, "log", "body", description)
-
-
 SCHEMA = Schema(
     scene="contact-force",
     parameters=(
@@ -55,8 +49,6 @@ SCHEMA = Schema(
         _force("x", -8.0),
         _force("y", 0.0),
         _force("z", 0.0),
-        of_body(MASS, "kg", 0.002, 2.7, 0.745, "mass of the body"),
-        of_body(YOUNG, "kPa", 7.0, 2700.0, 83.0, "Young's modulus of the body"),
     ),
     window=Window(0.0, 0.19, 100.0),
     objects=OBJECTS,
@@ -152,10 +144,8 @@ def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
     """`count` parameter sets of the object `name`; see `contact_draws`."""
     item = get_object(name)
     drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed, zlib.crc32(name.encode())])
-    own = {MASS: item.mass, YOUNG: 1e-3 * item.material.young}
     return [
-        own
-        | {
+        {
             f"{key}_{axis}": float(x)
             for key, row in (("contact", c), ("force", f))
             for axis, x in zip("xyz", row, strict=True)

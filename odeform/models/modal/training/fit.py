@@ -95,7 +95,7 @@ def fit_mechanical(
         known_parameters.add(SHARED, shared)
     bodies = [
         _Body(
-            schema_of(get_object(name), dataset.of(name).schema),
+            schema_of([get_object(name)], dataset.of(name).schema),
             {split: _inputs(dataset.of(name), split) for split in ("train", "val")},
             pushes,
             read_pushes(dataset.of(name), "val", pushes.body),
@@ -119,7 +119,8 @@ def fit_mechanical(
         report(f"{name}: {described(contact_parameters)}")
         progress.advance(note=name)
     progress.close()
-    whole = joined(dataset.schema, {name: found[name] for name in names})
+    items = [get_object(name) for name in names]
+    whole = joined(schema_of(items, dataset.schema), {name: found[name] for name in names})
     return replace(whole, config={**whole.config, "val": {"seconds": spent}})
 
 
