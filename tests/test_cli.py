@@ -137,7 +137,7 @@ def test_predict_stops_a_motion_that_sinks(tmp_path: Path, capsys: pytest.Captur
     assert run("predict", "kick/gp", "--out", tmp_path / "a.npz", *setting, "--times", "0:3.6:0.05") == 0
     said = capsys.readouterr()
     assert (stopped := re.search(r"status stopped at t = ([23]\.\d+) s", said.out)) is not None
-    assert f"the motion stops at t = {stopped[1]} s, because it sinks into the floor" in said.err
+    assert f"the motion is stopped at t = {stopped[1]} s: it sinks into the floor" in said.err
     with np.load(tmp_path / "a.npz", allow_pickle=False) as arrays:
         assert arrays["vertices"][..., 2].min() > -load("kick/gp").validity.limits.depth
         assert "sinks into the floor" in str(arrays["notes"])

@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> None:
     for caveat in caveats(motion, times):
         _note(caveat)
     stop = motion.first_stop(float(times.max()))
-    status = motion.stats.status if stop is None else f"stopped at t = {stop.time:.3f} s"
+    status = motion.stats.status if stop is None else str(stop)
     print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {status}")
 
 

@@ -135,6 +135,12 @@ class Predictor(ABC):
         """Predictors are pickled as their checkpoints, without what they keep."""
         return type(self), (self.checkpoint,)
 
+    def __copy__(self) -> Any:
+        """A shallow copy shares everything that was read."""
+        out = object.__new__(type(self))
+        out.__dict__.update(self.__dict__)
+        return out
+
     @abstractmethod
     def _read(self, checkpoint: Checkpoint) -> None:
         """Take what this model needs; KeyError or ValueError where it is missing or wrong."""

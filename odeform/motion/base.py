@@ -181,9 +181,7 @@ class Motion(Remade, ABC):
         """Says the solver's status, and from where on the motion is not physically possible; "ok" if neither says
         more."""
         stop, solver = self.first_stop(), self.stats.status
-        if stop is None:
-            return solver
-        return f"{'' if solver == 'ok' else f'{solver}; '}stopped at t = {stop.time:.3f} s: {stop.reason}"
+        return solver if stop is None else f"{'' if solver == 'ok' else f'{solver}; '}{stop}"
 
     def _clock(self, t: float | Times) -> Times:
         """(T,) seconds of the model's clock at which `t`, a number or (T,) seconds, is evaluated; before it starts, a

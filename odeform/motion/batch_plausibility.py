@@ -1,6 +1,7 @@
 """Finds which of many motions are physically possible up to a time; the others are checked one by one
 (`plausibility.py`)."""
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -31,20 +32,21 @@ class BatchPlausibility:
     def valid(self, times: Times, sample: Sample) -> Valid:
         """(B,) whether motions may be shown as they are at all of `times` (T,), where they are as in `sample`. What is
         false may still be valid, at times between those that are looked at."""
-        inside = (times <= self._window.stop) & (times > self._window.start)
+        inside = (times <= (self._window.stop if self._limits.ends else np.inf)) & (times > self._window.start)
         wrong = self._wrong(sample)[:, inside].any(axis=1)
         latest = float(times.max(initial=self._window.start))
         return ~wrong & self.valid_until(latest)
 
     def valid_throughout(self, latest: float) -> Valid:
         """(B,) whether motions are valid at all times of the grid, up to `latest` seconds of the clock."""
-        count = round((self._window.stop - self._window.start) / self._step)
+        stop = self._window.stop if self._limits.ends else latest
+        count = math.floor((stop - self._window.start) / self._step + 1e-9)
         grid = self._window.start + self._step * np.arange(1, count + 1)
         return ~self._wrong(self._sample(grid)).any(axis=1) & self.valid_until(latest)
 
     def valid_until(self, latest: float) -> Valid:
         """(B,) whether motions are valid after the window, up to `latest` seconds of the clock."""
-        while self._window.stop + self._steps * self._step < latest:
+        while self._limits.ends and self._window.stop + self._steps * self._step < latest:
             self._check_on()
         return self._later
 

@@ -63,4 +63,4 @@ def _stop(motion: Motion, times: Times) -> list[str]:
     stop = motion.stop_at(float(times[0])) if len(times) == 1 else motion.first_stop(float(np.max(times, initial=0.0)))
     if stop is None:
         return []
-    return [f"the motion stops at t = {stop.time:.3f} s, because {stop.reason} afterwards: that moment is shown on"]
+    return [f"the motion is {stop}"]

@@ -20,6 +20,8 @@ class Limits:
             reach 1.0, and up to ten times beyond it 1.2; a continuation that gets lost passes 1.4.
         energy: Largest energy of the rigid motion after the trained window, in multiples of the largest within it.
             Nothing drives a body then: sound motions stay below 0.6, one that falls through the floor reaches 18.
+        ends: Whether a motion ends where it is first not valid after the trained window, because what follows builds on
+            it. Mechanics loses energy by itself and gets up again: then each moment is checked as in the window.
     """
 
     floor: float | None = None
@@ -27,3 +29,4 @@ class Limits:
     gravity: float = 9.81
     deformation: float = 1.3
     energy: float = 1.1
+    ends: bool = True

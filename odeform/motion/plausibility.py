@@ -2,13 +2,15 @@
 
 Within the trained window a model predicts each moment by itself, so each is checked by itself: a moment that is not
 valid shows the last valid one before it. After the window each frame follows from the ones before, so the motion ends
-where it is first not valid. Both follow from the motion on fixed grids of times, whose intervals are refined where
-needed: never from the times that are asked for, nor from their order.
+where it is first not valid, unless its limits say otherwise. Both follow from the motion on fixed grids of times, whose
+intervals are refined where needed: never from the times that are asked for, nor from their order.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -55,6 +57,12 @@ class Stop:
 
     time: float
     reason: str
+    for_good: bool = True
+    """Whether the motion ends there; false where later moments are valid again, or may be."""
+
+    def __str__(self) -> str:
+        at = f"t = {self.time:.3f} s: {self.reason} afterwards"
+        return f"stopped at {at}" if self.for_good else f"held at {at}, until it is valid again"
 
 
 class PlausibilityCheck:
@@ -74,24 +82,25 @@ class PlausibilityCheck:
 
     def stop_at(self, time: float) -> Stop | None:
         """Says what is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
-        if time > self._window.stop:
+        if not self._alone(time):
             return self._after_window(time)
         return self._last_valid(time) if time > self._window.start and self._faults(np.array([time]))[0] else None
 
     def first_stop(self, until: float) -> Stop | None:
         """The first moment before `until` seconds of the clock from which on the motion is clamped; checks all of
         it."""
-        grid = self._grid[self._grid <= until]
+        grid = self._grid(until)
+        grid = grid[self._alone(grid)]
         wrong = np.flatnonzero(self._faults(grid))
         if len(wrong):
             return self._last_valid(float(grid[wrong[0]]))
-        return self._after_window(until) if until > self._window.stop else None
+        return None if self._alone(until) else self._after_window(until)
 
     def _clamped(self, times: Times) -> Times:
         latest = float(times.max(initial=self._window.start))
-        end = self._after_window(latest) if latest > self._window.stop else None
+        end = None if self._alone(latest) else self._after_window(latest)
         out = times if end is None else np.where(times > self._window.stop, np.minimum(times, end.time), times)
-        inside = (out <= self._window.stop) & (out > self._window.start)
+        inside = self._alone(out) & (out > self._window.start)
         # all are evaluated, also those that cannot be wrong: they are what is asked for next
         wrong = np.flatnonzero(inside & (self._faults(out) != VALID)) if inside.any() else []
         if len(wrong):
@@ -99,10 +108,14 @@ class PlausibilityCheck:
             out[wrong] = [self._last_valid(float(time)).time for time in out[wrong]]
         return out
 
-    @cached_property
-    def _grid(self) -> Times:
-        """Times of the window without its start, where the body is at rest."""
-        count = round((self._window.stop - self._window.start) / self._step)
+    def _alone(self, time: Any) -> Any:
+        """Whether a time, or each of many, is checked by itself."""
+        return time <= (self._window.stop if self._limits.ends else np.inf)
+
+    def _grid(self, until: float) -> Times:
+        """Times from the start of the window, where the body is at rest, to `until` s, without it."""
+        # a time on the grid counts, however it was rounded
+        count = math.floor((until - self._window.start) / self._step + 1e-9)
         return self._window.start + self._step * np.arange(1, count + 1)
 
     def _faults(self, times: Times) -> Ints:
@@ -112,12 +125,13 @@ class PlausibilityCheck:
         return faults_of(self.sample(times), self._limits)
 
     def _last_valid(self, time: float) -> Stop:
-        """The last valid moment in the window before `time`, which is not valid."""
-        grid = self._grid[self._grid < time]
+        """The last valid moment before `time`, which is checked by itself and not valid."""
+        grid = self._grid(time)
+        grid = grid[grid < time]
         valid = np.flatnonzero(self._faults(grid) == VALID)
         index = int(valid[-1]) + 1 if len(valid) else 0
         begin = float(grid[index - 1]) if index else self._window.start
-        return self._refined(begin, float(grid[index]) if index < len(grid) else time)
+        return replace(self._refined(begin, float(grid[index]) if index < len(grid) else time), for_good=False)
 
     def _refined(self, begin: float, end: float) -> Stop:
         """The last valid moment between a valid one and one that is not."""
@@ -139,7 +153,7 @@ class PlausibilityCheck:
         """Check the next times after the window; for any request they are the same, in the same order."""
         steps, stop = self._steps, self._window.stop
         if not steps and self._faults(np.array([stop]))[0] != VALID:
-            self._end = self._last_valid(stop)
+            self._end = replace(self._last_valid(stop), for_good=True)
             return
         times = stop + self._step * np.arange(steps - 1, steps + CHUNK + 2)
         sample = self.sample(times)

@@ -70,7 +70,7 @@ def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
         later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
         lines.append(f"⚠ **{status}**{later}")
     stop = motion.stop_at(time) or (motion.first_stop() if settled else None)
-    return lines if stop is None else [*lines, f"⚠ **stops at t = {stop.time:.3f} s**: {stop.reason} afterwards"]
+    return lines if stop is None else [*lines, f"⚠ {stop}"]
 
 
 class StatusPanel(Panel):

@@ -17,7 +17,7 @@ def summarize(frame: Frame) -> str:
     lines = [*_push(frame), _validity(frame)]
     for column in frame.columns:
         if stop := column.stop_at(frame.request.time):
-            lines.append(f"⚠ **{column.column.label} stopped at {stop.time:.3f} s**: {stop.reason} afterwards")
+            lines.append(f"⚠ **{column.column.label}** {stop}")
     if low := [c.column.label for c in frame.columns if c.below_floor]:
         deepest = max(c.depth for c in frame.columns)
         lines.append(f"⚠ **{', '.join(low)}**: {1e3 * deepest:.0f} mm below the floor")

@@ -166,7 +166,7 @@ class LoggedColumn:
         if shown.untrained and shown.similarity:
             problems.append(shown.similarity.describe())
         if stop := shown.stop_at(time):
-            problems.append(f"stopped at t = {stop.time:.3f} s: {stop.reason} afterwards")
+            problems.append(str(stop))
         status = f"{self.column.label}: {shown.stats.solver}, {'; '.join(problems) or 'ok'}"
         if status != self._status:
             level = rr.TextLogLevel.WARN if problems else rr.TextLogLevel.INFO

@@ -150,3 +150,18 @@ def test_after_the_window_no_moment_of_the_grid_is_left_out(step: int) -> None:
     assert stop is not None
     assert stop.time == pytest.approx(moment - 0.4 / 120.0, abs=2e-5)
     assert brief.stop_at(moment - 0.5 / 120.0) is None
+
+
+def test_mechanics_goes_on_after_a_moment_that_is_not_valid() -> None:
+    def sample(times: Times) -> Sample:
+        low = np.where((times > 1.2) & (times < 1.3), -0.006, 0.0)
+        return Sample(low, np.zeros_like(times), np.zeros((len(times), 3)))
+
+    check = PlausibilityCheck(Limits(floor=0.0, ends=False), WINDOW, sample)
+    shown = check.clamped(np.array([1.1, 1.25, 1.29, 1.31, 1.5]))
+    assert shown[[0, 3, 4]].tolist() == [1.1, 1.31, 1.5]
+    assert shown[1] == shown[2] == pytest.approx(1.2, abs=2e-5)
+    stop = check.first_stop(1.5)
+    assert stop == check.stop_at(1.25)
+    assert str(stop) == "held at t = 1.200 s: it sinks into the floor afterwards, until it is valid again"
+    assert check.stop_at(1.5) is None

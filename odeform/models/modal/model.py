@@ -129,9 +129,10 @@ class ModalModel(Model):
 
     @cached_property
     def validity(self) -> Validity:
-        # mechanics loses energy by itself; that of the centre alone may grow, as when a body falls over
+        # mechanics loses energy by itself (that of the centre alone may grow, as when a body falls over), and what
+        # bends too far comes back: its rigid motion goes on meanwhile
         validity = super().validity
-        return replace(validity, limits=replace(validity.limits, energy=float("inf")))
+        return replace(validity, limits=replace(validity.limits, ends=False))
 
     @property
     def mechanics(self) -> Mechanics:
