@@ -45,6 +45,8 @@ class Residual:
     weight: Float[np.ndarray, " y"]
     """(6 + K,) weights of the ODE's motion, by coordinate."""
     regression: FrameRegression
+    rigid: float = 1.0
+    """Factor on all that it does to the rigid motion."""
 
     @property
     def stop(self) -> float:
@@ -54,8 +56,18 @@ class Residual:
     def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "*batch times y"]]:
         """(T,) s -> (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
         several motions, (B, T, 6 + K)."""
-        frames = self.regression.frames(inputs)
+        frames = self.regression.frames(inputs) * self._factors
         return lambda times: self._spline(np.clip(times, self.times[0], self.times[-1])) @ frames
+
+    @property
+    def _factors(self) -> Float[np.ndarray, " y"]:
+        """(6 + K,)"""
+        return np.where(np.arange(len(self.weight)) < POSE, self.rigid, 1.0)
+
+    @property
+    def _taken(self) -> Float[np.ndarray, " y"]:
+        """(6 + K,) how much of the ODE's motion is taken away."""
+        return self._factors * (1.0 - self.weight)
 
     @cached_property
     def _spline(self) -> CubicSpline:
@@ -64,7 +76,7 @@ class Residual:
 
     def adjustment(self, own: Moving, inputs: Any) -> Adjustment:
         """Adds it to the coordinates (T, 6 + K) of the motion `own` of the ODE, or of several; zero at time 0."""
-        added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
+        added_at, taken, stop = self.over_time(inputs), self._taken, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
             added = added_at(times)
@@ -80,7 +92,7 @@ class Residual:
         After the last frame it fades away, linearly over `FADES` seconds: where a body comes to rest, it is as its ODE
         says.
         """
-        added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
+        added_at, taken, stop = self.over_time(inputs), self._taken, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
             share = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]

@@ -7,9 +7,10 @@ import numpy as np
 from odeform.models.base import Predictor
 from odeform.models.error_band import FEWEST
 from odeform.motion.base import Motion, SolveStats
+from odeform.motion.rest import rests_from
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import ColumnFrame, Description
+from odeform_viz.view import ColumnFrame, Description, played_until
 
 __all__ = ["StatusPanel", "describe_column"]
 
@@ -17,8 +18,8 @@ __all__ = ["StatusPanel", "describe_column"]
 def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> str:
     """Markdown: solver, work, solver error and model error of one column at `time` in seconds.
 
-    The solver error, and whether the motion stops later, take longer than the motion: they follow when the view has
-    `settled`.
+    The solver error, and whether the motion stops later and when the body rests, take longer than the motion: they
+    follow when the view has `settled`.
     """
     column, stats = shown.column, shown.stats
     lines = [f"**{column.label}** · {len(column.geometry.points):,} points"]
@@ -35,6 +36,7 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     lines += _model_error(shown, column.predictor, time)
     if isinstance(shown.motion, Motion):
         lines += _stops(shown.motion, time, settled)
+        lines += _rest(shown.motion, settled)
     return "  \n".join(lines)
 
 
@@ -51,7 +53,9 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
     if shown.untrained and not predictor.knows_untrained_errors:
         return ["model error: unknown, this shape was not trained"]
     band = shown.error_band(np.array([time]))
-    if band is None:
+    if band is None and predictor.model_of(shown.motion.parameters).is_changed(shown.motion.parameters):
+        lines = ["model error here: unknown, no data have this mass or stiffness"]
+    elif band is None:
         lines = [f"model error here: unknown, with fewer than {FEWEST} validation sequences"]
     else:
         rough = " (extrapolated: rough)" if shown.motion.extrapolates(time) or shown.motion.outside else ""
@@ -71,6 +75,15 @@ def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
         lines.append(f"⚠ **{status}**{later}")
     stop = motion.stop_at(time) or (motion.first_stop() if settled else None)
     return lines if stop is None else [*lines, f"⚠ {stop}"]
+
+
+def _rest(motion: Motion, settled: bool) -> list[str]:
+    """Says when the body has come to rest, of motions that are played until then."""
+    window = motion.schema.window
+    if not settled or (until := played_until(window)) <= window.stop or motion.stats.status != "ok":
+        return []
+    begin = rests_from(motion, until)
+    return [f"still moves at {until:.2g} s" if begin is None else f"at rest from t = {begin:.2f} s on"]
 
 
 class StatusPanel(Panel):

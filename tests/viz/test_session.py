@@ -199,6 +199,20 @@ def test_status_says_how_far_off_the_model_is() -> None:
     assert "(extrapolated: rough)" in describe_column(session.frame(later).columns[0], later.time)
 
 
+def test_status_says_when_a_pushed_body_rests_and_that_no_error_is_known_at_another_mass() -> None:
+    model = odeform.load("contact-force")
+    session, bottle = _alone(model)
+    assert "still moves at 1 s" in describe_column(session.frame(bottle).columns[0], 0.1)
+    view_request = replace(bottle, parameters=model.complete({"object": "cat"}))
+    shown = session.frame(view_request).columns[0]
+    assert re.search(r"at rest from t = 0\.\d\d s on", describe_column(shown, 0.1))
+    assert "model error here ≈" in describe_column(shown, 0.1)
+    assert "at rest" not in describe_column(shown, 0.1, settled=False)
+    heavy = {**view_request.parameters, "mass": 1.5 * view_request.parameters["mass"]}
+    text = describe_column(session.frame(replace(view_request, parameters=heavy)).columns[0], 0.1)
+    assert "model error here: unknown, no data have this mass or stiffness" in text
+
+
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:
     session, view_request = _alone(kick, 0.0)
     assert 0.005 < session.largest_deformation(view_request) < 0.03

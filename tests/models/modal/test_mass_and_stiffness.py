@@ -10,6 +10,9 @@ import torch
 import odeform
 from odeform.errors import InputError
 from odeform.models.base import Predictor
+from odeform.models.modal.model import ModalModel
+from odeform.motion.reduced_motion import as_reduced
+from odeform.types import Floats
 
 DONUT = {"object": "donut"}
 
@@ -92,3 +95,21 @@ def test_a_batch_and_a_pickled_motion_are_as_the_motion(model: Predictor, own: d
 def test_a_gradient_by_the_mass_is_refused(model: Predictor) -> None:
     with pytest.raises(InputError, match="mass: has no gradients"):
         model.torch({**DONUT, "mass": torch.tensor(0.2, requires_grad=True)}, [0.1])
+
+
+def test_the_residual_moves_a_heavier_body_less_and_a_lighter_one_as_it_was_trained(
+    model: Predictor, own: dict[str, Any]
+) -> None:
+    part, alone = model.model_of(own), odeform.load("contact-force").model_of(own)
+    assert isinstance(alone, ModalModel)
+    alone.residual = None
+    times = np.array([0.04, 0.1])
+
+    def added(mass: float) -> Floats:
+        with_it, without = (as_reduced(m.solve(parameters=changed(own, mass=mass))) for m in (part, alone))
+        return (with_it.coordinates(times) - without.coordinates(times))[:, 3:6]
+
+    usual, heavy, light = added(1.0), added(4.0 / 3.0), added(0.75)
+    # of one object, the rotation by mechanics has the weight one: all that is added is regressed
+    np.testing.assert_allclose(heavy, 0.75 * usual, rtol=0.05)
+    np.testing.assert_allclose(light, usual, rtol=0.05)
