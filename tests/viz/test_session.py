@@ -203,7 +203,9 @@ def test_status_says_when_a_pushed_body_rests_and_that_no_error_is_known_at_anot
     model = odeform.load("contact-force")
     session, bottle = _alone(model)
     assert "still moves at 1 s" in describe_column(session.frame(bottle).columns[0], 0.1)
-    view_request = replace(bottle, parameters=model.complete({"object": "cat"}))
+    cat = model.complete({"object": "cat"})
+    columns = Columns.of([Column(model.model, model, model.rest_of(cat))]).all
+    view_request = replace(bottle, parameters=cat, columns=columns)
     shown = session.frame(view_request).columns[0]
     assert re.search(r"at rest from t = 0\.\d\d s on", describe_column(shown, 0.1))
     assert "model error here ≈" in describe_column(shown, 0.1)
