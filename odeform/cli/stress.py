@@ -22,7 +22,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=5_000,
         metavar="N",
-        help="motions inside the trained box, watched to the end of the time axis (default: 5000)",
+        help="motions inside the trained box, watched to the end of the time axis; of pushed objects, pushes "
+        "until they rest (default: 5000)",
     )
     parser.add_argument(
         "--map", metavar="FILE.png", help="also write a picture of where it is stable, over two parameters and time"

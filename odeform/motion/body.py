@@ -15,7 +15,7 @@ from odeform.types import Floats, Mesh, PointCloud, Points, Rotations, Times, Ve
 __all__ = ["CheckedBody", "checked_body"]
 
 OUTERMOST = 256  # points that represent the body; every point of the bundled ball is within 1.5 mm of them in height
-NEAR = 2e-3  # m above the floor's limit from which on all points are looked at
+NEAR = 3.5e-3  # m above the floor's limit from which on all points are looked at
 
 
 @dataclass(frozen=True, eq=False)

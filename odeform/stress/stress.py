@@ -14,7 +14,8 @@ from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.latent.model import LatentModel
 from odeform.models.model import Model
-from odeform.models.registry import load_reduced
+from odeform.models.per_object import PerObject
+from odeform.models.registry import load, load_reduced
 from odeform.models.rolling.model import RollingModel
 from odeform.motion.base import Motion
 from odeform.parallel import parallel_map
@@ -23,6 +24,7 @@ from odeform.stress.cases import Case, extreme_cases, methods_of, shapes, subsam
 from odeform.stress.check import Check, Checks
 from odeform.stress.consistency import check_consistency
 from odeform.stress.convergence import check_orders, check_refining
+from odeform.stress.objects import stress_objects
 from odeform.stress.physics import check_physics
 from odeform.stress.shown import DRAWS, check_shown
 from odeform.stress.solvers import check_calibration, check_field, check_sensitivities
@@ -94,8 +96,12 @@ def _status(motion: Motion, times: Times) -> str:
 def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAWS) -> dict[str, Any]:
     """`count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
 
+    Of pushed objects, `draws` pushes until they rest.
+
     The seed fixes everything but wall times.
     """
+    if isinstance(load(checkpoint), PerObject):
+        return stress_objects(checkpoint, draws, seed)
     predictor = load_reduced(checkpoint)
     schema = predictor.schema
     cases = extreme_cases(schema, methods_of(predictor), count, seed)
@@ -186,11 +192,11 @@ def report(result: Mapping[str, Any]) -> str:
     """The result as text, one line per status and check."""
     lines = [f"{result['cases']} cases, {result['non_finite_shown']} non-finite frames"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
-    inside = result["inside"]
-    lines.append(
-        f"{inside['draws']} motions inside the trained box, to the end of the time axis: {inside['stopped']} stopped, "
-        f"{inside['stopped_in_window']} of them within the trained window"
-    )
+    if inside := result.get("inside"):
+        lines.append(
+            f"{inside['draws']} motions inside the trained box, to the end of the time axis: {inside['stopped']} "
+            f"stopped, {inside['stopped_in_window']} of them within the trained window"
+        )
     for name, check in result["checks"].items():
         figure = "not finite" if check["figure"] is None else f"{check['figure']:.4g}"
         lines.append(f"{'holds' if check['holds'] else 'FAILS'}   {name:<40}{figure:>12}   bound {check['bound']:.4g}")

@@ -1,0 +1,116 @@
+"""The stability of models that have one for each object: pushes of all of them, until they rest."""
+
+import time
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.models.per_object import PerObject
+from odeform.models.registry import load
+from odeform.motion.rest import rests_from
+from odeform.parallel import parallel_map
+from odeform.schema import OBJECT, Parameters, Schema
+from odeform.simulation.scenes.registry import find_scene
+from odeform.stress.check import Check
+
+__all__ = ["BEYOND", "Watched", "draws_of", "stress_objects", "watch"]
+
+BEYOND = 1.25  # times the trained forces, at most
+PATIENCE = 10.0  # s
+BATCH = 32  # pushes that a process takes at a time
+MOVING = 0.1  # fraction of bodies that may still move at the end: a bottle that lies rolls on
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What one motion did, from its start until the model knows no more of it."""
+
+    status: str
+    non_finite: int
+    """Frames that are not finite."""
+    start_off: float
+    """m between its first frame and the body at rest."""
+    depth: float
+    """m below the floor, at most."""
+    held: float
+    """Fraction of the frames that show an earlier moment, because it is not valid."""
+    rests: bool
+    seconds: float
+
+
+def draws_of(schema: Schema, count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` pushes of all objects in turn, drawn as their data are, with up to `BEYOND` times the force, and with
+    masses and stiffnesses from all of their ranges."""
+    scene = find_scene(schema.scene)
+    assert scene is not None
+    rng, each = np.random.default_rng(seed), -(-count // len(schema.objects))
+    drawn = scene.sample(each, seed, schema.objects)
+    out = [dict(row) for index in range(each) for row in drawn[index::each]][:count]
+    for row in out:
+        strength = rng.uniform(0.0, BEYOND)
+        row |= {name: strength * value for name, value in row.items() if name.startswith("force_")}
+    return out
+
+
+def watch(model: PerObject, draw: tuple[int, Parameters]) -> Watched:
+    """Solve one push, with a mass and a stiffness drawn from the ranges of its object, and look at all of its
+    frames."""
+    index, push = draw
+    part, rng, begin = model.parts[push[OBJECT]], np.random.default_rng(index), time.perf_counter()
+    body = {p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in part.schema.parameters if p.role == "body"}
+    try:
+        motion = model.solve(parameters={**push, **body})
+        window = motion.schema.window
+        end = window.start + (1.0 + window.reach) * (window.stop - window.start)
+        times = np.arange(0.0, end, 1.0 / window.rate)
+        frames = motion.vertices(times)
+        held = sum(motion.stop_at(float(moment)) is not None for moment in times) / len(times)
+        rests = window.reach == 0.0 or rests_from(motion, end) is not None
+        status, rest = motion.stats.status, model.settled({**push, **body}).points
+    except InputError:
+        return Watched("refused", 0, 0.0, 0.0, 0.0, True, time.perf_counter() - begin)
+    except Exception as error:
+        return Watched(f"fault: {type(error).__name__}", 0, 0.0, 0.0, 0.0, False, time.perf_counter() - begin)
+    finite, floor = np.isfinite(frames).all(axis=(1, 2)), motion.validity.limits.floor
+    depth = 0.0 if floor is None or not finite.any() else floor - float(frames[finite][..., 2].min())
+    start_off = float(np.abs(frames[0] - rest).max())
+    return Watched(status, int((~finite).sum()), start_off, depth, held, rests, time.perf_counter() - begin)
+
+
+def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]:
+    """`draws` pushes and the checks over them, as JSON; the seed fixes everything but times."""
+    model = _opened(checkpoint)
+    rows = list(enumerate(draws_of(model.schema, draws, seed)))
+    found = parallel_map("pushes", partial(_watched_from, checkpoint), rows, batch_size=BATCH)
+    depth = max(part.validity.limits.depth for part in model.parts.values())
+    checks = {
+        "faults": Check(sum(one.status.startswith("fault") for one in found), 0),
+        "non_finite_frames": Check(sum(one.non_finite for one in found), 0),
+        "start_off_m": Check(max(one.start_off for one in found), 0.0),
+        "shown_below_floor_mm": Check(1e3 * max(one.depth for one in found), 1e3 * depth),
+        "held_frames": Check(float(np.mean([one.held for one in found])), 0.05),
+        "moving_at_the_end": Check(float(np.mean([not one.rests for one in found])), MOVING),
+        "slowest_case_s": Check(max(one.seconds for one in found), PATIENCE),
+    }
+    return {
+        "cases": len(found),
+        "non_finite_shown": sum(one.non_finite for one in found),
+        "by_status": dict(Counter(one.status for one in found).most_common()),
+        "checks": {name: check.to_json() for name, check in checks.items()},
+    }
+
+
+@cache
+def _opened(checkpoint: str) -> PerObject:
+    """Opened once in each process."""
+    model = load(checkpoint)
+    assert isinstance(model, PerObject)
+    return model
+
+
+def _watched_from(checkpoint: str, draw: tuple[int, Parameters]) -> Watched:
+    return watch(_opened(checkpoint), draw)
