@@ -71,11 +71,11 @@ class Start:
 
     Past them, it is asked for a push of that direction that was trained, and its answer is scaled: so is the spin. But
     a push that lifts the body adds its impulse to the velocity; what presses it onto the floor is carried by the floor,
-    and braked by the law's friction.
+    and braked by friction.
     """
 
-    def __init__(self, regression: KernelRegression, schema: Schema, law: RollingContact) -> None:
-        self._regression, self._schema, self._law = regression, schema, law
+    def __init__(self, regression: KernelRegression, schema: Schema, contact: RollingContact) -> None:
+        self._regression, self._schema, self._contact = regression, schema, contact
         if is_pushed(schema):
             strengths = regression.inputs[:, -2:]
             self._strongest = float(np.linalg.norm(strengths, axis=1).max())
@@ -92,8 +92,8 @@ class Start:
         out = self._scaled(asked, self._strongest)
         out[TURNED] = self._scaled(asked, TRUSTED * self._strongest)[TURNED]
         ahead, up = asked[-2:]
-        share = max(_between(float(np.arctan2(up, ahead)), LIFTING), _between(-up, PRESSING))
-        out[STRAIGHT] += share * (self._straight(asked, inside) - out[STRAIGHT])
+        part = max(_between(float(np.arctan2(up, ahead)), LIFTING), _between(-up, PRESSING))
+        out[STRAIGHT] += part * (self._straight(asked, inside) - out[STRAIGHT])
         return out
 
     def _scaled(self, asked: Floats, strongest: float) -> Vector6:
@@ -107,12 +107,12 @@ class Start:
         begun, (ahead, up) = self._regression(known[None])[0, STRAIGHT], asked[-2:] - known[-2:]
         if asked[-1] < 0.0:
             # what is pressed stays down
-            friction = float(np.exp(self._law.coefficients(known[None, :-2])["friction"][0]))
+            friction = float(np.exp(self._contact.coefficients(known[None, :-2])["friction"][0]))
             ahead, up, begun[1::2] = ahead + friction * asked[-1], 0.0, np.minimum(begun[1::2], 0.0)
         return begun + np.array([ahead, up]) @ self._impulse
 
 
 def _between(value: float, ends: tuple[float, float]) -> float:
     """From 0 to 1 between two ends, smoothly."""
-    share = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    part = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
+    return part**2 * (3.0 - 2.0 * part)
