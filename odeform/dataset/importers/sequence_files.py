@@ -15,7 +15,7 @@ from odeform.dataset.importers.frame_reading import DISPLACEMENT, VTK
 from odeform.dataset.importers.recording import Recording
 from odeform.dataset.importers.unpacking import Unpacked
 from odeform.dataset.motion_arrays import read_motion_arrays
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.motion_capture import read_c3d
 from odeform.formats.vtk_files import read_grid
 from odeform.formats.vtk_grid import Grid, outside_of
@@ -59,7 +59,7 @@ def c3d_recording(path: Path) -> Recording:
     """The markers of a C3D file, as points without faces."""
     where = f"import {path}"
     capture = read_c3d(_content(path, MEMORY // 4), where)
-    notes = (*capture.notes, f"{len(capture.labels)} markers as points: {', '.join(capture.labels[:8])}"
+    notes = (*capture.notes, f"{counted(len(capture.labels), 'marker')} as points: {', '.join(capture.labels[:8])}"
              f"{' …' if len(capture.labels) > 8 else ''}")  # fmt: skip
     return Recording(
         where, len(capture.times), lambda: (capture.points, NO_FACES), capture.times, metric=True, notes=notes
