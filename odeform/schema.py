@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -221,16 +222,16 @@ class Schema:
     objects: tuple[str, ...] = ()
     surroundings: Surroundings | None = None
 
-    @property
+    @cached_property
     def learned(self) -> tuple[Parameter, ...]:
         """The P parameters that a model learns: all except the azimuth of a symmetric scene, and properties of the body
         itself."""
         return tuple(p for p in self.parameters if p.role == "physical")
 
-    @property
-    def names(self) -> list[str]:
+    @cached_property
+    def names(self) -> tuple[str, ...]:
         """Names of all parameters in order, with "object" first in a scene with objects."""
-        return [OBJECT] * bool(self.objects) + [p.name for p in self.parameters]
+        return (*[OBJECT] * bool(self.objects), *(p.name for p in self.parameters))
 
     def azimuth(self, parameters: Parameters) -> float:
         """The azimuth in radians; 0 for a scene without one."""

@@ -38,10 +38,12 @@ def push_inputs(schema: Schema, theta: Float[np.ndarray, "motions parameters"]) 
     100 m/s^2. The parameters as they are in a scene without force, elevation or mass."""
     if not is_pushed(schema):
         return theta
-    own = {p.name: np.array([p.denormalise(float(u)) for u in theta[:, i]]) for i, p in enumerate(schema.learned)}
-    force, elevation, mass = (own[name] for name in (*PUSHES, MASS))
-    strength = force / (UNIT * mass)
-    material = [theta[:, i] for i, p in enumerate(schema.learned) if p.name not in PUSHES]
+    own, material = {}, []
+    for normalised, parameter in zip(theta.T, schema.learned, strict=True):
+        own[parameter.name] = np.array([parameter.denormalise(float(u)) for u in normalised])
+        if parameter.name not in PUSHES:
+            material.append(normalised)
+    strength, elevation = own["force"] / (UNIT * own[MASS]), own["elevation"]
     return np.stack([*material, strength * np.cos(elevation), strength * np.sin(elevation)], axis=1)
 
 
@@ -76,7 +78,8 @@ class Start:
 
     def __init__(self, regression: KernelRegression, schema: Schema, contact: RollingContact) -> None:
         self._regression, self._schema, self._contact = regression, schema, contact
-        if is_pushed(schema):
+        self._pushed = is_pushed(schema)
+        if self._pushed:
             strengths = regression.inputs[:, -2:]
             self._strongest = float(np.linalg.norm(strengths, axis=1).max())
             # what a steep push adds, in the middle of what was trained, is its impulse alone
@@ -87,7 +90,7 @@ class Start:
     def __call__(self, theta: Floats) -> Vector6:
         """(P,) normalised parameters, as they are asked for."""
         asked, inside = push_inputs(self._schema, theta[None])[0], np.clip(theta, -1.0, 1.0)
-        if not is_pushed(self._schema) or np.array_equal(theta, inside):
+        if not self._pushed or np.array_equal(theta, inside):
             return self._regression(asked[None])[0]
         out = self._scaled(asked, self._strongest)
         out[TURNED] = self._scaled(asked, TRUSTED * self._strongest)[TURNED]
