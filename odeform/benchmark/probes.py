@@ -32,7 +32,7 @@ def round_mesh(points: int, predictor: Predictor) -> Mesh:
 
 
 def round_cloud(points: int, predictor: Predictor) -> PointCloud:
-    """The points of `round_mesh` alone."""
+    """Returns the points of `round_mesh` alone."""
     return PointCloud(_round(points, predictor)[0])
 
 
@@ -58,7 +58,7 @@ def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[P
 
 
 def nearest_sequences(dataset: Dataset, parameters: Any, count: int) -> Dataset:
-    """The `count` test sequences nearest to these parameters, in units of the trained ranges."""
+    """Returns the `count` test sequences nearest to these parameters, in units of the trained ranges."""
     schema = dataset.schema
     target = schema.vector(parameters)
     same_body = dataset.select("test", parameters.get(OBJECT))

@@ -20,7 +20,7 @@ COPIES = 4  # of its arrays that the use of a sequence takes
 
 
 def array_names(data: bytes, where: str) -> set[str]:
-    """The names of the arrays in an `.npz` archive. `InputError`, which `where` leads, for other files."""
+    """Returns the names of the arrays in an `.npz` archive. `InputError`, which `where` leads, for other files."""
     if data[:2] != b"PK":
         raise InputError(f"{where}: damaged: expected an .npz archive, got {len(data):,} other bytes")
     try:
@@ -59,7 +59,8 @@ def read_arrays(
 
 
 def checked_sequence(sequence: MotionSequence, where: str) -> MotionSequence:
-    """The same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not finite."""
+    """Returns the same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not
+    finite."""
     check_arrays({name: np.asarray(getattr(sequence, name)) for name in ARRAYS}, where)
     return sequence
 

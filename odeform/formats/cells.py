@@ -42,7 +42,7 @@ class Cells:
 
 
 def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) -> Geometry:
-    """The surface of all solid cells, else all flat ones, else the points (N, 3).
+    """Returns the surface of all solid cells, else all flat ones, else the points (N, 3).
 
     Raises:
         InputError: For cells that refer to no vertex, and faces of which none has three corners.

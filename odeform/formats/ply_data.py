@@ -136,7 +136,8 @@ def _binary_lists(data: NDArray[np.uint8], start: int, element: Element, order: 
 
 
 def _even_lists(data: NDArray[np.uint8], start: int, element: Element, order: str) -> tuple[Rows, int] | None:
-    """As `_binary_lists` where all lists of a property have one length, as in a mesh of triangles; None otherwise."""
+    """Reads as `_binary_lists` does where all lists of a property have one length, as in a mesh of triangles; None
+    otherwise."""
     fields: list[tuple[str, Any, Any]] = []
     position, lengths = start, []
     for column, entry in enumerate(element.properties):

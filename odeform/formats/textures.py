@@ -15,7 +15,8 @@ def sampled(
     uv: Float[np.ndarray, "vertices 2"],
     wraps: tuple[str, str] = (REPEAT, REPEAT),
 ) -> Float[np.ndarray, "vertices 3"]:
-    """sRGB colors, 0 to 255, of an image (H, W, 3) at coordinates (N, 2): 0 at its lower left, 1 at its upper right.
+    """Returns sRGB colors, 0 to 255, of an image (H, W, 3) at coordinates (N, 2): 0 at its lower left, 1 at its upper
+    right.
 
     Colors are interpolated between the four nearest pixels. Beyond 0 and 1 the image is repeated, mirrored or held, in
     each direction as `wraps` says. Coordinates that are not finite count as 0.

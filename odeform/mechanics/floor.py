@@ -30,7 +30,7 @@ class Floor:
 
 
 def stand(body: ReducedBody, parameters: ContactParameters) -> Floor:
-    """The springs, and the height and tilt of the floor at which they carry the body without turning it.
+    """Finds the springs, and the height and tilt of the floor at which they carry the body without turning it.
 
     The equilibrium is the minimum of the potential energy of the springs and the weight, which is convex.
     """

@@ -24,7 +24,7 @@ class Nodes:
 
     @property
     def shifts(self) -> Float[np.ndarray, "batch times 3"]:
-        """m."""
+        """Shifts of the mass centre, m."""
         return np.stack([state.shift for state in self.states], axis=1)
 
     @property

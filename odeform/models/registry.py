@@ -31,7 +31,7 @@ Kind = TypeVar("Kind", bound=Predictor)
 
 
 def model_class(name: str) -> type[Predictor]:
-    """The class of a model, or of an alias of one; `InputError` for any other name.
+    """Returns the class of a model, or of an alias of one; `InputError` for any other name.
 
     Besides those of this package there are models that a program registered (`odeform.models.plugins`), and those that
     installed packages declare. No code is imported because a checkpoint names it.
@@ -47,8 +47,8 @@ def model_class(name: str) -> type[Predictor]:
 
 
 def open_checkpoint(name: str | Path) -> Checkpoint:
-    """A checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE or
-    SCENE/MODEL. `InputError` for anything else."""
+    """Opens a checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE
+    or SCENE/MODEL. `InputError` for anything else."""
     path = resolve_checkpoint(str(name))
     if path.suffix.lower() == ENDING:
         return read_authors_checkpoint(path)

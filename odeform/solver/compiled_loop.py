@@ -22,7 +22,7 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 @njit(**OPTIONS)
 @no_type_check
 def slopes_of(slope, own, shared, sizes, states, out):
-    """Fields `out` (B, n) at states (B, n) of problems with numbers `own` (B, k)."""
+    """Computes the fields `out` (B, n) at states (B, n) of problems with numbers `own` (B, k)."""
     for row in range(len(states)):
         slope(states[row], own[row], shared, sizes, out[row])
 

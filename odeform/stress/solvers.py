@@ -25,7 +25,7 @@ HALF_STEP = 0.005  # in halves of the trained range: half a slider step of 1/200
 
 
 def check_field(model: Model, seed: int = 0) -> Checks:
-    """Growth of differences and of the state.
+    """Returns the growth of differences and of the state.
 
     `lyapunov_per_s`: largest finite-time Lyapunov exponent over the window, from the derivative of the final state by
     the initial one; the bound lets rounding in single precision grow to a thousandth. `state_growth`: largest latent

@@ -39,7 +39,8 @@ class StabilityMap:
 
 
 def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) -> float:
-    """Largest RMS deformation in metres of `count` random motions of the trained box, within the trained window."""
+    """Returns the largest RMS deformation in metres of `count` random motions of the trained box, within the trained
+    window."""
     times = predictor.schema.window.times
     motions = (predictor.solve(None, parameters) for parameters in inside(predictor.schema, count, seed))
     return max(float(motion.deformation_rms(times).max()) for motion in motions)

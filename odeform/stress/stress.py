@@ -92,7 +92,7 @@ def _status(motion: Motion, times: Times) -> str:
 
 
 def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAWS) -> dict[str, Any]:
-    """`count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
+    """Runs `count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
 
     The seed fixes everything but wall times.
     """
@@ -183,7 +183,7 @@ def _coarse(case: Case, window: Window) -> bool:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The result as text, one line per status and check."""
+    """Returns the result as text, one line per status and check."""
     lines = [f"{result['cases']} cases, {result['non_finite_shown']} non-finite frames"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
     inside = result["inside"]

@@ -176,7 +176,7 @@ def _family(model: str, dataset: Dataset) -> str:
 
 
 def scored(checkpoint: Checkpoint, dataset: Dataset, parts: Iterable[tuple[int, int]] = ()) -> Checkpoint:
-    """The checkpoint with its residuals on validation and its scores on the test split."""
+    """Returns the checkpoint with its residuals on validation and its scores on the test split."""
     # errors are those of motions that are watched over
     for measure in (trained_depth, validation_residuals, _calibration):
         checkpoint = replace(checkpoint, arrays={**checkpoint.arrays, **measure(load_model(checkpoint), dataset)})

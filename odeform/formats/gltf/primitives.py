@@ -36,7 +36,7 @@ class Primitive:
 
 
 def read_primitive(document: Document, primitive: Tree, weights: Floats, joints: Floats | None) -> Primitive:
-    """A part with morph targets added by `weights` (T,) and moved by `joints` (J, 4, 4), bound pose to world.
+    """Reads a part with morph targets added by `weights` (T,) and moved by `joints` (J, 4, 4), bound pose to world.
 
     Raises:
         InputError: For compressed or damaged data.
@@ -60,7 +60,7 @@ def read_primitive(document: Document, primitive: Tree, weights: Floats, joints:
 
 
 def attributes_of(document: Document, primitive: Tree) -> Tree:
-    """The attributes of a primitive. Raises `InputError` without positions."""
+    """Returns the attributes of a primitive. Raises `InputError` without positions."""
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise InputError(f"{document.where}: expected a primitive with positions")

@@ -24,7 +24,7 @@ Colors = UInt8[np.ndarray, "vertices 3"]
 
 @dataclass
 class _Parts:
-    """What has been placed so far; `colors` has None for parts without."""
+    """Holds what has been placed so far; `colors` has None for parts without."""
 
     points: list[Floats] = field(default_factory=list)
     faces: list[Faces] = field(default_factory=list)

@@ -63,7 +63,7 @@ class RollingContact:
     last: Float[np.ndarray, "hidden adjusted"]
 
     def flat(self) -> Float[np.ndarray, " numbers"]:
-        """All numbers in one axis."""
+        """Returns all numbers in one axis."""
         return np.concatenate([getattr(self, field.name).ravel() for field in fields(self)])
 
     def like(self, flat: Float[np.ndarray, " numbers"]) -> "RollingContact":
@@ -73,7 +73,7 @@ class RollingContact:
         return RollingContact(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
     def coefficients(self, material: Float[np.ndarray, "motions materials"]) -> dict[str, Floats]:
-        """By name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
+        """Returns by name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
         found = self.terms @ material_terms(material).T
         return dict(zip([*COEFFICIENTS, *PLAIN], found, strict=True))
 
@@ -89,7 +89,7 @@ class RollingContact:
 
 
 def material_terms(material: Float[np.ndarray, "motions materials"]) -> Float[np.ndarray, "motions terms"]:
-    """(M, Q) -> (M, 1 + Q + Q (Q + 1) / 2): one, the values, and their products."""
+    """Maps (M, Q) to (M, 1 + Q + Q (Q + 1) / 2): one, the values, and their products."""
     left, right = np.triu_indices(material.shape[1])
     return np.concatenate([np.ones((len(material), 1)), material, material[:, left] * material[:, right]], axis=1)
 

@@ -114,11 +114,11 @@ class RollingDynamics:
         self.bias = contact.bias + material @ contact.first[INPUTS:]
 
     def slopes(self, states: Float[np.ndarray, "states motions"]) -> Floats:
-        """(8, M) -> (8, M)."""
+        """Maps states (8, M) to their slopes (8, M)."""
         return self.with_contacts(states)[0]
 
     def with_contacts(self, states: Float[np.ndarray, "states motions"]) -> tuple[Floats, Contacts]:
-        """The `slopes` (8, M), and what causes them."""
+        """Returns the `slopes` (8, M), and what causes them."""
         out = np.empty_like(states)
         out[:MOVING] = states[MOVING : 2 * MOVING]
         out[MOVING : 2 * MOVING] = np.array([0.0, -GRAVITY, 0.0])[:, None]

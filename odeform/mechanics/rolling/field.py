@@ -50,7 +50,7 @@ def units_of(radius: float) -> Float[np.ndarray, "8"]:
 
 
 def make_field(contact: RollingContact, support: Support, radius: float, material: Floats) -> Field:
-    """(t, state (8,) in `units_of(radius)`) -> its slope, for the material (Q,) of one body of `radius` m."""
+    """Maps (t, state (8,) in `units_of(radius)`) to its slope, for the material (Q,) of one body of `radius` m."""
     dynamics = RollingDynamics(contact, support, radius, material[None])
     if not compiles():
         return _in_numpy(dynamics)

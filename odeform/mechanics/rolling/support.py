@@ -24,14 +24,14 @@ class Support:
     """m per rad."""
 
     def at(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Heights and slopes (...) at angles (...) in rad, of any size."""
+        """Returns heights and slopes (...) at angles (...) in rad, of any size."""
         index, part = self._place(angles)
         return tuple(  # pyright: ignore
             table[index] + part * (table[index + 1] - table[index]) for table in (self.heights, self.slopes)
         )
 
     def bends(self, angles: Floats) -> Floats:
-        """(...) derivatives of the slopes at angles (...) in rad, m per rad^2."""
+        """Computes (...) derivatives of the slopes at angles (...) in rad, m per rad^2."""
         index, _ = self._place(angles)
         return (self.slopes[index + 1] - self.slopes[index]) * (len(self.slopes) - 1) / (2.0 * np.pi)
 

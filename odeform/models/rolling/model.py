@@ -47,8 +47,8 @@ UNTURNED = np.array([0.0, 1.0, 0.0])
 
 
 def axes_of(axis: Vector) -> Float[np.ndarray, "3 6"]:
-    """What a unit of way ahead (m), of height (m) and of angle (rad), about the level unit vector `axis`, adds to shift
-    (m) and rotation vector. The same of their rates."""
+    """Returns what a unit of way ahead (m), of height (m) and of angle (rad), about the level unit vector `axis`,
+    adds to shift (m) and rotation vector. The same of their rates."""
     out = np.zeros((MOVING, POSE))
     out[0, :3], out[1, :3], out[2, 3:] = np.cross(axis, UP), UP, axis
     return out

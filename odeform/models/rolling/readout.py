@@ -63,7 +63,7 @@ class Readout:
     last_bias: Float[np.ndarray, " patterns"]
 
     def __call__(self, inputs: Float[np.ndarray, "rows inputs"]) -> Float[np.ndarray, "rows patterns"]:
-        """Amplitudes (R, S) in m."""
+        """Predicts amplitudes (R, S) in m."""
         x = ((inputs - self.mean) / self.scale).astype(self.first.dtype)
         x = _silu(x @ self.first + self.first_bias)
         return _silu(x @ self.middle + self.middle_bias) @ self.last + self.last_bias

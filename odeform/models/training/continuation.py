@@ -132,7 +132,7 @@ def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
 
 
 def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained `model` with the dynamics that continue it and their validation errors.
+    """Returns the checkpoint of a trained `model` with the dynamics that continue it and their validation errors.
 
     It is unchanged where these dynamics predict worse than motions that stop.
     """

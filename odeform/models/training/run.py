@@ -64,7 +64,7 @@ class Run:
         return data
 
     def reduced_checkpoint(self, data: TrainingData, arrays: Arrays, settings: Mapping[str, Any]) -> Checkpoint:
-        """The checkpoint of a model of reduced coordinates, with the arrays and settings of its own."""
+        """Returns the checkpoint of a model of reduced coordinates, with the arrays and settings of its own."""
         checkpoint = self.with_body({**arrays, **data.space.arrays()}, data.theta["train"])
         config = {"space": data.space.to_json(), **settings}
         return Checkpoint(

@@ -72,7 +72,7 @@ def simulate(
     report: Callable[[float], None] = lambda _: None,
     until: float | None = None,
 ) -> MotionSequence:
-    """One motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
+    """Simulates one motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
 
     See `simulate_object`.
     """
@@ -169,7 +169,7 @@ def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
 
 
 def rest_mesh(name: str = OBJECTS[0]) -> Mesh:
-    """The settled surface of an object."""
+    """Returns the settled surface of an object."""
     return get_object(name).rest_mesh()
 
 

@@ -61,7 +61,7 @@ class Motions:
 
 
 def roll_out(contact: RollingContact, support: Support, radius: float, motions: Motions) -> Floats:
-    """(T, 8, M) states in the frames of `motions`."""
+    """Computes (T, 8, M) states in the frames of `motions`."""
     dynamics = RollingDynamics(contact, support, radius, motions.material)
     return dynamics.roll_out(motions.start, *_half_frames(motions))[1::2]
 
@@ -83,7 +83,7 @@ def _missed(states: Floats, motions: Motions, radius: float, robust: float) -> t
 
 
 def contact_error_mm(contact: RollingContact, support: Support, radius: float, motions: Motions) -> float:
-    """Pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
+    """Returns the pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
     states = roll_out(contact, support, radius, motions)[:, :MOVING]
     apart = (states.swapaxes(1, 2) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
     return float(1e3 * np.sqrt(np.square(apart)[motions.seen].mean()))

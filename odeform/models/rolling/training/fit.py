@@ -103,7 +103,7 @@ def train_rolling(run: Run) -> Checkpoint:
 def fit_rolling_body(
     data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path | None = None
 ) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and settings of the checkpoint, without the residual.
+    """Fits the arrays and settings of the checkpoint, without the residual.
 
     Contact parameters are kept in `part` after each stage; a resumed training continues after the last one.
 
