@@ -60,20 +60,26 @@ def test_the_field_of_one_motion_is_that_of_many(support: Support) -> None:
 def test_compiled_motions_are_those_of_numpy(
     support: Support, settings: SolverSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Through flight, landings on corners, sliding and rolling."""
+    """Through flight, landings on corners, sliding and rolling.
+
+    Both round differently, and landings on corners amplify that: by no more than what NumPy makes of a start that
+    differs in the twelfth digit.
+    """
     begin, material = state(height=0.05, speed=1.5, rising=0.5, spin=-5.0), np.array([0.3, -0.6])
     times = np.linspace(0.0, 0.5, 200)
 
-    def moved() -> Floats:
+    def moved(factor: float = 1.0) -> Floats:
         field = make_field(any_contact(), support, RADIUS, material)
         assert isinstance(field, CompiledField) == fields.compiles()
-        return integrate(field, UNITS * begin, settings, 0.5).sample(times)
+        return integrate(field, factor * UNITS * begin, settings, 0.5).sample(times)
 
     found = moved()
     monkeypatch.setattr(fields, "compiles", lambda: False)
-    expected = moved()
-    assert np.abs(found - expected).max() < 1e-8 * np.abs(expected).max()
-    assert expected[:, 1].min() < 0.0
+    expected, differing = moved(), moved(1.0 + 1e-12)
+    landing = int((expected[:, 1] < 0.0).argmax())
+    assert 0 < landing < len(times) // 2
+    np.testing.assert_allclose(found[:landing], expected[:landing], rtol=1e-13, atol=1e-14)
+    assert np.abs(found - expected).max() < np.abs(differing - expected).max() < 1e-5
 
 
 def check_derivatives(contact: RollingContact, support: Support, chosen: Ints, accuracy: float = 1e-4) -> Floats:
