@@ -15,7 +15,7 @@ LABELS = {
     "clock": "the clock of the decoders",
     "parameters": "the parameters of the decoders",
     "random-features": "random features",
-    "network": "the network of the contact law",
+    "network": "the network of the contact coefficients",
     "corners": "the corners of the mesh, and the place that it rested on",
 }
 

@@ -135,7 +135,7 @@ def changed_object(item: SoftObject, parameters: Parameters) -> SoftObject:
 
 
 def _check_orientation(item: SoftObject, nodes: Points) -> None:
-    """Raise `SimulationError` if tetrahedra stay inside out at the end: too strong a pulse for this material law."""
+    """Raise `SimulationError` if tetrahedra stay inside out at the end: too strong a pulse for this material."""
     if inverted := int(inside_out(nodes, item.elements).sum()):
         raise SimulationError(f"{inverted} of {len(item.elements)} tetrahedra are inside out at the end")
 
