@@ -42,7 +42,8 @@ def model_class(name: str) -> type[Predictor]:
         return getattr(importlib.import_module(module), attribute)
     found = plugged_in(known)
     if found is None:
-        raise InputError(f"unknown model {name!r}: expected one of {', '.join((*MODELS, *registered()))}")
+        names = ", ".join((*MODELS, *registered()))
+        raise InputError(f"unknown model {name!r}: expected one of {names}; a file of your own is named by --plugin")
     return found
 
 

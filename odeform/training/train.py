@@ -115,7 +115,8 @@ def fit(
     seconds = trained.config.get("val", {}).get("seconds", time.process_time() - begin)
     provenance = {**_provenance(dataset, request, seconds), **trained.provenance}
     checkpoint = scored(replace(trained, provenance=provenance), dataset, parts)
-    report(f"test: pooled RMSE {checkpoint.scores['rmse_pooled_mm']:.3f} mm")
+    beyond = "" if window is None else f", with frames outside of {window[0]}:{window[1]}"
+    report(f"test: pooled RMSE {checkpoint.scores['rmse_pooled_mm']:.3f} mm{beyond}")
     return load_model(checkpoint)
 
 
