@@ -194,6 +194,14 @@ def test_damaged_contact_parameters_are_refused() -> None:
         RollingContact.from_arrays({}, 2)
 
 
+@pytest.mark.parametrize("entry", range(1, 6))
+def test_a_state_that_is_not_finite_has_no_slope(support: Support, entry: int) -> None:
+    lost = state(height=1.0)
+    lost[entry] = np.inf
+    field = make_field(any_contact(), support, RADIUS, np.array([0.5, -0.5]))
+    assert np.isnan(np.asarray(field(0.0, lost))).all()
+
+
 @pytest.mark.parametrize("height", [-1e300, float("-inf"), float("nan")])
 def test_a_state_that_is_lost_ends_the_integration_with_a_status(support: Support, height: float) -> None:
     field = make_field(any_contact(), support, RADIUS, np.array([0.5, -0.5]))
