@@ -30,17 +30,14 @@ def array_names(data: bytes, where: str) -> set[str]:
         raise InputError(f"{where}: damaged: {error}") from None
 
 
-def read_arrays(
-    data: bytes, where: str, names: Sequence[str] = ARRAYS, optional: Sequence[str] = ()
-) -> dict[str, np.ndarray]:
-    """Arrays of an `.npz` archive by name; those that are `optional` may be missing.
+def read_arrays(data: bytes, where: str, names: Sequence[str] = ARRAYS) -> dict[str, np.ndarray]:
+    """Reads arrays of an `.npz` archive by name.
 
     Sizes are checked before an array is read. Nothing is unpickled. `InputError`, which `where` leads, for other files.
     """
     try:
-        found = array_names(data, where)
+        array_names(data, where)  # or says what is damaged
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = [*names, *(name for name in optional if name in found)]
             size = sum(archive.getinfo(f"{name}.npy").file_size for name in names)
         require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
