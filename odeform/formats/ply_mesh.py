@@ -146,7 +146,7 @@ def _colors(
     notes: list[str],
 ) -> NDArray[np.uint8] | None:
     """(F, 3, 3) colors of the corners: of a texture, else of vertices, else of faces."""
-    uv = _coordinates(rows, corners, triangles, polygon)
+    uv = _coordinates(rows, corners, triangles)
     if header.textures and len(header.textures) > 1:
         notes.append(f"{len(header.textures)} textures left out: one is read at most")
     elif header.textures:
@@ -162,7 +162,7 @@ def _colors(
     return None if of_faces is None else np.repeat(of_faces[polygon][:, None], 3, axis=1)
 
 
-def _coordinates(rows: dict[str, Rows], corners: Ints, triangles: Faces, polygon: Ints) -> Floats | None:
+def _coordinates(rows: dict[str, Rows], corners: Ints, triangles: Faces) -> Floats | None:
     """(F, 3, 2) texture coordinates of the corners; None without."""
     lists = rows.get("face", {}).get("texcoord")
     if isinstance(lists, Lists):

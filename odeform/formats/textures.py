@@ -43,7 +43,7 @@ def _wrapped(values: Floats, how: str) -> Floats:
 
 
 def _between(values: Floats, size: int) -> tuple[Int[np.ndarray, " vertices"], Ints, Floats]:
-    """The two nearest pixels of `size`, and the share of the second."""
+    """The two nearest pixels of `size`, and the weight of the second."""
     place = values * (size - 1)
     below = np.clip(np.floor(place).astype(np.int64), 0, size - 1)
     return below, np.minimum(below + 1, size - 1), place - below

@@ -13,7 +13,7 @@ from odeform.types import Floats, Perpoint
 __all__ = ["Floor", "stand"]
 
 GRAVITY = 9.81  # m/s^2
-TOUCHING = 4.0  # inverse of the share of a body's surface that typically stands
+TOUCHING = 4.0  # inverse of the fraction of a body's surface that typically stands
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,9 +84,9 @@ class Residual:
         added_at, taken, stop = self.over_time(inputs), 1.0 - self.weight, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
-            share = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
+            fading = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
             out = y.copy()
-            out[..., POSE:] += share * (added_at(times) - taken * y)[..., POSE:]
+            out[..., POSE:] += fading * (added_at(times) - taken * y)[..., POSE:]
             return out
 
         return adjust

@@ -73,7 +73,7 @@ def _divergence(model: Model, seed: int) -> float:
 
 def check_calibration(model: Model, seed: int = 0) -> Checks:
     """Reported solver errors against those measured with tolerance 1e-11: their rank correlation (Spearman), and the
-    share of solves in which they are within a factor of 2.
+    fraction of solves in which they are within a factor of 2.
 
     Half of the motions are inside the trained box, the others up to ten times beyond it. Settings are the model's
     qualities and random ones; solves without an estimate are left out. `..._inside` counts the trained box alone.

@@ -118,7 +118,7 @@ def _place(parts: _Parts, part: Primitive, colors: Colors | None, copies: Floats
 
 
 def _weights(document: Document, node: Tree, mesh: Tree) -> Floats:
-    """(T,) shares of the morph targets."""
+    """(T,) weights of the morph targets."""
     values = node.get("weights", mesh.get("weights", []))
     try:
         weights = np.array(values, dtype=float).reshape(-1)
