@@ -38,15 +38,17 @@ def test_states_slopes_and_errors_agree_to_rounding(block: Block) -> None:
     assert np.abs(states[:2, :3]).max() > 1e-3, "they have been pushed"
 
 
+@pytest.mark.parametrize("begin", [0.0, 1.0], ids=["pushed", "free"])
 @pytest.mark.parametrize("spin", [[0.0, 0.0, 0.0], [60.0, 0.0, 0.0], [0.0, -60.0, 20.0]])
-def test_they_agree_for_bodies_that_fall_and_spin_fast(block: Block, spin: list[float]) -> None:
+def test_they_agree_for_bodies_that_fall_and_spin_fast(block: Block, spin: list[float], begin: float) -> None:
     """In long steps, whose errors are large, and in which contacts begin."""
     reference, compiled = bodies(block)
     rows, steps, states = np.arange(3), np.full(3, 4e-3), reference.start
     moving = parts_of(states)[-1].start
     states[:, 2], states[:, moving : moving + 6] = [4e-3, 8e-3, 2e-2], [0.1, 0.0, -3.0, *spin]
-    for _ in range(10):
-        known, found = (each.advance(rows, np.ones(3), states, steps) for each in (reference, compiled))
+    for index in range(10):
+        times = begin + index * steps
+        known, found = (each.advance(rows, times, states, steps) for each in (reference, compiled))
         for one, other in zip(known, found, strict=True):
             np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-8 * np.abs(one).max())
         states = known[0]
