@@ -32,6 +32,15 @@ def test_parameters_and_times_outside(kick: Predictor) -> None:
     assert far.endswith("soon after 4 s it stands still")
 
 
+def test_the_error_band_is_that_of_the_trained_body(kick: Predictor) -> None:
+    times, egg = np.array([0.1, 0.5]), replace(kick.rest, points=kick.rest.points * np.float32([1.0, 1.0, 0.7]))
+    motion = kick.solve()
+    band = motion.error_band(times)
+    assert band is not None
+    np.testing.assert_array_equal(band, kick.error_band(motion.parameters, times))
+    assert kick.solve(egg).error_band(times) is None
+
+
 def test_the_reach_of_a_window_counts_from_its_end(kick: Predictor) -> None:
     motion = as_reduced(kick.solve())
     later = replace(motion, schema=replace(motion.schema, window=Window(0.5, 1.0, 120.0, reach=2.0)))
