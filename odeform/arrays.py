@@ -10,7 +10,7 @@ __all__ = ["finite_arrays"]
 
 
 def finite_arrays(arrays: Arrays, prefix: str, shapes: Mapping[str, tuple[int, ...]]) -> Arrays:
-    """The arrays that `shapes` names, without their `prefix`, in double precision.
+    """Returns the arrays that `shapes` names, without their `prefix`, in double precision.
 
     KeyError where one is missing, ValueError where one is not finite or has another shape.
     """

@@ -1,6 +1,6 @@
-"""The errors that commands turn into exit codes."""
+"""The errors that commands turn into exit codes, and words of messages."""
 
-__all__ = ["FailedCheck", "InputError", "one_line"]
+__all__ = ["FailedCheck", "InputError", "counted", "one_line"]
 
 WORD, LINE = 300, 1000  # characters
 
@@ -28,6 +28,11 @@ def one_line(text: object) -> str:
     """A text in one line without control characters; the middle of a very long word, and of the whole, is left out."""
     words = [_shortened("".join(filter(str.isprintable, word)), WORD) for word in str(text).split()]
     return _shortened(" ".join(words), LINE)
+
+
+def counted(count: int, name: str) -> str:
+    """Writes how many there are of something, whose plural ends in s: `1 line`, `2,000 lines`."""
+    return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
 def _shortened(text: str, most: int) -> str:

@@ -89,7 +89,7 @@ def parallel_map(
     workers: int | None = None,
     batch_size: int = 1,
 ) -> list[Result]:
-    """The results of `as_completed` in the order of `items`, with progress under `title`."""
+    """Returns the results of `as_completed` in the order of `items`, with progress under `title`."""
     progress, results = Progress(title, len(items)), {}
     for index, result in as_completed(function, items, workers, batch_size):
         results[index] = result

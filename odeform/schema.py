@@ -4,6 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ class Parameter:
         return 2.0 * (value - low) / (high - low) - 1.0
 
     def denormalise(self, unit: float) -> float:
-        """The inverse of `normalise`."""
+        """Inverts `normalise`."""
         if self.scale == "log":
             return self.low * (self.high / self.low) ** ((unit + 1.0) / 2.0)
         return self.low + (self.high - self.low) * (unit + 1.0) / 2.0
@@ -221,23 +222,23 @@ class Schema:
     objects: tuple[str, ...] = ()
     surroundings: Surroundings | None = None
 
-    @property
+    @cached_property
     def learned(self) -> tuple[Parameter, ...]:
         """The P parameters that a model learns: all except the azimuth of a symmetric scene, and properties of the body
         itself."""
         return tuple(p for p in self.parameters if p.role == "physical")
 
-    @property
-    def names(self) -> list[str]:
+    @cached_property
+    def names(self) -> tuple[str, ...]:
         """Names of all parameters in order, with "object" first in a scene with objects."""
-        return [OBJECT] * bool(self.objects) + [p.name for p in self.parameters]
+        return (*[OBJECT] * bool(self.objects), *(p.name for p in self.parameters))
 
     def azimuth(self, parameters: Parameters) -> float:
-        """The azimuth in radians; 0 for a scene without one."""
+        """Returns the azimuth in radians; 0 for a scene without one."""
         return next((parameters[p.name] for p in self.parameters if p.role == "azimuth"), 0.0)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
-        """All parameters, checked, in the order of the schema, with defaults for those not given.
+        """Returns all parameters, checked, in the order of the schema, with defaults for those not given.
 
         Three parameters NAME_x, NAME_y and NAME_z may be given as one vector NAME: three numbers, or "X,Y,Z". In a
         scene with objects the first entry is "object"; all others are floats.
@@ -250,7 +251,7 @@ class Schema:
         return body | {p.name: p.check(given.get(p.name, p.default)) for p in self.parameters}
 
     def expanded(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
-        """The values as given, with vectors as three numbers each; `InputError` for an unknown name."""
+        """Returns the values as given, with vectors as three numbers each; `InputError` for an unknown name."""
         known = self.names
         given: dict[str, Any] = {}
         for name, value in (parameters or {}).items():
@@ -269,7 +270,8 @@ class Schema:
         return name
 
     def with_ranges(self, ranges: Mapping[str, tuple[float, float]]) -> "Schema":
-        """The same scene with other ranges, low and high in units of the parameters. Defaults are moved into them.
+        """Returns the same scene with other ranges, low and high in units of the parameters. Defaults are moved into
+        them.
 
         Raises:
             InputError: An unknown name, a low that is not below its high, or a scene with objects.
@@ -298,7 +300,7 @@ class Schema:
         return np.array([p.normalise(parameters[p.name]) for p in self.learned])
 
     def inputs(self, parameters: Parameters) -> Floats:
-        """(P,) the normalised parameters as inputs of a model: soft-clipped to magnitudes below 1.15."""
+        """Computes (P,) the normalised parameters as inputs of a model: soft-clipped to magnitudes below 1.15."""
         return soft_clip(self.vector(parameters), 1.0, BEYOND)
 
     def corners(self, reach: float = 1.0) -> list[dict[str, float]]:

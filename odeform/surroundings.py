@@ -22,7 +22,7 @@ class Contacts:
     """Radius of the sphere in metres."""
 
     def forces_on(self, name: str) -> tuple[float, float]:
-        """Weakest and strongest force on an object in newton; those of the first for an unknown one."""
+        """Returns the weakest and strongest force on an object in newton; those of the first for an unknown one."""
         return self.forces.get(name) or next(iter(self.forces.values()))
 
 

@@ -111,7 +111,7 @@ class App:
         return f"http://{f'[{host}]' if ':' in host else host}:{self.server.get_port()}"
 
     def panel(self, kind: type[P]) -> P:
-        """The panel of that class."""
+        """Returns the panel of that class."""
         return next(panel for panel in self.page.panels if isinstance(panel, kind))
 
     def request(self) -> ViewRequest:

@@ -36,6 +36,6 @@ def color_of(column: Column) -> Color:
 
 
 def paler(color: Color) -> Color:
-    """The second color of a checkerboard: a body of one color hides its rotation."""
+    """Returns the second color of a checkerboard: a body of one color hides its rotation."""
     red, green, blue = (round(0.45 * channel + 0.55 * 235) for channel in color)
     return red, green, blue

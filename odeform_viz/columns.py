@@ -146,7 +146,7 @@ class Columns:
 
     @classmethod
     def of(cls, columns: Sequence[Column]) -> "Columns":
-        """Columns of the first one's scene. `InputError` for models of different scenes."""
+        """Makes columns of the first one's scene. `InputError` for models of different scenes."""
         out = cls(columns[0].source.schema)
         out.add(*columns)
         return out

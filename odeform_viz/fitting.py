@@ -43,7 +43,7 @@ def shape_from(name: str | Path, body: Mesh, transform: Similarity | None = None
 
 
 def fit_to_json(fit: FittedShape) -> dict[str, Any]:
-    """The origin, moving part and transform of a shape, as plain values."""
+    """Returns the origin, moving part and transform of a shape, as plain values."""
     region = None if fit.region is None else region_to_json(fit.region)
     file = Path(fit.origin)
     origin = str(file.resolve()) if file.is_file() else fit.origin

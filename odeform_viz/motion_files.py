@@ -34,7 +34,7 @@ BANNER = (
 
 
 def write_rrd(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape | None) -> None:
-    """A Rerun recording of the motion at `times` (T,) s: the body with the floor and forces, and curves.
+    """Writes a Rerun recording of the motion at `times` (T,) s: the body with the floor and forces, and curves.
 
     It has the entities of the viewer's recordings. Its model is in no file of its own, so that it cannot be replayed.
     """
@@ -54,7 +54,7 @@ def write_rrd(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape | 
 
 
 def write_html(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape | None) -> None:
-    """A page that plays the motion at `times` (T,) s in any browser, at its own speed, without a server.
+    """Writes a page that plays the motion at `times` (T,) s in any browser, at its own speed, without a server.
 
     A caption names the scene and the parameters, and says what lies outside of what was trained.
     """

@@ -165,7 +165,7 @@ class Page:
         self.hotkeys[keys] = label
 
     def save(self) -> bytes:
-        """The state of the page as a file."""
+        """Returns the state of the page as a file."""
         return state_to_json(capture(self.schema.scene, self.request(), self.options()))
 
     def restore(self, data: bytes) -> Sequence[str]:

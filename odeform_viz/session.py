@@ -70,7 +70,7 @@ class Session:
         self._seconds: dict[int, float] = {}  # by column: from its last new motion to the first frame of it
 
     def parameters(self, column: Column, request: ViewRequest) -> Mapping[str, float]:
-        """The parameters of a column: pinned, or those of the sliders."""
+        """Returns the parameters of a column: pinned, or those of the sliders."""
         return column.pinned if column.pinned is not None else request.parameters
 
     def motion(self, column: Column, request: ViewRequest) -> Motion | RecordedMotion:
@@ -140,7 +140,7 @@ class Session:
         return window.start + np.arange(round((shown_until(window) - window.start) * window.rate) + 1) / window.rate
 
     def curves(self, shown: ColumnFrame, request: ViewRequest) -> Curves:
-        """The curves of a column's motion; computed once for each motion."""
+        """Returns the curves of a column's motion; computed once for each motion."""
         truth = self.truth_of(shown.column, request)
         with self._lock:
             known = self._curves.get(shown.column.key)

@@ -106,7 +106,7 @@ def state_to_json(state: PageState) -> bytes:
 
 
 def state_from_json(data: bytes, scene: str) -> PageState:
-    """`InputError` for anything but a state of that scene."""
+    """Reads a state; raises `InputError` for anything but one of that scene."""
     try:
         raw = parse_json(data, "state: not a state file of ODeform")
         if not isinstance(raw, dict) or raw.pop("odeform_state", None) != FORMAT:

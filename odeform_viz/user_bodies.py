@@ -31,7 +31,7 @@ def read_user_body(name: str | Path) -> UserBody:
 
 
 def describe_user_body(body: UserBody) -> str:
-    """One line: points, size and material."""
+    """Returns one line: points, size and material."""
     size = 1e3 * float(np.ptp(body.item.settled, axis=0).max())
     points = len(body.fit.geometry.points)
     return (

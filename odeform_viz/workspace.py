@@ -34,7 +34,7 @@ class Workspace:
         return cls(Path(root), frozenset(Path(name).resolve() for name in (*models, *datasets, *shapes) if name))
 
     def inside(self, name: str) -> Path:
-        """A path of the page, relative to the folder. `InputError` if it leads out of it, through links too."""
+        """Returns a path of the page, relative to the folder. `InputError` if it leads out of it, through links too."""
         path = self.root / name
         try:
             found = path.resolve()
@@ -45,7 +45,7 @@ class Workspace:
         return path
 
     def confined(self, state: PageState) -> PageState:
-        """The same state, whose files are bundled or inside. `InputError` for others."""
+        """Returns the same state, whose files are bundled or inside. `InputError` for others."""
         columns = tuple({**column, "origin": self._column(column)} for column in state.columns)
         shape = state.shape and {**state.shape, "origin": self._file(str(state.shape["origin"]), bundled_shapes())}
         return replace(state, columns=columns, shape=shape)

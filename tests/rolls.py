@@ -1,4 +1,4 @@
-"""Data sets of a ball that is thrown and rolls, or falls straight, by a known law of contact, with a dent where it
+"""Data sets of a ball that is thrown and rolls, or falls straight, by known contact parameters, with a dent where it
 touches the floor."""
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from odeform.geometry.primitives import octasphere
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.shape import surface_weights
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.contact import RollingContact, first_law
+from odeform.mechanics.rolling.contact import RollingContact, initial_contact
 from odeform.mechanics.rolling.dynamics import STATE, RollingDynamics
 from odeform.mechanics.rolling.support import support_of
 from odeform.schema import Parameter, Schema, Window
@@ -34,14 +34,14 @@ SCHEMA = Schema(
 )
 
 
-def true_law() -> RollingContact:
-    """Heavier balls sink deeper and bounce less; all bounce less and slide more than by the first law of a fit."""
-    law = first_law(1, seed=0)
-    terms = law.terms.copy()
+def true_contact() -> RollingContact:
+    """Heavier balls sink deeper and bounce less; all bounce less and slide more than by the first contact of a fit."""
+    contact = initial_contact(1, seed=0)
+    terms = contact.terms.copy()
     terms[:3, 1] = -0.8, 0.2, 0.6
     terms[2, 0] += 1.0
     terms[4, 0] -= 0.7
-    return replace(law, terms=terms, last=np.zeros_like(law.last))
+    return replace(contact, terms=terms, last=np.zeros_like(contact.last))
 
 
 def launched(given: dict[str, float]) -> Floats:
@@ -54,11 +54,11 @@ def launched(given: dict[str, float]) -> Floats:
 
 
 def motion(given: dict[str, float]) -> MotionSequence:
-    """All frames: three with a constant acceleration, then under the law."""
+    """All frames: three with a constant acceleration, then under the contact."""
     times = np.arange(round(SCHEMA.window.stop * RATE) + 1) / RATE
     start, material = launched(given), np.array([[SCHEMA.parameters[0].normalise(given["mass"])]])
-    law = true_law()
-    dynamics = RollingDynamics(law, support_of(BALL.points, AXIS), RADIUS, material)
+    contact = true_contact()
+    dynamics = RollingDynamics(contact, support_of(BALL.points, AXIS), RADIUS, material)
     count = 2 * (len(times) - 4)
     states = dynamics.roll_out(start[:, None], SUBSTEPS, count, 0.5 / RATE / SUBSTEPS)[1::2, :, 0]
     free = start[:3] - 0.5 / RATE * start[3:6] - [0.0, 0.5 * GRAVITY * (0.5 / RATE) ** 2, 0.0]
@@ -73,7 +73,7 @@ def recorded(times: Floats, moved: Floats, given: dict[str, float]) -> MotionSeq
     turned = BALL.points @ turn.swapaxes(1, 2)
     near = np.exp(4.0 * (-turned[..., 2] / RADIUS - 1.0))
     weights = surface_weights(BALL)
-    turned[..., 2] += 2.0 * depth[:, None] * (near - (near @ weights)[:, None])  # the law is that of the mass centre
+    turned[..., 2] += 2.0 * depth[:, None] * (near - (near @ weights)[:, None])  # the mass centre follows the ODE
     vertices = turned + moved[:, None, :2] @ np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) + [0.0, 0.0, RADIUS]
     return MotionSequence(times, vertices.astype(np.float32), BALL.faces, weights, dict(given))
 
@@ -87,12 +87,12 @@ HEIGHT = 0.1  # m
 
 
 def fall(given: dict[str, float]) -> MotionSequence:
-    """All frames of a ball that falls from rest under the law of `motion`, but bounces more."""
+    """All frames of a ball that falls from rest under the contact of `motion`, but bounces more."""
     times = np.arange(round(FALL.window.stop * RATE) + 1) / RATE
-    law, material = true_law(), np.array([[FALL.parameters[0].normalise(given["mass"])]])
-    terms = law.terms.copy()
+    contact, material = true_contact(), np.array([[FALL.parameters[0].normalise(given["mass"])]])
+    terms = contact.terms.copy()
     terms[2, 0] -= 1.5
-    dynamics = RollingDynamics(replace(law, terms=terms), support_of(BALL.points, AXIS), RADIUS, material)
+    dynamics = RollingDynamics(replace(contact, terms=terms), support_of(BALL.points, AXIS), RADIUS, material)
     start = np.zeros((STATE, 1))
     start[1] = HEIGHT
     moved = dynamics.roll_out(start, 4 * SUBSTEPS, len(times) - 1, 0.25 / RATE / SUBSTEPS)[:, :3, 0]

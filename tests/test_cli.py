@@ -48,7 +48,7 @@ def test_predict_npz(
     settings = ("--set", "mass=0.6", "azimuth=1.0", "--set", "force=100")
     assert run("predict", trained["odeform"], "--out", out, *settings, "--times", "0:1.5:0.1") == 0
     count = len(predictors["odeform"].rest.points)
-    assert f"15 frames of {count} points" in capsys.readouterr().out
+    assert f"15 frames of {count:,} points" in capsys.readouterr().out
     motion = predictors["odeform"].solve(None, {"mass": 0.6, "azimuth": 1.0, "force": 100.0})
     with np.load(out, allow_pickle=False) as arrays:
         assert set(arrays) == {"times", "vertices", "faces", "parameters", "notes"}

@@ -153,7 +153,7 @@ def test_an_object_is_chosen_by_name() -> None:
     assert Schema.from_json(json.loads(json.dumps(schema.to_json()))) == schema
     assert schema.complete({})["object"] == "cat"
     complete = schema.complete({"mass": "0.6", "object": "dog"})
-    assert list(complete) == schema.names == ["object", *SCHEMA.names]
+    assert tuple(complete) == schema.names == ("object", *SCHEMA.names)
     assert complete["object"] == "dog"
     assert np.array_equal(schema.vector(complete), SCHEMA.vector(SCHEMA.complete({"mass": 0.6})))
     assert schema.outside(complete) == ()

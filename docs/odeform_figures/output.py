@@ -10,7 +10,7 @@ __all__ = ["write_or_print"]
 
 
 def write_or_print(result: Any, path: str | Path | None) -> None:
-    """A result of a study as JSON: in the file `path`, or on the terminal without one."""
+    """Writes a result of a study as JSON: in the file `path`, or on the terminal without one."""
     text = json.dumps(result, indent=1)
     if path:
         atomic_write(Path(path), text.encode())

@@ -87,7 +87,7 @@ class View:
             raise TimeoutError(f"the page did not get there within {DEADLINE:g} s")
 
     def largest_error_time(self) -> float:
-        """The time, in s, of the largest error of the first column against the truth."""
+        """Finds the time, in s, of the largest error of the first column against the truth."""
         frame = self.app.presenter.frame
         assert frame is not None
         curves = self.app.session.curves(frame.columns[0], frame.request)

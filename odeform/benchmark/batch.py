@@ -17,8 +17,8 @@ TIMES = 4  # of each motion, at which its vertices are asked for
 
 
 def batch_speed(predictor: Predictor) -> dict[str, Any]:
-    """Milliseconds a motion of `solve_batch` for `MOTIONS` of the default body, and of a loop of `solve` over the first
-    `LOOP` of them: with their vertices at `TIMES` times each."""
+    """Measures the milliseconds a motion of `solve_batch` for `MOTIONS` of the default body, and of a loop of
+    `solve` over the first `LOOP` of them: with their vertices at `TIMES` times each."""
     sets = random_parameters(predictor, MOTIONS)
     arrays = {name: np.array([given[name] for given in sets]) for name in sets[0] if name != OBJECT}
     shared = {OBJECT: sets[0][OBJECT]} if OBJECT in sets[0] else {}

@@ -36,7 +36,8 @@ SEQUENCES = 20  # of the test split, for the errors of other checkpoints
 def comparisons(
     predictor: Predictor, dataset: Dataset | None, operating_points: list[OperatingPoint]
 ) -> dict[str, Any]:
-    """Rows by name: points, frames, ms, speedup of `predictor` over this method, error in mm (None: not measured).
+    """Measures rows by name: points, frames, ms, speedup of `predictor` over this method, error in mm (None: not
+    measured).
 
     A row with `skipped` gives the reason for no measurement.
     """

@@ -22,7 +22,7 @@ SEQUENCES = 12  # of the test split of each object
 
 
 def bench_objects(predictor: PerObject, dataset: Dataset | None) -> dict[str, Any]:
-    """Rows of each object: time and error of each quality, time of a frame, and of the simulator.
+    """Measures the rows of each object: time and error of each quality, time of a frame, and of the simulator.
 
     A new motion is the trajectory after a change of the push, with its deformations around the contact, and all frames
     of the window at all vertices. Solver errors compare it with an integration in much smaller steps, model errors with

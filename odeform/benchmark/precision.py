@@ -104,7 +104,7 @@ def measure(model: Model, point: OperatingPoint, quality: SolverSettings, repeat
 
 
 def work_precision(model: Model, points: list[OperatingPoint]) -> list[dict[str, Any]]:
-    """Every setting of the ladder, in both precisions, at every operating point."""
+    """Measures every setting of the ladder, in both precisions, at every operating point."""
     settings = ladder(1.0 / model.schema.window.rate)
     return [
         measure(model, point, replace(quality, dtype=dtype))

@@ -32,7 +32,7 @@ def round_mesh(points: int, predictor: Predictor) -> Mesh:
 
 
 def round_cloud(points: int, predictor: Predictor) -> PointCloud:
-    """The points of `round_mesh` alone."""
+    """Returns the points of `round_mesh` alone."""
     return PointCloud(_round(points, predictor)[0])
 
 
@@ -44,21 +44,21 @@ def round_splats(points: int, predictor: Predictor) -> GaussianSplats:
     return GaussianSplats(where, covariances, np.zeros((points, 1, 3)), np.ones(points))
 
 
-def random_parameters(predictor: Predictor, count: int, seed: int = 0) -> list[Parameters]:
+def random_parameters(predictor: Predictor, count: int) -> list[Parameters]:
     """Random parameter sets of the trained box, with one azimuth: the basis depends on it and is timed separately.
 
     In a scene with objects they are drawn as its data are, all of the default object.
     """
     schema = predictor.schema
     if schema.objects and (scene := find_scene(schema.scene)):
-        return list(scene.sample(count, seed, schema.objects[:1]))
-    rng = np.random.default_rng(seed)
+        return list(scene.sample(count, 0, schema.objects[:1]))
+    rng = np.random.default_rng(0)
     fixed = {p.name: p.default for p in schema.parameters if p.role == "azimuth"}
     return [{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in schema.learned} | fixed for _ in range(count)]
 
 
 def nearest_sequences(dataset: Dataset, parameters: Any, count: int) -> Dataset:
-    """The `count` test sequences nearest to these parameters, in units of the trained ranges."""
+    """Returns the `count` test sequences nearest to these parameters, in units of the trained ranges."""
     schema = dataset.schema
     target = schema.vector(parameters)
     same_body = dataset.select("test", parameters.get(OBJECT))

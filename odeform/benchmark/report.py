@@ -9,7 +9,7 @@ SIMULATED = ("simulator_s", "speedup", "skipped")
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """Tables of all measurements."""
+    """Writes tables of all measurements."""
     machine = result["machine"]
     lines = [
         f"{result['model']} of {result['scene']} on {machine['cores']} cores of {machine['processor']}; load average "

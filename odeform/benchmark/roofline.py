@@ -23,7 +23,7 @@ FRAMES = 20
 
 
 def gemm_gflops() -> float:
-    """Best of five products of square matrices in single precision, in GFLOP/s."""
+    """Returns the best of five products of square matrices in single precision, in GFLOP/s."""
     rng = np.random.default_rng(0)
     a, b = rng.normal(size=(2, SIDE, SIDE)).astype(np.float32)
     out = np.empty_like(a)
@@ -55,7 +55,8 @@ def least_ms(points: int, modes: int, frames: int, gflops: float, gb_s: float) -
 
 
 def roofline(predictor: ReducedModel) -> dict[str, Any]:
-    """Rates of this machine, and the fraction of them that decoding reaches, for one frame or `FRAMES` at once.
+    """Measures the rates of this machine, and the fraction of them that decoding reaches, for one frame or `FRAMES` at
+    once.
 
     Decoding is timed from reduced coordinates to points: a motion caches the coordinates of the last times.
     """
@@ -78,7 +79,8 @@ def roofline(predictor: ReducedModel) -> dict[str, Any]:
 
 
 def scaling(predictor: ReducedModel, sizes: Sequence[int]) -> list[dict[str, Any]]:
-    """Times in ms over the number of points: solving, evaluating the basis, decoding one frame from its coordinates."""
+    """Measures times in ms over the number of points: solving, evaluating the basis, decoding one frame from its
+    coordinates."""
     window = predictor.schema.window
     moment = 0.5 * (window.start + window.stop)
     rows = []

@@ -24,12 +24,12 @@ def milliseconds(work: Callable[[int], object], repeats: int, warm: int = 3) -> 
 
 
 def quantiles(samples: Floats) -> dict[str, float]:
-    """Median `p50` and 95th percentile `p95` of samples (R,), in their unit."""
+    """Returns the median `p50` and 95th percentile `p95` of samples (R,), in their unit."""
     return {"p50": float(np.percentile(samples, 50)), "p95": float(np.percentile(samples, 95))}
 
 
 def typical(work: Callable[[int], object], repeats: int, warm: int = 3) -> float:
-    """The median of `milliseconds`."""
+    """Returns the median of `milliseconds`."""
     return float(np.median(milliseconds(work, repeats, warm)))
 
 

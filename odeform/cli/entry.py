@@ -58,7 +58,7 @@ COMMANDS: dict[str, Command] = {
 
 
 def commands() -> dict[str, Command]:
-    """`COMMANDS`, and those that installed packages declare (`odeform.cli.declared`)."""
+    """Returns `COMMANDS`, and those that installed packages declare (`odeform.cli.declared`)."""
     from odeform.cli.declared import declared_commands  # reading entry points takes time
 
     return COMMANDS | declared_commands()

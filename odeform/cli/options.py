@@ -47,12 +47,12 @@ def add_checkpoint(parser: argparse.ArgumentParser, default: str | None = None) 
 
 
 def add_data(parser: argparse.ArgumentParser, required: bool = True, text: str = DATA) -> None:
-    """--data DATASET."""
+    """Adds --data DATASET."""
     parser.add_argument("--data", required=required, metavar="DATASET", help=text)
 
 
 def add_split(parser: argparse.ArgumentParser) -> None:
-    """--split."""
+    """Adds --split."""
     splits = ("train", "val", "test", "all")
     parser.add_argument("--split", default="test", choices=splits, help="sequences to use (default: test)")
 
@@ -64,29 +64,29 @@ def add_window(parser: argparse.ArgumentParser, purpose: str) -> None:
 
 
 def add_quality(parser: argparse.ArgumentParser) -> None:
-    """--quality NAME."""
+    """Adds --quality NAME."""
     text = "solver settings: draft, balanced (default) or reference"
     parser.add_argument("--quality", default="balanced", metavar="NAME", help=text)
 
 
 def add_seed(parser: argparse.ArgumentParser, purpose: str) -> None:
-    """--seed S."""
+    """Adds --seed S."""
     parser.add_argument("--seed", type=int, default=0, metavar="S", help=f"random seed of {purpose} (default: 0)")
 
 
 def add_cluster(parser: argparse.ArgumentParser, needs: str = "") -> None:
-    """--cluster ADDRESS, of `odeform.cluster.on_cluster`."""
+    """Adds --cluster ADDRESS, of `odeform.cluster.on_cluster`."""
     text = f"work on the workers of this Dask scheduler, tcp://HOST:PORT, instead of this machine{needs}"
     parser.add_argument("--cluster", metavar="ADDRESS", help=text)
 
 
 def add_json(parser: argparse.ArgumentParser, text: str = "also write the result to this file, as JSON") -> None:
-    """--json FILE."""
+    """Adds --json FILE."""
     parser.add_argument("--json", metavar="FILE", help=text)
 
 
 def add_plugin(parser: argparse._ActionsContainer) -> None:
-    """--plugin FILE, for `load_plugins`."""
+    """Adds --plugin FILE, for `load_plugins`."""
     text = "run this Python file first, which registers models of your own (may be repeated)"
     parser.add_argument("--plugin", action="append", default=[], metavar="FILE.py", help=text)
 
@@ -112,7 +112,7 @@ def parse_settings(pairs: Sequence[str], option: str = "--set") -> dict[str, str
 
 
 def parse_window(text: str | None) -> tuple[int, int] | None:
-    """A:B as two frame numbers."""
+    """Parses A:B as two frame numbers."""
     if text is None:
         return None
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from odeform.cli.options import add_checkpoint, add_quality, parse_settings
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.io import require_writable
 
 if TYPE_CHECKING:
@@ -86,7 +86,8 @@ def run(args: argparse.Namespace) -> None:
         _note(caveat)
     stop = motion.first_stop(float(times.max()))
     status = motion.stats.status if stop is None else str(stop)
-    print(f"{len(times)} frames of {len(motion.geometry.points)} points to {args.out}; status {status}")
+    written = f"{counted(len(times), 'frame')} of {counted(len(motion.geometry.points), 'point')}"
+    print(f"{written} to {args.out}; status {status}")
 
 
 def _read_truth(

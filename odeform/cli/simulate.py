@@ -4,7 +4,7 @@ import argparse
 import os
 
 from odeform.cli.options import add_cluster, add_seed, parse_settings
-from odeform.errors import FailedCheck, InputError
+from odeform.errors import FailedCheck, InputError, counted
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> None:
     with on_cluster(args.cluster):
         dataset = simulate(args.scene, args.out, **asked, objects=args.object, ranges=ranges)
     failed = [entry for entry in dataset.entries if entry.status != "ok"]
-    print(f"{len(dataset.entries) - len(failed)} sequences in {args.out}; failed: {len(failed) or 'none'}")
+    print(f"{counted(len(dataset.entries) - len(failed), 'sequence')} in {args.out}; failed: {len(failed) or 'none'}")
     for entry in failed:
         print(f"{entry.name} failed: {entry.status}")
     if unexpected := sum(entry.status.startswith(UNEXPECTED) for entry in failed):

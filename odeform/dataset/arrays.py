@@ -20,7 +20,7 @@ COPIES = 4  # of its arrays that the use of a sequence takes
 
 
 def array_names(data: bytes, where: str) -> set[str]:
-    """The names of the arrays in an `.npz` archive. `InputError`, which `where` leads, for other files."""
+    """Returns the names of the arrays in an `.npz` archive. `InputError`, which `where` leads, for other files."""
     if data[:2] != b"PK":
         raise InputError(f"{where}: damaged: expected an .npz archive, got {len(data):,} other bytes")
     try:
@@ -30,17 +30,14 @@ def array_names(data: bytes, where: str) -> set[str]:
         raise InputError(f"{where}: damaged: {error}") from None
 
 
-def read_arrays(
-    data: bytes, where: str, names: Sequence[str] = ARRAYS, optional: Sequence[str] = ()
-) -> dict[str, np.ndarray]:
-    """Arrays of an `.npz` archive by name; those that are `optional` may be missing.
+def read_arrays(data: bytes, where: str, names: Sequence[str] = ARRAYS) -> dict[str, np.ndarray]:
+    """Reads arrays of an `.npz` archive by name.
 
     Sizes are checked before an array is read. Nothing is unpickled. `InputError`, which `where` leads, for other files.
     """
     try:
-        found = array_names(data, where)
+        array_names(data, where)  # or says what is damaged
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = [*names, *(name for name in optional if name in found)]
             size = sum(archive.getinfo(f"{name}.npy").file_size for name in names)
         require_memory(where, f"{size:,} bytes of arrays", COPIES * size)
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
@@ -59,7 +56,8 @@ def read_arrays(
 
 
 def checked_sequence(sequence: MotionSequence, where: str) -> MotionSequence:
-    """The same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not finite."""
+    """Returns the same sequence. `InputError`, which `where` leads, if its arrays do not fit together or are not
+    finite."""
     check_arrays({name: np.asarray(getattr(sequence, name)) for name in ARRAYS}, where)
     return sequence
 

@@ -63,7 +63,7 @@ class BodyCodec:
         return self.modes @ np.linalg.inv(self.modes.T @ self.modes)
 
     def encode(self, sequence: MotionSequence, rate: float) -> bytes:
-        """Bytes of a sequence of this mesh, evenly spaced at `rate` Hz from time 0."""
+        """Encodes a sequence of this mesh, evenly spaced at `rate` Hz from time 0."""
         pose, local = _moving(sequence, self.points)
         values = np.rint(np.concatenate([pose, local @ self._dual], axis=1) / self._steps)
         series = squeezed(values.astype(np.int64), rate)
@@ -80,7 +80,7 @@ class BodyCodec:
         return LENGTH.pack(len(series)) + series + body
 
     def decode(self, data: bytes) -> tuple[Floats, Floats]:
-        """Times (T,) s and vertices (T, N, 3) m. Raises `LZMAError`, `struct.error` or `ValueError`."""
+        """Decodes times (T,) s and vertices (T, N, 3) m. Raises `LZMAError`, `struct.error` or `ValueError`."""
         (length,) = LENGTH.unpack_from(data)
         return self.decode_series(data[LENGTH.size : LENGTH.size + length], data[LENGTH.size + length :])
 
@@ -114,7 +114,7 @@ class BodyCodec:
 
     @classmethod
     def from_bytes(cls, data: bytes, settings: dict[str, Any]) -> "BodyCodec":
-        """The inverse of `to_bytes`. Raises `LZMAError`, `SafetensorError`, `KeyError` or `ValueError`."""
+        """Inverts `to_bytes`. Raises `LZMAError`, `SafetensorError`, `KeyError` or `ValueError`."""
         arrays = load(decompressed(data))
         steps, count = arrays["mode_steps"], arrays["points"].size
         modes = from_planes(arrays["modes"], (len(steps), count)).T * steps

@@ -77,7 +77,7 @@ class Dataset:
         return tuple(name for name in self.schema.objects if name in present)
 
     def select(self, split: str, object: str | None = None) -> list[Entry]:
-        """Entries of the split "train", "val", "test" or "all" whose simulation succeeded.
+        """Selects entries of the split "train", "val", "test" or "all" whose simulation succeeded.
 
         `object` restricts them to one object of a scene with several.
 
@@ -107,7 +107,7 @@ class Dataset:
 
 
 def assign_splits(count: int, seed: int) -> list[str]:
-    """70 % train, 10 % val, 20 % test, in random order."""
+    """Assigns 70 % to train, 10 % to val, 20 % to test, in random order."""
     return _shuffled(count, np.random.default_rng(seed))
 
 
@@ -130,7 +130,7 @@ def _shuffled(count: int, rng: np.random.Generator) -> list[str]:
 
 
 def index_to_json(dataset: Dataset, **more: Any) -> bytes:
-    """The index as JSON, with `more` keys."""
+    """Returns the index as JSON, with `more` keys."""
     index = {
         "format": FORMAT,
         "schema": dataset.schema.to_json(),

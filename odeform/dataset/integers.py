@@ -28,7 +28,7 @@ def decompressed(data: bytes) -> bytes:
 
 
 def planes_of(values: Integers) -> bytes:
-    """Integers (A, B) of 32 bits -> the four planes of their bytes. `InputError` for larger ones."""
+    """Maps integers (A, B) of 32 bits to the four planes of their bytes. `InputError` for larger ones."""
     limits = np.iinfo(np.int32)
     if values.size and (values.min() < limits.min or values.max() > limits.max):
         raise InputError("pack: the tolerance is too small for motions this large")
@@ -37,7 +37,7 @@ def planes_of(values: Integers) -> bytes:
 
 
 def from_planes(planes: NDArray[np.uint8], shape: tuple[int, int]) -> Integers:
-    """The inverse of `planes_of`, for values (A, B) of that shape. Raises `ValueError` for another length."""
+    """Inverts `planes_of`, for values (A, B) of that shape. Raises `ValueError` for another length."""
     values = np.ascontiguousarray(np.moveaxis(planes.reshape(4, *shape), 0, -1)).view("<i4")
     return values[..., 0].astype(np.int64)
 
@@ -55,7 +55,7 @@ def squeezed(values: Integers, rate: float) -> bytes:
 
 
 def expanded(data: bytes) -> tuple[Integers, float]:
-    """The inverse of `squeezed`. Raises `LZMAError`, `struct.error` or `ValueError` for damaged bytes."""
+    """Inverts `squeezed`. Raises `LZMAError`, `struct.error` or `ValueError` for damaged bytes."""
     body = decompressed(data)
     frames, series, rate = HEADER.unpack_from(body)
     require_memory("sequence", f"{frames:,} frames of {series:,} series", INTEGER_BYTES * frames * series)

@@ -39,7 +39,7 @@ class MotionArrays:
 
 
 def read_motion_arrays(data: bytes, where: str) -> MotionArrays:
-    """The motion in the bytes of an `.npz` file; `where` leads the message of an `InputError`."""
+    """Reads the motion in the bytes of an `.npz` file; `where` leads the message of an `InputError`."""
     names = array_names(data, where)
     chosen = {wanted[0]: _chosen(wanted, names, where) for wanted in (TIMES, VERTICES, FACES)}
     if not chosen["vertices"]:

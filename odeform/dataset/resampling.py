@@ -30,7 +30,7 @@ def even_times(times: Floats, where: str) -> Floats:
 
 
 def resampled(times: Floats, frames: Floats, wanted: Floats, where: str) -> Floats:
-    """The frames (T, N, 3) of `times` (T,), both from their first, at the times `wanted` (K,), as (K, N, 3)."""
+    """Returns the frames (T, N, 3) of `times` (T,), both from their first, at the times `wanted` (K,), as (K, N, 3)."""
     size = 8.0 * frames[0].size * (8 * len(times) + 2 * len(wanted))
     require_memory(where, f"{len(wanted)} frames between {len(times)}", size)
     return CubicSpline(times - times[0], frames)(wanted)

@@ -37,13 +37,13 @@ class FrameSubsampling:
         return count if self.stagger else count - (count - 1) % self.every
 
     def kept(self, count: int, sequence: int) -> Ints:
-        """(F,) increasing indices of the observed frames, out of `count`, of the sequence with that index."""
+        """Computes (F,) increasing indices of the observed frames, out of `count`, of the sequence with that index."""
         if not self.stagger:
             return np.arange(0, count, self.every)
         return np.unique([0, *range(sequence % self.every, count, self.every), count - 1])
 
     def interpolated(self, values: Floats, count: int, sequence: int) -> Floats:
-        """Values at the observed frames of a sequence (K, ...) -> (count, ...), by cubic splines."""
+        """Maps values at the observed frames of a sequence (K, ...) to (count, ...), by cubic splines."""
         if self.every == 1:
             return values
         frames = np.arange(count)

@@ -188,7 +188,8 @@ def _trained_schema(schema: Schema, times: Times, subsampling: FrameSubsampling)
 
 
 def inputs_identity(dataset: Dataset, subsampling: FrameSubsampling, count: int, modes: int) -> str:
-    """SHA-256 of all inputs of a training: the sequences, the frames, and the number of modes, or of given frames."""
+    """Returns the SHA-256 of all inputs of a training: the sequences, the frames, and the number of modes, or of given
+    frames."""
     used = [[entry.name, entry.sha256] for split in SPLITS for entry in dataset.select(split)]
     inputs = [used, count, subsampling.every, subsampling.stagger, modes]
     return hashlib.sha256(json.dumps(inputs).encode()).hexdigest()

@@ -16,8 +16,9 @@ SEQUENCES, FEW = 64, 8  # training sequences whose depth is looked up; few for m
 
 
 def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "val") -> Arrays:
-    """Arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and `val.rmse_mm` (S, T),
-    the RMSE over all coordinates of each frame of each sequence; of several objects each, as OBJECT/val.theta."""
+    """Returns the arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and
+    `val.rmse_mm` (S, T), the RMSE over all coordinates of each frame of each sequence; of several objects each, as
+    OBJECT/val.theta."""
     if len(dataset.objects) < 2:
         return _residuals(predictor, dataset, split)
     each = {name: _residuals(predictor, dataset.of(name), split) for name in dataset.objects}

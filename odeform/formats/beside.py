@@ -12,7 +12,7 @@ __all__ = ["file_beside", "pixels_of", "read_image"]
 
 
 def file_beside(path: Path, name: str) -> Path | None:
-    """The file that `path` names: in its folder or below, else one of that name in its folder; None without.
+    """Finds the file that `path` names: in its folder or below, else one of that name in its folder; None without.
 
     Names of other machines, such as C:\\textures\\ball.png, are looked for by their last part.
     """

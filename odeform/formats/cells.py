@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.polygons import triangulated
 from odeform.types import Floats, Geometry, Ints, Mesh, PointCloud
 
@@ -42,7 +42,7 @@ class Cells:
 
 
 def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) -> Geometry:
-    """The surface of all solid cells, else all flat ones, else the points (N, 3).
+    """Returns the surface of all solid cells, else all flat ones, else the points (N, 3).
 
     Raises:
         InputError: For cells that refer to no vertex, and faces of which none has three corners.
@@ -58,11 +58,11 @@ def surface(points: Floats, cells: list[Cells], where: str, notes: list[str]) ->
     shown = {*SOLID, *FLAT, "polygon", "strip", "vertex"}
     other = sum(len(group.counts) for group in cells if group.kind not in shown)
     if other:
-        notes.append(f"{other:,} cells that are neither solid nor faces left out")
+        notes.append(f"{counted(other, 'cell')}, neither solid nor a face, left out")
     if any(group.middle for group in (*solid, *flat)):
         notes.append("nodes between the corners of cells left out")
     if solid and flat:
-        notes.append(f"{sum(len(group.counts) for group in flat):,} faces beside the solid cells left out")
+        notes.append(f"{counted(sum(len(group.counts) for group in flat), 'face')} beside the solid cells left out")
     if solid:
         corners, counts = _boundary(points, solid)
     elif flat:

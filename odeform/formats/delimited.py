@@ -75,7 +75,7 @@ def read_table(path: Path, where: str, key: str) -> Table:
 
 
 def parse_number(cell: str, where: str) -> float:
-    """The number in a cell, as plain text with a decimal point. Raises `InputError`, which `where` leads."""
+    """Parses the number in a cell, as plain text with a decimal point. Raises `InputError`, which `where` leads."""
     if not NUMBER.fullmatch(cell):
         comma = ": with commas between cells, decimals need a point" if COMMA_NUMBER.fullmatch(cell) else ""
         raise InputError(f"{where}: expected a number, got {cell!r}{comma}")

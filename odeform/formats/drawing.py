@@ -25,7 +25,7 @@ Ints = Int[np.ndarray, " samples"]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What a picture shows: `height` metres around `target` (3,) m, in `size` (width, height) pixels.
+    """Says what a picture shows: `height` metres around `target` (3,) m, in `size` (width, height) pixels.
 
     `tile` is the side of the floor's squares at z = 0 in m; 0 for a plain floor.
     """
@@ -48,14 +48,14 @@ class View:
         )
 
     def project(self, points: Floats) -> Floats:
-        """(N, 3): column and row of points (N, 3) m among the samples, and their nearness to the eye in m."""
+        """Projects points (N, 3) m: their column and row among the samples, and their nearness to the eye in m."""
         width, height = np.array(self.size) * SAMPLES
         seen = (points - self.target) @ self.axes.T
         scale = height / self.height
         return np.column_stack([0.5 * width + scale * seen[:, 0], 0.5 * height - scale * seen[:, 1], seen[:, 2]])
 
     def floor(self) -> Floats:
-        """(H, W, 3) samples of the floor alone."""
+        """Computes (H, W, 3) samples of the floor alone."""
         width, height = np.array(self.size) * SAMPLES
         image = np.full((height, width, 3), PAPER)
         if not self.tile:

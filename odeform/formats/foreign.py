@@ -26,7 +26,7 @@ PAGES = (b"<!doctype html", b"<html", b"<head", b"<body")
 
 
 def unread(suffix: str) -> str:
-    """What to do with a format that is known and not read; empty for others."""
+    """Says what to do with a format that is known and not read; empty for others."""
     if suffix in PACKED:
         return f"{suffix} is not read: unpack it first"
     if suffix in MOTIONS:

@@ -63,7 +63,7 @@ class _Numbers:
 
 
 def read_msh(path: Path, merge: bool) -> Geometry:
-    """The surface of the solid elements, else the flat ones, else the nodes.
+    """Reads the surface of the solid elements, else the flat ones, else the nodes.
 
     Raises:
         InputError: For other versions, and for files that are cut short.

@@ -38,8 +38,8 @@ class Keyframes:
 
 
 def keyframes(motion: Motion, times: Times, back: Similarity, tolerance: float) -> Keyframes:
-    """Those of `motion` at (T,) seconds; `back` goes from the scene to the file. No point is off by more than
-    `tolerance` in metres of the scene."""
+    """Makes the keyframes of `motion` at (T,) seconds; `back` goes from the scene to the file. No point is off by
+    more than `tolerance` in metres of the scene."""
     poses, rest = motion.pose(times), np.asarray(motion.geometry.points, dtype=float)
     turns, centre = poses[:, :3, :3], rest.mean(axis=0)
     local = (np.asarray(motion.vertices(times), dtype=float) - poses[:, None, :3, 3]) @ turns

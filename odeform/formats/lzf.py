@@ -11,7 +11,7 @@ LITERALS = 32  # control bytes below copy as many bytes, plus one, from the inpu
 
 
 def decompressed(data: bytes, size: int, where: str) -> bytes:
-    """The `size` bytes that `data` packs. Raises `InputError`, which `where` leads, for any other number."""
+    """Returns the `size` bytes that `data` packs. Raises `InputError`, which `where` leads, for any other number."""
     out = bytearray()
     position, end = 0, len(data)
     while position < end and len(out) <= size:

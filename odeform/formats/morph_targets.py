@@ -34,5 +34,5 @@ def morph_targets(displacements: Frames, tolerance: float) -> tuple[Targets, Wei
 
 
 def _largest(residual: Floats) -> float:
-    """Of (T, 3 N) coordinates: the largest distance of a point."""
+    """Returns the largest distance of a point, of coordinates (T, 3 N)."""
     return float(np.sqrt((residual.reshape(-1, 3) ** 2).sum(axis=1).max(initial=0.0)))

@@ -34,7 +34,7 @@ ERRORS = ("error_rmse_mm", "error_mae_mm", "error_worst_mm")
 def write_csv(
     file: IO[bytes], motion: Motion, times: Times, fit: FittedShape | None, truth: RecordedMotion | None = None
 ) -> None:
-    """One row for each of `times` (T,) s, below a row with the names in `COLUMNS`.
+    """Writes one row for each of `times` (T,) s, below a row with the names in `COLUMNS`.
 
     The centre is the mean of the points, moved with the body. The rotation is the angle from the shape at rest, and
     grows past whole turns. Errors are RMSE (`Motion.error_band`), empty where they are not known. `status` is "ok", or

@@ -20,8 +20,8 @@ LEVEL = 1  # of compression: floats hardly shrink at any level
 
 
 def write_npz(file: IO[bytes], motion: Motion, times: Floats, fit: FittedShape | None) -> None:
-    """`times` (T,) s, `parameters` as JSON, and `vertices` (T, N, 3) m float32 with `faces` (F, 3), or for splats
-    `centers` (T, N, 3) and `covariances` (T, N, 3, 3).
+    """Writes `times` (T,) s, `parameters` as JSON, and `vertices` (T, N, 3) m float32 with `faces` (F, 3), or for
+    splats `centers` (T, N, 3) and `covariances` (T, N, 3, 3).
 
     `notes`, as JSON, is a list of sentences: what has to be known of the motion (`odeform.motion.caveats`), such as
     that its shape was not trained. With `fit`, lengths are in the units of its file, and only the part that moves is

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odeform.budget import require_memory
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.obj_corners import Corners, read_corners
 from odeform.formats.obj_materials import material_colors
 from odeform.formats.polygons import triangulated
@@ -61,7 +61,7 @@ def read_obj(path: Path, merge: bool) -> Geometry:
     points, painted = vertices.columns(0, 3), _painted(vertices, notes)
     corners = read_corners(lines, is_vertex, where)
     if corners.short:
-        notes.append(f"{corners.short} faces of fewer than three corners left out")
+        notes.append(f"{counted(corners.short, 'face')} of fewer than three corners left out")
     notes += _left_out(lines)
     if not corners.counts.size:
         if any(lines.starting(base).any() for base in BASES):
@@ -101,9 +101,9 @@ def _painted(vertices: _Table, notes: list[str]) -> Floats | None:
 
 
 def _left_out(lines: Lines) -> list[str]:
-    names = {b"l": "lines", b"curv": "curves", b"surf": "free-form surfaces"}
+    names = {b"l": "line", b"curv": "curve", b"surf": "free-form surface"}
     found = {name: int(lines.starting(word).sum()) for word, name in names.items()}
-    return [f"{count} {name} left out" for name, count in found.items() if count]
+    return [f"{counted(count, name)} left out" for name, count in found.items() if count]
 
 
 def _colors(

@@ -34,7 +34,7 @@ class Corners:
 
 
 def read_corners(lines: Lines, is_vertex: NDArray[np.bool_], where: str) -> Corners:
-    """The faces of a file, of whose lines `is_vertex` (L,) marks the vertices.
+    """Reads the faces of a file, of whose lines `is_vertex` (L,) marks the vertices.
 
     Negative numbers count back from the last vertex before the face.
 

@@ -22,7 +22,7 @@ VECTORS = ("-o", "-s", "-t")  # followed by one to three numbers
 @dataclass
 class _Material:
     color: Floats | None = None
-    """Of the diffuse part, 0 to 255."""
+    """The diffuse part, 0 to 255."""
     texture: str = ""
     file: Path = Path()
     """In which the material stands; the name of a texture is relative to it."""

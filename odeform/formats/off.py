@@ -23,7 +23,7 @@ KEYWORD = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\s*(.*)")
 
 
 def read_off(path: Path, merge: bool) -> Mesh:
-    """A mesh with the colors of its vertices, else of its faces.
+    """Reads a mesh with the colors of its vertices, else of its faces.
 
     Raises:
         InputError: For missing rows, no faces, binary files, and coordinates of other than three dimensions.
@@ -68,7 +68,7 @@ def read_off(path: Path, merge: bool) -> Mesh:
 
 
 def _face_numbers(rows: list[bytes], lines: Ints, where: str) -> NDArray[Any]:
-    """As `_numbers`; whole numbers, of faces without colors of fractions, are read twenty times as fast."""
+    """Reads as `_numbers` does; whole numbers, of faces without colors of fractions, are read twenty times as fast."""
     try:
         return _numbers(rows, lines, where, np.int64)
     except InputError:

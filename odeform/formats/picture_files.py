@@ -17,7 +17,7 @@ Picture = UInt8[np.ndarray, "height width 3"]
 
 
 def png_bytes(picture: Picture, notes: Sequence[str]) -> bytes:
-    """A PNG file of (H, W, 3) pixels, with `notes` as its text `Description`."""
+    """Encodes a PNG file of (H, W, 3) pixels, with `notes` as its text `Description`."""
     info, file = PngInfo(), io.BytesIO()
     if notes:
         info.add_itxt("Description", ". ".join(notes))

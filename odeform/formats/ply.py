@@ -59,7 +59,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Header:
-    """What a file says of itself.
+    """Holds what a file says of itself.
 
     Attributes:
         order: "<" or ">" for binary data, "=" for text.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.ply import BOM, Element, Header, Table
 from odeform.formats.text import numbers_of, plain_text, words_per_line
 from odeform.types import Ints
@@ -70,7 +70,7 @@ def read_rows(path: Path, header: Header, notes: list[str]) -> dict[str, Rows]:
             continue
         out[element.name], start = _binary_lists(data, start, element, header.order, path)
     if (extra := len(data) - start) > 0:
-        notes.append(f"{extra:,} bytes after the last row left out")
+        notes.append(f"{counted(extra, 'byte')} after the last row left out")
     return out
 
 
@@ -136,7 +136,8 @@ def _binary_lists(data: NDArray[np.uint8], start: int, element: Element, order: 
 
 
 def _even_lists(data: NDArray[np.uint8], start: int, element: Element, order: str) -> tuple[Rows, int] | None:
-    """As `_binary_lists` where all lists of a property have one length, as in a mesh of triangles; None otherwise."""
+    """Reads as `_binary_lists` does where all lists of a property have one length, as in a mesh of triangles; None
+    otherwise."""
     fields: list[tuple[str, Any, Any]] = []
     position, lengths = start, []
     for column, entry in enumerate(element.properties):
@@ -194,7 +195,7 @@ def _text_rows(path: Path, header: Header, elements: Sequence[Element], notes: l
         values = numbers_of(part, f"geometry {path}", range(lines[0], lines[-1] + 1))
         yield _split_rows(values, counts[chosen], element, path, lines)
     if used < len(filled):
-        notes.append(f"{len(filled) - used:,} lines after the last row left out")
+        notes.append(f"{counted(len(filled) - used, 'line')} after the last row left out")
 
 
 def _split_rows(values: NDArray[np.float64], counts: Ints, element: Element, path: Path, lines: Ints) -> Rows:

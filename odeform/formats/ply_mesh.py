@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from odeform.budget import require_memory
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.beside import read_image
 from odeform.formats.ply import Header
 from odeform.formats.ply_data import Lists, Rows, read_rows
@@ -42,9 +42,9 @@ def read_ply_mesh(path: Path, header: Header, merge: bool) -> Geometry:
     double = any(np.asarray(values).dtype.itemsize > 4 for values in xyz)
     points = np.stack([np.asarray(values, np.float64 if double else np.float32) for values in xyz], axis=1)
     notes += [
-        f"{element.rows} edges left out"
+        f"{counted(element.rows, 'edge')} left out"
         if element.name == "edge"
-        else f"{element.rows} rows of {element.name} left out"
+        else f"{counted(element.rows, 'row')} of {element.name} left out"
         for element in header.elements
         if element.name not in READ and element.rows
     ]
@@ -85,7 +85,7 @@ def _triangles(rows: dict[str, Rows], points: Floats, where: str, notes: list[st
     if lists is None and any(isinstance(entry, Lists) and len(entry.counts) for entry in faces.values()):
         raise InputError(f"{where}: expected faces with a list {CORNERS[0]}, got {', '.join(faces)[:100]}")
     if strip is not None and lists is not None:
-        notes.append(f"{len(strip.counts)} strips beside the faces left out")
+        notes.append(f"{counted(len(strip.counts), 'strip')} beside the faces left out")
     if strip is not None and lists is None:
         corners = _whole(strip.values, where)
         _require_vertices(corners, strip.counts, len(points), where, least=-1)
@@ -146,7 +146,7 @@ def _colors(
     notes: list[str],
 ) -> NDArray[np.uint8] | None:
     """(F, 3, 3) colors of the corners: of a texture, else of vertices, else of faces."""
-    uv = _coordinates(rows, corners, triangles, polygon)
+    uv = _coordinates(rows, corners, triangles)
     if header.textures and len(header.textures) > 1:
         notes.append(f"{len(header.textures)} textures left out: one is read at most")
     elif header.textures:
@@ -162,7 +162,7 @@ def _colors(
     return None if of_faces is None else np.repeat(of_faces[polygon][:, None], 3, axis=1)
 
 
-def _coordinates(rows: dict[str, Rows], corners: Ints, triangles: Faces, polygon: Ints) -> Floats | None:
+def _coordinates(rows: dict[str, Rows], corners: Ints, triangles: Faces) -> Floats | None:
     """(F, 3, 2) texture coordinates of the corners; None without."""
     lists = rows.get("face", {}).get("texcoord")
     if isinstance(lists, Lists):

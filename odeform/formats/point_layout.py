@@ -46,7 +46,7 @@ class Layout:
     names: tuple[str, ...] = ()
 
     def rows(self, text: bytes) -> tuple[bytes, Ints]:
-        """The lines of N points, with spaces between their numbers, and the number (N,) of each line."""
+        """Returns the lines of N points, with spaces between their numbers, and the number (N,) of each line."""
         kept, numbers = [], []
         for number, line in enumerate(text.split(b"\n"), 1):
             line = line.strip()
@@ -67,7 +67,8 @@ class Layout:
 
 
 def find_layout(text: bytes, where: str) -> Layout:
-    """The layout of a text. Raises `InputError` without any line of numbers, and for columns without x, y and z."""
+    """Finds the layout of a text. Raises `InputError` without any line of numbers, and for columns without x, y and
+    z."""
     names: tuple[bytes, tuple[bytes, ...]] | None = None
     count, odd, at = None, b"", 0
     for index, raw in enumerate(text.split(b"\n", MOST_HEADER)[:MOST_HEADER]):
@@ -110,7 +111,7 @@ def _first(names: tuple[str, ...], words: list[bytes], where: str) -> tuple[str,
 
 
 def _separator(line: bytes) -> tuple[bytes, bool]:
-    """What separates the columns of a line, and whether its numbers have decimal commas."""
+    """Finds what separates the columns of a line, and whether its numbers have decimal commas."""
     if b";" in line:
         return b";", b"." not in line
     words = _words(line, b" ")

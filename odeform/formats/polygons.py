@@ -11,7 +11,7 @@ __all__ = ["triangulated"]
 
 
 def triangulated(points: Floats, corners: Ints, counts: Ints) -> tuple[Faces, Ints]:
-    """Polygons -> triangles, in the same order and orientation.
+    """Maps polygons to triangles, in the same order and orientation.
 
     Args:
         points: (N, 3) vertices.

@@ -18,7 +18,8 @@ __all__ = ["read_geometry"]
 
 HEAD = 512  # bytes that tell what a file is
 EXTENT = (1e-15, 1e15)
-"""Of a shape in the units of its file. Squares of lengths, and their inverses, are then numbers of single precision."""
+"""Bounds the size of a shape in the units of its file. Squares of lengths, and their inverses, are then numbers of
+single precision."""
 
 
 def read_geometry(path: str | Path, merge: bool = True) -> Geometry:

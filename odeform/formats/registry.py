@@ -93,7 +93,7 @@ WRITERS: dict[str, Writer] = {
 
 
 def writers() -> Mapping[str, Writer]:
-    """Suffix -> writer: `WRITERS`, and those of whole motions that installed packages declare.
+    """Maps each suffix to its writer: `WRITERS`, and those of whole motions that installed packages declare.
 
     Their entry points are in the group `odeform.motion_writers`: the name is the suffix, the object the function.
     """
@@ -122,7 +122,7 @@ def motion_endings() -> str:
 
 
 def load_function(target: str) -> Callable[..., Any]:
-    """The function that "module:function" names."""
+    """Loads the function that "module:function" names."""
     module, _, name = target.partition(":")
     return getattr(import_module(module), name)
 

@@ -31,7 +31,7 @@ MARGIN = 1e-7  # to opacities 0 and 1, whose logits are not finite
 
 
 def inria_splats(table: Table, path: Path) -> GaussianSplats:
-    """The element vertex -> splats; gray without colour. Raises `InputError` for missing columns.
+    """Reads the element vertex as splats; gray without colour. Raises `InputError` for missing columns.
 
     Splats of two scales are flat (Huang et al., "2D Gaussian Splatting for Geometrically Accurate Radiance Fields",
     2024). Red, green and blue, from 0 to 255, stand for the constant harmonic where there is none.
@@ -76,7 +76,7 @@ def harmonic_columns(table: Table, path: Path) -> list[tuple[str, str, str]]:
 
 
 def inria_bytes(splats: GaussianSplats) -> bytes:
-    """The .ply of splats, with float32 columns in the order of the original code."""
+    """Encodes the .ply of splats, with float32 columns in the order of the original code."""
     count = len(splats.points)
     scales, quaternions = axes_from_covariances(splats.covariances)
     opacities = np.clip(splats.opacities, MARGIN, 1.0 - MARGIN, dtype=float)

@@ -57,7 +57,7 @@ LEVELS = (_Level("<f4", "<f4", "<f4"), _Level("<u2", "<f2", "<f2"), _Level("<u2"
 
 
 def read_ksplat(path: Path, merge: bool) -> GaussianSplats:
-    """The splats of all sections, with the harmonics of the highest degree among them.
+    """Reads the splats of all sections, with the harmonics of the highest degree among them.
 
     Raises:
         InputError: For other versions, and a file that is cut short.

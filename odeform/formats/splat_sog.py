@@ -47,7 +47,7 @@ class _Archive:
         require_memory(self.where, f"{self.count:,} splats", SPLAT_BYTES * self.count)
 
     def part(self, name: str) -> dict[str, Any]:
-        """What the table says of one property."""
+        """Returns what the table says of one property."""
         part = self.meta.get(name)
         if not isinstance(part, dict):
             raise InputError(f"{self.where}: expected {name} in meta.json")
@@ -109,7 +109,7 @@ class _Archive:
 
 
 def read_sog(path: Path, merge: bool) -> GaussianSplats:
-    """All splats of an archive, in its axes.
+    """Reads all splats of an archive, in its axes.
 
     Raises:
         InputError: For version 1, and for missing or damaged images.

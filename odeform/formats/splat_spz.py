@@ -58,12 +58,12 @@ class Header(NamedTuple):
 
 
 def read_spz(path: Path, merge: bool) -> GaussianSplats:
-    """All splats of a file, x right, y down, z forward."""
+    """Reads all splats of a file, x right, y down, z forward."""
     return spz_splats(read_limited(path, f"geometry {path}", MEMORY >> 1), path)
 
 
 def spz_splats(data: bytes, path: Path) -> GaussianSplats:
-    """The splats in the bytes of a file. Raises `InputError`, which names `path`, for damaged ones."""
+    """Reads the splats in the bytes of a file. Raises `InputError`, which names `path`, for damaged ones."""
     header, body = _unpacked(data, path)
     count, widths = header.splats, header.widths
     if len(body) < count * sum(widths):
@@ -104,7 +104,7 @@ def _decode(header: Header, parts: list[Bytes], out: GaussianSplats) -> None:
 
 
 def spz_bytes(splats: GaussianSplats, fraction: int = 12) -> bytes:
-    """Splats of one colour each -> a file of version 3, with positions rounded to 2^-`fraction` of a unit.
+    """Encodes splats of one colour each in a file of version 3, with positions rounded to 2^-`fraction` of a unit.
 
     Raises `ValueError` for further harmonics.
     """

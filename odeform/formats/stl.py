@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from odeform.budget import MEMORY, read_limited, require_memory
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.text import Lines, numbers_of, plain_text, words_per_line
 from odeform.types import Floats, Mesh
 
@@ -57,7 +57,7 @@ def _binary_corners(data: bytes, count: int, where: str) -> tuple[Floats, list[s
             f"{len(data):,}: no STL file?"
         )
     if extra:
-        notes.append(f"{extra:,} bytes after the last triangle left out")
+        notes.append(f"{counted(extra, 'byte')} after the last triangle left out")
     facets = np.frombuffer(data, FACET, count, HEADER)
     marked = facets["attribute"] if b"COLOR=" in data[:80] else facets["attribute"] & COLORED
     if marked.any():

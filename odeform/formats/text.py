@@ -111,7 +111,7 @@ class Lines:
         return self.data[np.minimum(places, len(self.data) - 1)]
 
     def line(self, index: int) -> str:
-        """A line as text."""
+        """Returns a line as text."""
         return self.text[self.starts[index] : self.stops[index]].decode("utf-8", "replace").strip()
 
     def without(self, chosen: NDArray[np.bool_], word: bytes) -> bytes:

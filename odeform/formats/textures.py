@@ -15,7 +15,8 @@ def sampled(
     uv: Float[np.ndarray, "vertices 2"],
     wraps: tuple[str, str] = (REPEAT, REPEAT),
 ) -> Float[np.ndarray, "vertices 3"]:
-    """sRGB colors, 0 to 255, of an image (H, W, 3) at coordinates (N, 2): 0 at its lower left, 1 at its upper right.
+    """Returns sRGB colors, 0 to 255, of an image (H, W, 3) at coordinates (N, 2): 0 at its lower left, 1 at its upper
+    right.
 
     Colors are interpolated between the four nearest pixels. Beyond 0 and 1 the image is repeated, mirrored or held, in
     each direction as `wraps` says. Coordinates that are not finite count as 0.
@@ -42,7 +43,7 @@ def _wrapped(values: Floats, how: str) -> Floats:
 
 
 def _between(values: Floats, size: int) -> tuple[Int[np.ndarray, " vertices"], Ints, Floats]:
-    """The two nearest pixels of `size`, and the share of the second."""
+    """The two nearest pixels of `size`, and the weight of the second."""
     place = values * (size - 1)
     below = np.clip(np.floor(place).astype(np.int64), 0, size - 1)
     return below, np.minimum(below + 1, size - 1), place - below

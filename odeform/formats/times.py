@@ -11,7 +11,7 @@ LIMIT = 1_000_000  # frames
 
 
 def parse_times(text: str) -> Floats:
-    """ "START:STOP:STEP" in seconds -> (T,), half-open like `numpy.arange`. Raises `InputError`."""
+    """Maps "START:STOP:STEP" in seconds to (T,), half-open like `numpy.arange`. Raises `InputError`."""
     try:
         start, stop, step = (float(part) for part in text.split(":"))
     except ValueError:

@@ -17,7 +17,7 @@ HEAD = 4096  # bytes that tell whether a file is text
 
 
 def read_vtk(path: Path, merge: bool) -> Geometry:
-    """The surface in a file of VTK, in the units of the file: of volumes the outer faces."""
+    """Reads the surface in a file of VTK, in the units of the file: of volumes the outer faces."""
     where = f"geometry {path}"
     return geometry_of(read_grid(path, where), where)
 

@@ -91,7 +91,7 @@ def read_legacy(data: bytes, where: str) -> Grid:
 
 
 class _Parts:
-    """What was found so far."""
+    """Holds what was found so far."""
 
     def __init__(self) -> None:
         self.points: Floats | None = None

@@ -48,7 +48,7 @@ COMPRESSORS: dict[str, Callable[[bytes, int], bytes]] = {
 
 
 def parsed_xml(data: bytes, where: str) -> ElementTree.Element:
-    """The root of an XML text without entities of its own. Raises `InputError`, which `where` leads."""
+    """Parses the root of an XML text without entities of its own. Raises `InputError`, which `where` leads."""
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise InputError(f"{where}: expected XML without a document type")
     try:
@@ -88,7 +88,7 @@ class _Decoder:
     where: str
     order: str
     header: np.dtype[Any]
-    """Of the numbers that lead binary arrays."""
+    """The type of the numbers that lead binary arrays."""
     decompress: Callable[[bytes, int], bytes] | None
     appended: bytes
     raw: bool

@@ -119,7 +119,8 @@ def _require_finite(motion: Motion, times: Floats) -> None:
 
 
 def shape_at(motion: Motion, time: float, fit: FittedShape | None = None) -> Geometry:
-    """The geometry at `time` in seconds, in scene axes; with `fit` in those of its file, the still part included."""
+    """Returns the geometry at `time` in seconds, in scene axes; with `fit` in those of its file, the still part
+    included."""
     moved = replace(motion.geometry, points=motion.vertices(time))
     if isinstance(moved, GaussianSplats):
         # colours turn with the body as a whole

@@ -8,7 +8,8 @@ __all__ = ["equal_rows"]
 
 
 def equal_rows(rows: Floats) -> tuple[Ints, Ints]:
-    """The first of each group of equal rows of (N, C), in their order, and the number of each row's group (N,)."""
+    """Returns the first of each group of equal rows of (N, C), in their order, and the number of each row's group
+    (N,)."""
     _, first, inverse = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(order), np.int64)

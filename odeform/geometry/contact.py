@@ -75,7 +75,7 @@ def _surface_of(mesh: Mesh) -> _Surface:
 
 
 def surface_point(mesh: Mesh, face: int, barycentric: Floats, distance: float = 0.0) -> SurfacePoint:
-    """The point of a face with barycentric coordinates `barycentric` (3,)."""
+    """Returns the point of a face with barycentric coordinates `barycentric` (3,)."""
     surface = _surface_of(mesh)
     corners = surface.corners[face]
     normal = np.asarray(barycentric) @ surface.normals[mesh.faces[face]]
@@ -126,7 +126,7 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
 
 
 def checked_contact(mesh: Mesh, point: Floats, force: Floats) -> tuple[SurfacePoint, Vector]:
-    """The contact nearest to `point` (3,) m, and the centre of the sphere there, for a `force` (3,) N.
+    """Finds the contact nearest to `point` (3,) m, and the centre of the sphere there, for a `force` (3,) N.
 
     A force outside of the cone is accepted, as long as it pushes inward; no force is, too.
 

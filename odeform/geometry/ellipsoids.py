@@ -18,7 +18,7 @@ BLOCK = 1 << 16  # splats at a time: intermediate results are several times as l
 
 
 def covariances_from_axes(scales: Points, quaternions: Quaternions) -> Covariances:
-    """(N, 3) standard deviations in m and (N, 4) quaternions -> (N, 3, 3) m^2.
+    """Maps (N, 3) standard deviations in m and (N, 4) quaternions to (N, 3, 3) m^2.
 
     Quaternions are normalised; one of zero length is the identity, one that is not finite gives a covariance that is
     not.
@@ -42,7 +42,7 @@ def _covariances(scales: Points, quaternions: Quaternions) -> Covariances:
 
 
 def axes_from_covariances(covariances: Covariances) -> tuple[Points, Quaternions]:
-    """(N, 3, 3) m^2 -> (N, 3) standard deviations in m and (N, 4) unit quaternions with w >= 0."""
+    """Maps (N, 3, 3) m^2 to (N, 3) standard deviations in m and (N, 4) unit quaternions with w >= 0."""
     from scipy.spatial.transform import Rotation
 
     variances, axes = np.linalg.eigh(np.asarray(covariances, dtype=float))
@@ -53,7 +53,7 @@ def axes_from_covariances(covariances: Covariances) -> tuple[Points, Quaternions
 
 
 def with_fourth(others: Points, index: Ints) -> Quaternions:
-    """(N, 3) components of unit quaternions and the `index` (N,) of the missing one -> (N, 4) in the same order.
+    """Maps (N, 3) components of unit quaternions and the `index` (N,) of the missing one to (N, 4) in the same order.
 
     The missing component is taken as positive: q and -q are the same rotation.
     """

@@ -18,7 +18,7 @@ DIRECTIONS = 10  # in which a harmonic is sampled; degree 3 has 7 coefficients
 
 
 def harmonic_basis(directions: Vectors, degree: int) -> Float[np.ndarray, "*batch basis"]:
-    """(..., 3) unit vectors -> (..., (degree + 1)^2) values, by the recurrences of Legendre functions."""
+    """Maps (..., 3) unit vectors to (..., (degree + 1)^2) values, by the recurrences of Legendre functions."""
     x, y, z = np.moveaxis(np.asarray(directions, dtype=float), -1, 0)
     out = np.empty((*x.shape, (degree + 1) ** 2))
     real, imaginary = np.ones_like(x), np.zeros_like(x)  # (x + i y)^m

@@ -20,7 +20,7 @@ def vertex_normals(points: Points, faces: Faces) -> Points:
 
 
 def nearest_normals(surface: Mesh, points: Points) -> Points:
-    """(M, 3) unit normals of `surface` at its points nearest to `points` (M, 3), interpolated over the faces.
+    """Computes (M, 3) unit normals of `surface` at its points nearest to `points` (M, 3), interpolated over the faces.
 
     The nearest point is searched on the faces around the nearest vertex. +z where the surface has no normal.
     """

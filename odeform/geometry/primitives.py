@@ -9,8 +9,8 @@ __all__ = ["octasphere"]
 
 
 def octasphere(radius: float, segments: int) -> Mesh:
-    """A sphere of `radius` in m about the origin, each octant a triangle grid with `segments` edges per side:
-    4 segments^2 + 2 vertices.
+    """Makes a sphere of `radius` in m about the origin, each octant a triangle grid with `segments` edges per side: 4
+    segments^2 + 2 vertices.
 
     Edges follow the three coordinate planes, so a pattern by octants has straight borders.
     """

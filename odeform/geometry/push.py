@@ -53,12 +53,13 @@ class Push:
         return self.angle > CONE + 1e-6
 
     def at(self, contact: SurfacePoint) -> "Push":
-        """The same force at another contact: as strong, and tilted as far off the normal there."""
+        """Returns the same force at another contact: as strong, and tilted as far off the normal there."""
         return replace(self, contact=contact)
 
 
 def contact_axes(normal: Floats) -> Rotations:
-    """(3, 3) unit vectors as rows: into the surface, sideways and upwards along it, at an outward unit normal (3,)."""
+    """Computes (3, 3) unit vectors as rows: into the surface, sideways and upwards along it, at an outward unit normal
+    (3,)."""
     reference = np.array([0.0, 0.0, 1.0] if abs(normal[2]) < STEEP else [1.0, 0.0, 0.0])
     up = reference - (reference @ normal) * normal
     up /= np.linalg.norm(up)

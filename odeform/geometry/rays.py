@@ -12,7 +12,7 @@ ROUNDING = 1e-9  # of a triangle: rays through its edges hit it
 def crossings(
     origin: Floats, direction: Floats, corner: Floats, first: Floats, second: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Distance along a ray to each of F triangles, and where in them (Moeller and Trumbore 1997).
+    """Returns the distance along a ray to each of F triangles, and where in them (Moeller and Trumbore 1997).
 
     A triangle is given by a `corner` (F, 3) and the sides `first` and `second` (F, 3) from it. The distances (F,) are
     in lengths of `direction` (3,), negative behind `origin` (3,), and infinite without a crossing; the crossing is at
@@ -31,8 +31,8 @@ def crossings(
 
 
 def first_on_mesh(origin: Floats, direction: Floats, points: Points, faces: Faces) -> tuple[int, Vector, float] | None:
-    """The first face that a ray from (3,) along (3,) meets, the barycentric coordinates (3,) there, and the distance in
-    lengths of `direction`; None if it meets none."""
+    """Finds the first face that a ray from (3,) along (3,) meets, the barycentric coordinates (3,) there, and the
+    distance in lengths of `direction`; None if it meets none."""
     a, b, c = (np.asarray(points, dtype=float)[faces[:, i]] for i in range(3))
     distance, u, v = crossings(np.asarray(origin, dtype=float), np.asarray(direction, dtype=float), a, b - a, c - a)
     distance = np.where(distance > 0.0, distance, np.inf)
@@ -43,7 +43,7 @@ def first_on_mesh(origin: Floats, direction: Floats, points: Points, faces: Face
 
 
 def first_on_points(origin: Floats, direction: Floats, points: Points, radius: float) -> tuple[int, float] | None:
-    """The first of (N, 3) m points within `radius` m of a ray, and its distance in lengths of `direction`.
+    """Finds the first of (N, 3) m points within `radius` m of a ray, and its distance in lengths of `direction`.
 
     Of points that are nearly as near as the first (by less than `radius`), it is the one closest to the ray.
     """

@@ -67,7 +67,7 @@ def region_to_json(region: Region) -> dict[str, Any]:
 
 
 def region_from_json(raw: Any) -> Region:
-    """The inverse of `region_to_json`. Raises `InputError` for anything else."""
+    """Inverts `region_to_json`. Raises `InputError` for anything else."""
     try:
         ((kind, values),) = raw.items()
         numbers = {name: np.asarray(value, dtype=float) for name, value in values.items()}

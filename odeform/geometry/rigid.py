@@ -27,7 +27,7 @@ ACROSS = np.array(
 
 
 def rotation_z(angle: float) -> Rotations:
-    """(3, 3) rotation by `angle` radians about the vertical axis."""
+    """Computes the rotation (3, 3) by `angle` radians about the vertical axis."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -39,7 +39,7 @@ def is_rotation(matrix: Floats) -> bool:
 
 
 def rotation_from_vector(vector: Vectors) -> Rotations:
-    """(..., 3) rotation vectors in radians, of any length -> (..., 3, 3) (Rodrigues)."""
+    """Maps (..., 3) rotation vectors in radians, of any length to (..., 3, 3) (Rodrigues)."""
     vector = np.asarray(vector, dtype=float)
     # by few calls: of one vector, they take longer than the arithmetic
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None]
@@ -70,7 +70,8 @@ def body_spin(vector: Float[np.ndarray, "*#batch 3"], change: Float[np.ndarray, 
 
 
 def vector_from_rotation(rotation: Rotations) -> Vectors:
-    """(..., 3, 3) -> (..., 3) rotation vectors of angle at most pi, through unit quaternions for accuracy near pi."""
+    """Maps (..., 3, 3) to (..., 3) rotation vectors of angle at most pi, through unit quaternions for accuracy near
+    pi."""
     from scipy.spatial.transform import Rotation
 
     flat = Rotation.from_matrix(np.asarray(rotation, dtype=float).reshape(-1, 3, 3)).as_rotvec()
@@ -100,7 +101,8 @@ def unwrapped_vectors(rotations: Rotations) -> Vectors:
 def best_rigid(
     rest: Float[np.ndarray, "*#batch points 3"], moved: Float[np.ndarray, "*batch points 3"], weights: Perpoint
 ) -> tuple[Rotations, Vectors]:
-    """Weighted least-squares rigid motion of `rest` (N, 3) or (..., N, 3) onto `moved` (..., N, 3) (Kabsch 1976).
+    """Finds the weighted least-squares rigid motion of `rest` (N, 3) or (..., N, 3) onto `moved` (..., N, 3) (Kabsch
+    1976).
 
     Returns rotations R (..., 3, 3) and shifts p (..., 3) of the weighted centroid c:
     moved ~ R (rest - c) + c + p. `weights` (N,) sum to 1.

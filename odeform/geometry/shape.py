@@ -17,7 +17,8 @@ EVEN = 0.2  # length of the mean unit vector below which the surroundings give n
 
 
 def surface_weights(geometry: Geometry) -> Perpoint:
-    """(N,) fraction of the surface at each point, summing to 1: a third of the adjacent faces; equal without faces."""
+    """Computes the fraction (N,) of the surface at each point, summing to 1: a third of the adjacent faces; equal
+    without faces."""
     count = len(geometry.points)
     if not isinstance(geometry, Mesh):
         return np.full(count, 1.0 / count)

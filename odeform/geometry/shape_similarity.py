@@ -38,7 +38,7 @@ class ShapeSimilarity:
         return self.distance <= self.tolerance
 
     def describe(self) -> str:
-        """One sentence, for people."""
+        """Describes it in one sentence, for people."""
         if self.same:
             return f"the shape is the trained body's, to within {1e3 * self.distance:.1f} mm"
         return (

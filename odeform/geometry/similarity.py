@@ -46,7 +46,7 @@ class Similarity:
 
     @classmethod
     def from_json(cls, raw: Any) -> "Similarity":
-        """The inverse of `to_json`. Raises `InputError` for anything else."""
+        """Inverts `to_json`. Raises `InputError` for anything else."""
         try:
             factor = float(raw["factor"])
             rotation, shift = np.array(raw["rotation"], dtype=float), np.array(raw["shift"], dtype=float)

@@ -53,11 +53,11 @@ class Discrepancy:
         return {PREFIX + name: value.astype(np.float32) for name, value in named.items()}
 
     def at(self, times: Times) -> Floats:
-        """Variances (T, 6 + K) mm^2 at `times` (T,) s; constant after the last one."""
+        """Returns the variances (T, 6 + K) mm^2 at `times` (T,) s; constant after the last one."""
         return np.exp(_between(times, self.times, np.log(self.variances)))
 
     def minus_mean(self, linear: Linear, theta: Floats, times: Times) -> Linear:
-        """A comparison at theta (P,), minus the expected error of the model there."""
+        """Returns a comparison at theta (P,), minus the expected error of the model there."""
         means = _between(times, self.times, self.means)
         expected = linear.spread @ (means @ np.concatenate([[1.0], theta]))[..., None]
         slopes = means[..., 1 : 1 + linear.jacobian.shape[-1]]  # empty if the comparison has no jacobians

@@ -37,7 +37,8 @@ class ParameterFit:
 
 
 def normal_equations(linear: Linear, variances: Floats, noise_mm: float) -> tuple[Floats, Floats, float]:
-    """J' C^-1 J (P, P), J' C^-1 r (P,) and r' C^-1 r, of r with covariance C = noise^2 + spread variances spread'.
+    """Returns J' C^-1 J (P, P), J' C^-1 r (P,) and r' C^-1 r, of r with covariance C = noise^2 + spread variances
+    spread'.
 
     The Woodbury identity keeps the system at 6 + K unknowns a frame, also where there are fewer points.
     """

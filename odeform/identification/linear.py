@@ -76,7 +76,8 @@ def _motion(predictor: Predictor, theta: Floats, times: Times) -> Floats:
 
 
 def derivatives(predictor: Predictor, theta: Floats, times: Times) -> Float[np.ndarray, "jet times y"]:
-    """(1 + P, T, 6 + K): the reduced motion under theta (P,) in [-1, 1], and its derivatives by each parameter.
+    """Computes (1 + P, T, 6 + K): the reduced motion under theta (P,) in [-1, 1], and its derivatives by each
+    parameter.
 
     Exact where the model has them, else by central differences.
     """

@@ -115,7 +115,7 @@ def _scores(parameter: Parameter, rows: Sequence[dict[str, Any]]) -> dict[str, A
 
 
 def report(result: dict[str, Any]) -> str:
-    """The result as a text table."""
+    """Returns the result as a text table."""
     view = result["view"]
     points = f"{view['points']} points" if view["points"] else "all points"
     frames = f"{view['frames']} frames" if view["frames"] else "all frames"

@@ -28,7 +28,7 @@ class Samples:
 
     @property
     def modes(self) -> Float[np.ndarray, "samples 3 modes"]:
-        """The displacements."""
+        """The modes as displacements."""
         return self.rows[:3].transpose(1, 0, 2)
 
     @cached_property
@@ -74,7 +74,7 @@ class ReducedBody:
     """Samples at which something may push it."""
 
     def changed(self, mass: float, stiffness: float) -> "ReducedBody":
-        """The same body with so many times the mass and the stiffness. Its modes keep their shapes."""
+        """Returns the same body with so many times the mass and the stiffness. Its modes keep their shapes."""
         solid = self.solid
         parts = {
             name: replace(samples, rows=samples.rows / np.sqrt(mass), masses=mass * samples.masses)
@@ -89,7 +89,8 @@ class ReducedBody:
         return float(np.sqrt((self.support.points**2).sum(axis=1).max()))
 
     def near(self, points: Float[np.ndarray, "batch 3"], count: int) -> Ints:
-        """(B, count) indices of the samples of the surface nearest to each point, m relative to the mass centre."""
+        """Computes (B, count) indices of the samples of the surface nearest to each point, m relative to the mass
+        centre."""
         return self.surface.tree.query(points, min(count, len(self.surface.points)))[1].reshape(len(points), -1)
 
 

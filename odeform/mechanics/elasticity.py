@@ -33,7 +33,7 @@ class ElasticModes:
 def tangent_stiffness(
     points: Points, elements: Ints, positions: Points, young: float, poisson: float, thickness: float = 0.0
 ) -> csc_matrix:
-    """(3 N, 3 N) N/m: minus the derivative of the elastic forces at `positions` (N, 3) m.
+    """Computes (3 N, 3 N) N/m: minus the derivative of the elastic forces at `positions` (N, 3) m.
 
     `points` (N, 3) m are without stress, `young` is in Pa. `elements` are tetrahedra (M, 4), or the triangles (M, 3) of
     a shell of `thickness` metres, which bends as well, from the curvature of `points`.
@@ -92,7 +92,8 @@ def _assembled(blocks: Floats, elements: Ints, count: int) -> csc_matrix:
 
 
 def rigid_modes(points: Points, masses: Perpoint) -> Float[np.ndarray, "6 nodes 3"]:
-    """Shifts and small rotations of `points` (N, 3) m about their mass centre, orthonormal under `masses` (N,) kg."""
+    """Returns shifts and small rotations of `points` (N, 3) m about their mass centre, orthonormal under `masses` (N,)
+    kg."""
     arms = points - masses @ points / masses.sum()
     shifts = np.broadcast_to(np.eye(3)[:, None], (3, len(points), 3))
     turns = np.cross(np.eye(3)[:, None], arms[None])

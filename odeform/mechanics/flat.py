@@ -46,7 +46,7 @@ def packed(after: State, before: States) -> States:
 
 
 def flat_slopes(now: State, acceleration: Float[np.ndarray, "rows velocities"]) -> States:
-    """(R, 20 + 2 K), from the accelerations."""
+    """Computes (R, 20 + 2 K), from the accelerations."""
     velocity, count = now.velocity, len(now.velocity)
     turn = (skew(velocity[:, 3:6]) @ now.rotation).reshape(count, 9)
     speed = velocity[:, now.body :] if now.pushed else np.zeros((count, 1))

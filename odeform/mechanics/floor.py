@@ -13,7 +13,7 @@ from odeform.types import Floats, Perpoint
 __all__ = ["Floor", "stand"]
 
 GRAVITY = 9.81  # m/s^2
-TOUCHING = 4.0  # inverse of the share of a body's surface that typically stands
+TOUCHING = 4.0  # inverse of the fraction of a body's surface that typically stands
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Floor:
 
 
 def stand(body: ReducedBody, parameters: ContactParameters) -> Floor:
-    """The springs, and the height and tilt of the floor at which they carry the body without turning it.
+    """Finds the springs, and the height and tilt of the floor at which they carry the body without turning it.
 
     The equilibrium is the minimum of the potential energy of the springs and the weight, which is convex.
     """

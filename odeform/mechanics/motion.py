@@ -10,21 +10,19 @@ from odeform.mechanics.push import Push
 from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.state import State
 from odeform.mechanics.step import Mechanics
-from odeform.types import Floats
 
 __all__ = ["Nodes", "push_body"]
 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """States of B motions at `times` (T,) s."""
+    """Holds the states of B motions at T times, a step apart."""
 
-    times: Floats
     states: list[State]
 
     @property
     def shifts(self) -> Float[np.ndarray, "batch times 3"]:
-        """m."""
+        """Shifts of the mass centre, m."""
         return np.stack([state.shift for state in self.states], axis=1)
 
     @property
@@ -49,4 +47,4 @@ def push_body(mechanics: Mechanics, push: Push, pulse: float, until: float, step
     for index in range(max(int(np.ceil(until / step - 1e-9)), 1)):
         flat = bodies.advance(rows, index * steps, flat, steps)[0]
         states.append(unpacked(flat, index + 1 < count))
-    return Nodes(step * np.arange(len(states)), states)
+    return Nodes(states)

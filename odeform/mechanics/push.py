@@ -52,7 +52,7 @@ class Push:
 
     @cached_property
     def over(self) -> "Push":
-        """The same without the samples that the sphere may touch."""
+        """Returns the same without the samples that the sphere may touch."""
         parts = (self.points[..., : self.support], self.rows[:, :, : self.support], self.masses[:, : self.support])
         points, rows, masses = (np.ascontiguousarray(part) for part in parts)
         return replace(self, points=points, rows=rows, masses=masses)

@@ -46,11 +46,11 @@ class PushedBody:
         return self._bodies.start[0]
 
     def __call__(self, time: float, state: Floats) -> Floats:
-        """The slope of a state (20 + 2 K,) at `time` in s."""
+        """Returns the slope of a state (20 + 2 K,) at `time` in s."""
         return self._bodies(FIRST, np.array([time]), state[None])[0]
 
     def advance(self, time: float, state: Floats, step: float) -> tuple[Floats, Floats, float]:
-        """The state (20 + 2 K,) after `step` seconds, to second order, the slope there, and the error in m.
+        """Returns the state (20 + 2 K,) after `step` seconds, to second order, the slope there, and the error in m.
 
         The end of the pulse ends a step.
         """

@@ -14,12 +14,13 @@ for _axis, _row, _column in ((0, 2, 1), (1, 0, 2), (2, 1, 0)):
 
 
 def skew(vectors: Floats) -> Floats:
-    """(..., 3) -> (..., 3, 3): the matrices of v x."""
+    """Maps (..., 3) to (..., 3, 3): the matrices of v x."""
     return (vectors @ CROSS).reshape(*vectors.shape, 3)
 
 
 def turned(rotation: Float[np.ndarray, "*#batch 3 3"], vector: Float[np.ndarray, "*#batch 3"]) -> Floats:
-    """Rotations (..., 3, 3), turned further by rotation vectors (..., 3) in radians in the axes of the scene."""
+    """Returns rotations (..., 3, 3), turned further by rotation vectors (..., 3) in radians in the axes of the
+    scene."""
     angle = np.sqrt((vector * vector).sum(axis=-1))[..., None, None] + TINY
     cross = skew(vector)
     once = cross @ rotation
@@ -28,7 +29,7 @@ def turned(rotation: Float[np.ndarray, "*#batch 3 3"], vector: Float[np.ndarray,
 
 
 def turn(rotation: Rotations) -> Floats:
-    """(B, 3, 3) rotations by less than a right angle -> rotation vectors (B, 3)."""
+    """Maps (B, 3, 3) rotations by less than a right angle to rotation vectors (B, 3)."""
     sine = 0.5 * (rotation - rotation.transpose(0, 2, 1)).reshape(-1, 9) @ (0.5 * CROSS.T)
     size = np.sqrt((sine * sine).sum(axis=-1, keepdims=True)) + TINY
     return sine * (np.arcsin(np.minimum(size, 1.0)) / size)

@@ -56,12 +56,12 @@ class State:
         )
 
     def without_projectile(self) -> "State":
-        """The same, after the projectile is gone."""
+        """Returns the same, after the projectile is gone."""
         return State(self.shift, self.rotation, self.modes, self.projectile, self.velocity[:, : self.body])
 
 
 def apart(one: State, other: State) -> Float[np.ndarray, "batch coordinates"]:
-    """(B, 6 + K) from the other to the one: shift in m, rotation vector in rad, and modal amplitudes."""
+    """Computes (B, 6 + K) from the other to the one: shift in m, rotation vector in rad, and modal amplitudes."""
     turns = turn(one.rotation @ other.rotation.transpose(0, 2, 1))
     return np.concatenate([one.shift - other.shift, turns, one.modes - other.modes], axis=1)
 

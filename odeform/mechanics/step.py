@@ -131,7 +131,7 @@ class Steps:
         return np.sqrt((between * between + ahead * ahead) @ self._spread)
 
     def slope(self, state: State) -> Floats:
-        """(B, V) accelerations."""
+        """Computes (B, V) accelerations."""
         local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
         _, rate = self._free(state, local)
         rate[:, inner] -= self._relaxation * self._eigenvalues * local[:, inner]

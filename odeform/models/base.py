@@ -138,7 +138,7 @@ class Predictor(ABC):
     def __copy__(self) -> Any:
         """A shallow copy shares everything that was read."""
         out = object.__new__(type(self))
-        out.__dict__.update(self.__dict__)
+        vars(out).update(vars(self))
         return out
 
     @abstractmethod
@@ -165,7 +165,7 @@ class Predictor(ABC):
         until: float | None = None,
         observed: MotionSequence | None = None,
     ) -> Motion:
-        """The motion of `geometry` under `parameters`.
+        """Solves the motion of `geometry` under `parameters`.
 
         Args:
             geometry: a shape of N points in metres, where it lies at rest in the scene; by default the trained body
@@ -256,7 +256,7 @@ class Predictor(ABC):
         return differentiable_points(self, parameters, times, geometry)
 
     def complete(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
-        """All parameters, checked, with defaults for those not given (`Schema.complete`).
+        """Returns all parameters, checked, with defaults for those not given (`Schema.complete`).
 
         In a scene in which a sphere pushes bodies, contacts and forces that are not given suit the object: see
         `odeform.simulation.contacts.complete_push`.
@@ -278,7 +278,7 @@ class Predictor(ABC):
         return {}
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
-        """Weakest and strongest force in newton on the body that `parameters` select, in training.
+        """Returns the weakest and strongest force in newton on the body that `parameters` select, in training.
 
         Raises `InputError` in scenes in which no sphere pushes.
         """

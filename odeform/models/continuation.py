@@ -71,7 +71,7 @@ class Dynamics:
     deformation: KernelRegression
 
     def flight(self, before: Float[np.ndarray, "*batch y"], now: Float[np.ndarray, "*batch y"]) -> Floats:
-        """The next frame (..., 6 + K) of a body without contact."""
+        """Predicts the next frame (..., 6 + K) of a body without contact."""
         out = 2.0 * now - before
         out[..., :3] += self.gravity
         out[..., POSE:] = 0.0
@@ -98,7 +98,7 @@ class Dynamics:
         now: Float[np.ndarray, "states y"],
         theta: Float[np.ndarray, "states parameters"],
     ) -> Float[np.ndarray, "states y"]:
-        """The next frame (S, 6 + K) from the last two."""
+        """Predicts the next frame (S, 6 + K) from the last two."""
         features, near = self.features(before, now, theta)
         out = self.flight(before, now)
         out[:, :POSE] += near * self.pose(without_side(features))

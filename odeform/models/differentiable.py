@@ -43,7 +43,7 @@ class HasSensitivities(Protocol):
     """A model whose equations are differentiated, and solved with their derivatives."""
 
     def sensitivities(self, theta: Floats, times: Times, quality: SolverSettings) -> Floats:
-        """(1 + P, T, 6 + K): y at (T,) seconds under theta (P,), and its derivatives by theta."""
+        """Computes (1 + P, T, 6 + K): y at (T,) seconds under theta (P,), and its derivatives by theta."""
         ...
 
 

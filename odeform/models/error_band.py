@@ -21,7 +21,7 @@ ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a 
 
 
 def error_band(arrays: Arrays) -> "ErrorBand | None":
-    """The band of a checkpoint's arrays; None without validation errors, or with those of too few sequences."""
+    """Returns the band of a checkpoint's arrays; None without validation errors, or with those of too few sequences."""
     enough = "val.theta" in arrays and len(arrays["val.theta"]) >= FEWEST
     return ErrorBand(arrays) if enough else None
 
@@ -73,7 +73,7 @@ class ErrorBand:
         return min(grown, np.log(2.0) * FARTHEST)
 
     def at(self, theta: Floats, times: Times) -> Floats:
-        """(P,) parameters in [-1, 1] and (T,) seconds -> (T, 2) mm: the median, and the quantile `NOMINAL`."""
+        """Maps (P,) parameters in [-1, 1] and (T,) seconds to (T, 2) mm: the median, and the quantile `NOMINAL`."""
         level = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0] + self._outside(theta)
         stop = self._times[-1]
         profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)

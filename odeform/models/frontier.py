@@ -32,7 +32,7 @@ class FrontierPoint:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "FrontierPoint":
-        """The inverse of `to_json`."""
+        """Inverts `to_json`."""
         setting = dict(data)
         measured = [float(setting.pop(name)) for name in MEASURED]
         return cls(SolverSettings(**setting), *measured)

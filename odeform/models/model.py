@@ -47,7 +47,7 @@ class Model(ReducedModel):
 
     @abstractmethod
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
-        """The initial value problem for theta (P,) in [-1, 1] on a body: field, initial state, and readout."""
+        """States the initial value problem for theta (P,) in [-1, 1] on a body: field, initial state, and readout."""
 
     def batch_problem(
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
@@ -63,7 +63,7 @@ class Model(ReducedModel):
     def integrate(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings, until: float
     ) -> SolvedTrajectory:
-        """The solution of the ODE alone for theta (P,) in [-1, 1], to `until` seconds at least."""
+        """Solves the ODE alone for theta (P,) in [-1, 1], to `until` seconds at least."""
         problem = self.problem(theta, evaluated, getattr(np, settings.dtype))
         return self._solved(problem, lambda: self.problem(theta, evaluated, np.float64), settings, until)
 

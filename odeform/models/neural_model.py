@@ -31,7 +31,8 @@ class NeuralModel(Model):
     (B, P) is in [-1, 1]:
 
     - `initial_state(theta)` -> (B, S), the state at time 0;
-    - `vector_field(t, z, theta)` -> (B, S), the slope per second of z (B, S) at t seconds, a number;
+    - `vector_field(t, z, theta)` -> (B, S), the slope per second of z (B, S) at t seconds, a number; derivatives that
+      it takes by `torch.autograd` need `torch.enable_grad()`, since predictions keep no graph;
     - `readout(t, z, theta)` -> (B, C), the coordinates in units of their root mean square, at t (B,) seconds. Their
       value at time 0 is subtracted, so that a body starts at rest.
 
@@ -91,16 +92,18 @@ class NeuralModel(Model):
         known = torch.tensor(theta[None].astype(dtype))
 
         def field(time: float, state: Floats) -> Floats:
-            with torch.inference_mode():
-                return module.vector_field(time, torch.from_numpy(state)[None], known)[0].numpy()
+            # not in inference mode: a field may be the derivative of an energy
+            with torch.no_grad():
+                return module.vector_field(time, torch.from_numpy(state)[None], known)[0].detach().numpy()
 
         def readout(times: Floats, states: Floats) -> Floats:
             at, rows = torch.tensor(times.astype(dtype)), torch.from_numpy(np.ascontiguousarray(states, dtype=dtype))
-            with torch.inference_mode():
-                return module.readout(at, rows, known.expand(len(rows), -1)).numpy().astype(float) * self._scale
+            with torch.no_grad():
+                out = module.readout(at, rows, known.expand(len(rows), -1))
+            return out.detach().numpy().astype(float) * self._scale
 
-        with torch.inference_mode():
-            start = module.initial_state(known)[0].numpy()
+        with torch.no_grad():
+            start = module.initial_state(known)[0].detach().numpy()
         origin = readout(np.zeros(1), start[None])
         return Problem(field, start, lambda times, states: readout(times, states) - origin)
 

@@ -47,7 +47,7 @@ def register_model(name: str, model: type) -> None:
 
 
 def registered() -> tuple[str, ...]:
-    """The names of the registered models, and of those that installed packages declare."""
+    """Returns the names of the registered models, and of those that installed packages declare."""
     return (*_REGISTERED, *(entry.name for entry in entry_points(group=GROUP)))
 
 

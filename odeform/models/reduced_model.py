@@ -71,7 +71,7 @@ class ReducedModel(Predictor):
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
-        """y(t) for inputs theta (P,), solved at least to `until` seconds, without `dynamics`."""
+        """Solves y(t) for inputs theta (P,), solved at least to `until` seconds, without `dynamics`."""
 
     def _continued(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -83,7 +83,7 @@ class ReducedModel(Predictor):
         return continued(solved, self.dynamics, theta, window)
 
     def inputs(self, parameters: Parameters) -> Floats:
-        """(P,) normalised parameters, soft-clipped by `reach`."""
+        """Computes (P,) normalised parameters, soft-clipped by `reach`."""
         return self.batch_inputs([parameters])[0]
 
     def batch_inputs(self, sets: Sequence[Parameters]) -> Floats:

@@ -31,7 +31,7 @@ Kind = TypeVar("Kind", bound=Predictor)
 
 
 def model_class(name: str) -> type[Predictor]:
-    """The class of a model, or of an alias of one; `InputError` for any other name.
+    """Returns the class of a model, or of an alias of one; `InputError` for any other name.
 
     Besides those of this package there are models that a program registered (`odeform.models.plugins`), and those that
     installed packages declare. No code is imported because a checkpoint names it.
@@ -42,13 +42,14 @@ def model_class(name: str) -> type[Predictor]:
         return getattr(importlib.import_module(module), attribute)
     found = plugged_in(known)
     if found is None:
-        raise InputError(f"unknown model {name!r}: expected one of {', '.join((*MODELS, *registered()))}")
+        names = ", ".join((*MODELS, *registered()))
+        raise InputError(f"unknown model {name!r}: expected one of {names}; a file of your own is named by --plugin")
     return found
 
 
 def open_checkpoint(name: str | Path) -> Checkpoint:
-    """A checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE or
-    SCENE/MODEL. `InputError` for anything else."""
+    """Opens a checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE
+    or SCENE/MODEL. `InputError` for anything else."""
     path = resolve_checkpoint(str(name))
     if path.suffix.lower() == ENDING:
         return read_authors_checkpoint(path)

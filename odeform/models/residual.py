@@ -32,7 +32,8 @@ class FrameRegression(Protocol):
     """A regression of whole motions."""
 
     def frames(self, inputs: Any) -> Float[np.ndarray, "*batch times y"]:
-        """(T, 6 + K) at the residual's frames, from what causes the motion; (B, T, 6 + K) from what causes several."""
+        """Computes (T, 6 + K) at the residual's frames, from what causes the motion; (B, T, 6 + K) from what causes
+        several."""
         ...
 
 
@@ -50,11 +51,11 @@ class Residual:
 
     @property
     def stop(self) -> float:
-        """s: the last of its frames."""
+        """The time of its last frame, s."""
         return float(self.times[-1])
 
     def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "*batch times y"]]:
-        """(T,) s -> (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
+        """Maps (T,) s to (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
         several motions, (B, T, 6 + K)."""
         frames = self.regression.frames(inputs) * self._factors
         return lambda times: self._spline(np.clip(times, self.times[0], self.times[-1])) @ frames
@@ -95,17 +96,17 @@ class Residual:
         added_at, taken, stop = self.over_time(inputs), self._taken, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
-            share = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
+            fading = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
             out = y.copy()
-            out[..., POSE:] += share * (added_at(times) - taken * y)[..., POSE:]
+            out[..., POSE:] += fading * (added_at(times) - taken * y)[..., POSE:]
             return out
 
         return adjust
 
 
 def weight_of(parts: Mapping[str, float], scale: Float[np.ndarray, " coefficients"]) -> Float[np.ndarray, " y"]:
-    """(6 + K,) weights of coordinates, from those of shift, rotation and deformation, and the scale (K,) of the
-    deformation's coefficients."""
+    """Computes (6 + K,) weights of coordinates, from those of shift, rotation and deformation, and the scale (K,) of
+    the deformation's coefficients."""
     out = np.concatenate([np.ones(POSE), scale])
     for part, columns in PARTS.items():
         out[columns] *= parts[part]
@@ -135,7 +136,7 @@ class ParameterRegression:
     parts: Mapping[str, RegressedPart]
 
     def frames(self, inputs: Float[np.ndarray, "*batch parameters"]) -> Float[np.ndarray, "*batch times y"]:
-        """(T, 6 + K) at theta (P,) in [-1, 1], or (B, T, 6 + K) at theta (B, P)."""
+        """Computes (T, 6 + K) at theta (P,) in [-1, 1], or (B, T, 6 + K) at theta (B, P)."""
         out = np.zeros((*inputs.shape[:-1], *self.shape))
         for name, part in self.parts.items():
             found = part.regression(np.atleast_2d(inputs)) @ part.modes + part.mean
@@ -143,7 +144,7 @@ class ParameterRegression:
         return out
 
     def jet(self, theta: Float[np.ndarray, " parameters"]) -> Float[np.ndarray, "jet times y"]:
-        """(1 + P, T, 6 + K) at theta (P,) in [-1, 1]: the frames, and their derivatives by each parameter."""
+        """Computes (1 + P, T, 6 + K) at theta (P,) in [-1, 1]: the frames, and their derivatives by each parameter."""
         out = np.zeros((1 + len(theta), *self.shape))
         for name, part in self.parts.items():
             found = part.regression.jet(theta) @ part.modes
@@ -161,7 +162,7 @@ class ParameterRegression:
         return ParameterRegression((frames, POSE + modes), parts)
 
     def residual(self, times: Times) -> Residual:
-        """The residual with these frames at `times` (T,) s."""
+        """Returns the residual with these frames at `times` (T,) s."""
         weights = {name: self.parts[name].weight if name in self.parts else 1.0 for name in PARTS}
         return Residual(times, weight_of(weights, np.ones(self.shape[1] - POSE)), self)
 

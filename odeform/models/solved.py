@@ -91,12 +91,12 @@ class SolvedTrajectory:
         return float("inf") if self._last.status is Status.OK else self._last.end
 
     def states(self, times: Floats) -> Floats:
-        """(T,) seconds -> (T, state)."""
+        """Maps (T,) seconds to (T, state)."""
         self._extend(float(times.max()))
         return self._sample(times)
 
     def reduced(self, times: Floats) -> Floats:
-        """(T,) seconds -> (T, 6 + K); zero at time 0."""
+        """Maps (T,) seconds to (T, 6 + K); zero at time 0."""
         times = np.asarray(times, dtype=float)
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))

@@ -67,7 +67,7 @@ class SolvedBatch:
         ]
 
     def states(self, times: Times) -> Float[np.ndarray, "batch times state"]:
-        """(T,) seconds -> (B, T, n)."""
+        """Maps (T,) seconds to (B, T, n)."""
         latest = float(times.max())
         if latest > self._until:
             # steps do not depend on the end: up to here, they are as they were
@@ -76,6 +76,6 @@ class SolvedBatch:
         return self._solution.sample(times)
 
     def reduced(self, times: Times) -> Float[np.ndarray, "batch times y"]:
-        """(T,) seconds -> (B, T, 6 + K); zero at time 0."""
+        """Maps (T,) seconds to (B, T, 6 + K); zero at time 0."""
         states = self.states(times)
         return self._readout(times, states) * (times > 0.0)[:, None]

@@ -119,7 +119,7 @@ class Motion(Remade, ABC):
 
     @abstractmethod
     def vertices(self, t: float | Times) -> Points | Frames:
-        """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
+        """Computes (N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
 
     @abstractmethod
     def pose(self, t: float | Times) -> Pose:
@@ -131,19 +131,20 @@ class Motion(Remade, ABC):
 
     @abstractmethod
     def deformed(self, t: float) -> Points:
-        """D(t)(P0), the deformed body before the rigid motion `pose(t)`: (N, 3) float32 metres."""
+        """Returns D(t)(P0), the deformed body before the rigid motion `pose(t)`: (N, 3) float32 metres."""
 
     @abstractmethod
     def covariances(self, t: float) -> Matrices:
-        """Covariances of splats at `t` seconds: F S F^T, F the deformation gradient; (N, 3, 3) float32 m^2."""
+        """Returns the covariances of splats at `t` seconds: F S F^T, F the deformation gradient; (N, 3, 3) float32
+        m^2."""
 
     @abstractmethod
     def deformed_covariances(self, t: float) -> Matrices:
-        """Covariances of splats before the rigid motion, those of `deformed(t)`: (N, 3, 3) m^2."""
+        """Returns the covariances of splats before the rigid motion, those of `deformed(t)`: (N, 3, 3) m^2."""
 
     @abstractmethod
     def deformation_bound(self, time: float) -> float:
-        """An upper bound on the local displacement of every point at `time` seconds, in metres."""
+        """Returns an upper bound on the local displacement of every point at `time` seconds, in metres."""
 
     @abstractmethod
     def deformation_rms(self, times: Times) -> Times:

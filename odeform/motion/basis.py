@@ -36,7 +36,7 @@ class DisplacementBasis:
         return self.weights.shape[1] // 3
 
     def first(self, count: int) -> "DisplacementBasis":
-        """The basis of the first `count` modes."""
+        """Returns the basis of the first `count` modes."""
         return replace(self, weights=self.weights[:, : 3 * count])
 
     @cached_property
@@ -50,7 +50,7 @@ class DisplacementBasis:
         return scaled, away, soft_clip(away, self._far, 0.5 * self._far)
 
     def values(self, points: Points, out: Float[np.ndarray, "modes points 3"] | None = None) -> Basis:
-        """phi at `points` (N, 3) metres about the anchor -> (N, 3, K) float32.
+        """Evaluates phi at `points` (N, 3) metres about the anchor: (N, 3, K) float32.
 
         A view of an array with the modes first (`out`, if given), so that frames are c @ values at the speed of memory
         or arithmetic.
@@ -70,7 +70,7 @@ class DisplacementBasis:
     def slopes(
         self, points: Points, directions: Float[np.ndarray, "points directions 3"]
     ) -> Float[np.ndarray, "modes directions 3 points"]:
-        """(grad phi) d at `points` (N, 3) along `directions` (N, M, 3) -> (K, M, 3, N) float32, metre per metre.
+        """Maps (grad phi) d at `points` (N, 3) along `directions` (N, M, 3) to (K, M, 3, N) float32, metre per metre.
 
         The modes come first, so that a frame is c @ slopes at memory speed.
         """
@@ -104,7 +104,7 @@ def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
 
 
 def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
-    """The basis with the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
+    """Fits the basis with the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
     system = np.block([[_squares(centers, centers) ** 1.5, tail], [tail.T, np.zeros((4, 4))]])

@@ -31,7 +31,7 @@ class BatchTrajectory(Protocol):
         ...
 
     def reduced(self, times: Times) -> Coordinates:
-        """(T,) seconds -> (B, T, 6 + K)."""
+        """Maps (T,) seconds to (B, T, 6 + K)."""
         ...
 
 
@@ -43,16 +43,16 @@ class AdjustedBatch:
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:
-        """(B,) of `inner`."""
+        """As they are of `inner`, (B,)."""
         return self.inner.ok
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) of `inner`."""
+        """As they are of `inner`, (B,)."""
         return self.inner.stats
 
     def reduced(self, times: Times) -> Coordinates:
-        """(T,) s -> (B, T, 6 + K)."""
+        """Maps (T,) s to (B, T, 6 + K)."""
         return self._adjust(times, self.inner.reduced(times))
 
 
@@ -72,11 +72,11 @@ class PiecewiseBatch:
 
     @property
     def stats(self) -> list[SolveStats]:
-        """(B,) of `inner`."""
+        """As they are of `inner`, (B,)."""
         return self.inner.stats
 
     def reduced(self, times: Times) -> Coordinates:
-        """(T,) s -> (B, T, 6 + K)."""
+        """Maps (T,) s to (B, T, 6 + K)."""
         later = times > self._stop
         if not later.any():
             return self.inner.reduced(times)

@@ -27,8 +27,8 @@ class CheckedBody:
     limit: float
 
     def sample(self, predicted: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Sample:
-        """At predictions (T, 6 + K), not yet bounded, in metres and radians, after `windows` (T,) as in
-        `ReducedSpace.bounded`."""
+        """Samples the body at predictions (T, 6 + K), not yet bounded, in metres and radians, after `windows` (T,)
+        as in `ReducedSpace.bounded`."""
         space = self.all.space
         with np.errstate(all="ignore"):
             deformation = np.sqrt(np.square(predicted[:, POSE:]).sum(axis=1)) / space.largest[1]
@@ -36,7 +36,8 @@ class CheckedBody:
             return Sample(heights, deformation, rotation @ self._centre + shift + space.anchor)
 
     def lowest(self, predicted: Float[np.ndarray, "times y"]) -> Times:
-        """(T,) height in metres of the lowest point, at predictions (T, 6 + K) within the trained window."""
+        """Computes the heights (T,) in metres of the lowest point, at predictions (T, 6 + K) within the trained
+        window."""
         with np.errstate(all="ignore"):
             return self._at(self.all.space.bounded(predicted, np.ones(len(predicted))))[0]
 

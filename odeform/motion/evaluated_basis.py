@@ -35,7 +35,7 @@ class EvaluatedBasis:
     reach: Float[np.ndarray, " modes"]
     """Largest displacement of any point by each mode."""
     areas: Perpoint
-    """Share of the surface at each point."""
+    """Fraction of the surface at each point."""
 
     @property
     def values(self) -> Float[np.ndarray, "modes entries"]:

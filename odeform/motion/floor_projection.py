@@ -36,7 +36,7 @@ class FloorProjection:
         self._inner, self._lowest, self._limit, self._grid = inner, lowest, limit, grid
 
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
-        """Coordinates (T, 6 + K) of `inner` at (T,) s -> (T, 6 + K); of many motions, (B, T, 6 + K)."""
+        """Maps coordinates (T, 6 + K) of `inner` at (T,) s to (T, 6 + K); of many motions, (B, T, 6 + K)."""
         if self._grid is None or times.min() > self._grid[-1]:
             return raised(y, self._lowest, self._limit)
         return _moved_up(y, self._between(times, y, self._grid))
@@ -60,7 +60,7 @@ class FloorProjection:
 
 
 def raised(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Float[np.ndarray, "*batch times y"]:
-    """Coordinates (..., T, 6 + K), each moment raised by itself; the others as of `FloorProjection`."""
+    """Returns coordinates (..., T, 6 + K), each moment raised by itself; the others as of `FloorProjection`."""
     return _moved_up(y, _missing(y, lowest, limit))
 
 

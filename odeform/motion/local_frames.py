@@ -42,7 +42,7 @@ class LocalFrames:
     slopes: Float[np.ndarray, "modes followed 3 points"]
 
     def carried(self, coefficients: Float[np.ndarray, " modes"]) -> Axes:
-        """The axes P under the deformation of `coefficients` (K,): finite and within `BOUND` for any values."""
+        """Returns the axes P under the deformation of `coefficients` (K,): finite and within `BOUND` for any values."""
         modes, followed, _, count = self.slopes.shape
         out = np.empty((3, 3, count), dtype=np.float32)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -59,7 +59,7 @@ class LocalFrames:
 
 
 def evaluate_local_frames(rest: Points, space: ReducedSpace) -> LocalFrames:
-    """Local frames at the canonical points `rest` (N, 3) metres."""
+    """Evaluates local frames at the canonical points `rest` (N, 3) metres."""
     if space.surface is None:
         axes = np.broadcast_to(np.eye(3)[..., None], (3, 3, len(rest)))
     else:
@@ -74,7 +74,7 @@ def gradients(rest: Axes, carried: Axes) -> Matrices:
 
 
 def moved_covariances(local: Axes, carried: Axes) -> Matrices:
-    """P (Q^T S Q) P^T, (N, 3, 3), from `local` (3, 3, N), the covariances in the axes of their local frames."""
+    """Returns P (Q^T S Q) P^T, (N, 3, 3), from `local` (3, 3, N), the covariances in the axes of their local frames."""
     half = np.einsum("jkn,kin->jin", local, carried)
     return np.einsum("jin,jln->nil", carried, half)
 

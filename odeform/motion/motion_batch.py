@@ -75,9 +75,9 @@ class MotionBatch(Remade, Sequence[Motion]):
         return tuple(motion.status for motion in self)
 
     def vertices(self, t: float | Times) -> BatchVertices:
-        """(B, N, 3) float32 metres at time `t` in seconds; (B, T, N, 3) for (T,) times."""
+        """Computes (B, N, 3) float32 metres at time `t` in seconds; (B, T, N, 3) for (T,) times."""
         return np.stack([motion.vertices(t) for motion in self])
 
     def pose(self, t: float | Times) -> BatchPoses:
-        """The rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
+        """Returns the rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
         return np.stack([motion.pose(t) for motion in self])

@@ -191,8 +191,8 @@ class PlausibilityCheck:
 def energy_of(
     times: Times, centres: Float[np.ndarray, "*batch times 3"], ground: float | Floats, gravity: float
 ) -> Floats:
-    """(..., T - 2) energies of centres (..., T, 3) m above `ground` m, per mass, at all but the first and the last of
-    evenly spaced `times` (T,) s."""
+    """Computes (..., T - 2) energies of centres (..., T, 3) m above `ground` m, per mass, at all but the first and the
+    last of evenly spaced `times` (T,) s."""
     with np.errstate(all="ignore"):
         speed = (centres[..., 2:, :] - centres[..., :-2, :]) / (times[2:] - times[:-2])[:, None]
         return gravity * (centres[..., 1:-1, 2] - ground) + 0.5 * (speed**2).sum(axis=-1)

@@ -41,7 +41,7 @@ class PointTrajectory(Protocol):
         ...
 
     def displacements(self, times: Times) -> Frames:
-        """(T,) seconds -> (T, N, 3) metres in canonical axes; zero at time 0."""
+        """Maps (T,) seconds to (T, N, 3) metres in canonical axes; zero at time 0."""
         ...
 
 
@@ -83,7 +83,7 @@ class PointFrame:
     part_scale: float
 
     def inputs(self, rest: Vectors) -> Points:
-        """(N, 3) metres relative to the anchor -> units of the radius of gyration, float32.
+        """Maps (N, 3) metres relative to the anchor to units of the radius of gyration, float32.
 
         Points farther away than one and a half times `reach` are pulled in along their ray, to at most twice `reach`,
         so that inputs of networks are bounded.
@@ -93,7 +93,8 @@ class PointFrame:
         return (rest * (near / away) / self.gyration_radius).astype(np.float32)
 
     def bounded(self, displacements: Frames) -> Frames:
-        """Bit-exact up to a quarter above the largest trained displacement; soft-clipped beyond."""
+        """Bounds displacements: bit-exact up to a quarter above the largest trained displacement; soft-clipped
+        beyond."""
         limit = MARGIN * self.largest
         size = np.linalg.norm(displacements, axis=-1, keepdims=True)
         if not (size > limit).any():
@@ -112,7 +113,7 @@ class Probes:
 
 
 def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
-    """Vertices spread over the body, each the farthest from the ones before (Gonzalez 1985)."""
+    """Chooses vertices spread over the body, each the farthest from the ones before (Gonzalez 1985)."""
     points = to_canonical(rest.points, anchor, 0.0)
     chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)
     nearest = np.zeros(len(points), dtype=int)

@@ -70,7 +70,7 @@ class RecordedMotion:
         return time > self.end + 1e-9
 
     def vertices(self, t: float | Times) -> Points | Frames:
-        """(N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
+        """Computes (N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""
         out = self._splines[0](np.clip(checked_times(t), 0.0, self.end)).astype(np.float32)
         return out[0] if np.ndim(t) == 0 else out
 
@@ -89,7 +89,7 @@ class RecordedMotion:
         return ((self.vertices(t) - pose[:3, 3]) @ pose[:3, :3]).astype(np.float32)
 
     def deformation_bound(self, time: float) -> float:
-        """The largest local displacement of any point at `time`, in metres."""
+        """Returns the largest local displacement of any point at `time`, in metres."""
         return float(np.linalg.norm(self.deformed(time) - self.sequence.vertices[0], axis=1).max())
 
     def deformation_rms(self, times: Times) -> Times:

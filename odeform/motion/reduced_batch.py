@@ -83,7 +83,7 @@ class ReducedBatch(MotionBatch):
         return tuple("ok" if ok else self[index].status for index, ok in enumerate(np.concatenate(good)))
 
     def vertices(self, t: float | Times) -> BatchVertices:
-        """(B, N, 3) float32 metres at time `t` in seconds; (B, T, N, 3) for (T,) times."""
+        """Computes (B, N, 3) float32 metres at time `t` in seconds; (B, T, N, 3) for (T,) times."""
         count = len(self._basis(float(self._parts[0].azimuths[0])).points)
 
         def move(azimuth: float, y: Coordinates, out: Floats, rows: Ints) -> None:
@@ -97,7 +97,7 @@ class ReducedBatch(MotionBatch):
         return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
 
     def pose(self, t: float | Times) -> BatchPoses:
-        """The rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
+        """Returns the rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
 
         def place(azimuth: float, y: Coordinates, out: Floats, rows: Ints) -> None:
             space = self._basis(azimuth).space

@@ -67,7 +67,8 @@ class ReducedMotion(Motion):
         return self.space.bounded(self.trajectory.reduced(times), self.schema.window.passed(times))
 
     def coordinates(self, t: float | Times) -> Float[np.ndarray, "times body_y"]:
-        """(T, 6 + K) in metres and radians, double precision: pose and deformation at (T,) seconds, or at one."""
+        """Computes (T, 6 + K) in metres and radians, double precision: pose and deformation at (T,) seconds, or at
+        one."""
         return self._reduced(t)
 
     def vertices(self, t: float | Times) -> Points | Frames:
@@ -87,7 +88,7 @@ class ReducedMotion(Motion):
         return self.evaluated.points + self.local(t)
 
     def gradients(self, t: float) -> Matrices:
-        """F(t) = dP/dP0 at each point: (N, 3, 3), float32, with singular values within `local_frames.BOUND`.
+        """Returns F(t) = dP/dP0 at each point: (N, 3, 3), float32, with singular values within `local_frames.BOUND`.
 
         Data on a surface determine the tangential part alone: the unit normal there is mapped to that of the deformed
         surface, and a point off the surface has the normal of the nearest point on it.
@@ -97,7 +98,7 @@ class ReducedMotion(Motion):
         return gradients(_turned(self.evaluated.local_frames.rest, self._to_scene_axes), carried)
 
     def rotations(self, t: float) -> Matrices:
-        """(N, 3, 3) the rotation nearest to F(t) at each point: its polar factor."""
+        """Computes (N, 3, 3) the rotation nearest to F(t) at each point: its polar factor."""
         u, _, vt = np.linalg.svd(self.gradients(t))
         u[:, :, 2] *= np.linalg.det(u @ vt)[:, None]
         return u @ vt
@@ -163,7 +164,8 @@ def placements(space: ReducedSpace, y: Floats, azimuth: float) -> tuple[Floats, 
 
 
 def moved_points(evaluated: EvaluatedBasis, y: Floats, weights: Floats, rotations: Rotations) -> Frames:
-    """(T, N, 3) float32 metres: the points of a geometry under coordinates `y` (T, 6 + K), from their `placements`."""
+    """Computes (T, N, 3) float32 metres: the points of a geometry under coordinates `y` (T, 6 + K), from their
+    `placements`."""
     count = len(evaluated.points)
     if not len(y):
         return np.empty((0, count, 3), dtype=np.float32)
@@ -188,7 +190,7 @@ def moved_points(evaluated: EvaluatedBasis, y: Floats, weights: Floats, rotation
 
 
 def poses_of(space: ReducedSpace, y: Floats, azimuth: float) -> Pose:
-    """(T, 4, 4) rigid parts in scene axes, metres, of coordinates `y` (T, 6 + K) at an azimuth in radians."""
+    """Computes (T, 4, 4) rigid parts in scene axes, metres, of coordinates `y` (T, 6 + K) at an azimuth in radians."""
     rotation, shift = rotation_of(y[:, :6], azimuth)
     rotation = rotation @ rotation_of(np.zeros(6), azimuth)[0].T
     out = np.zeros((len(rotation), 4, 4))

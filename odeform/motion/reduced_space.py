@@ -72,7 +72,7 @@ class ReducedSpace:
         return np.concatenate([y[:, :POSE], self.rolling.amplitudes(y[:, 3:POSE], y[:, POSE:])], axis=1)
 
     def bounded(self, y: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Floats:
-        """(T, 6 + K), bit-exact up to shifts and deformations 15 % larger than any trained.
+        """Computes (T, 6 + K), bit-exact up to shifts and deformations 15 % larger than any trained.
 
         Larger ones, from parameters far outside the trained range or from a coarse solver, are soft-clipped below 30 %,
         so that a body keeps its shape and stays nearby for any input. After `windows` (T,) of the trained window, at
@@ -117,7 +117,7 @@ class ReducedSpace:
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:
-    """(..., 3) metres in the scene -> relative to the anchor, rotated by minus the azimuth in radians."""
+    """Maps (..., 3) metres in the scene to metres relative to the anchor, rotated by minus the azimuth in radians."""
     return (np.asarray(points, dtype=float) - anchor) @ rotation_z(azimuth)
 
 
@@ -138,7 +138,8 @@ def decompose(sequence: MotionSequence, anchor: Vector, azimuth: float) -> tuple
 
 
 def fit_modes(locals_: list[Float[np.ndarray, "_ points 3"]], weights: Perpoint, modes: int) -> Basis:
-    """POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the weights."""
+    """Fits the POD of the training deformations (T, N, 3) over one topology: (N, 3, K), orthonormal under the
+    weights."""
     root = np.sqrt(weights)[:, None]
     if sum(map(len, locals_)) < 3 * len(weights):  # of many points in few frames, the frames tell the modes
         snapshots = np.concatenate([(local * root).reshape(len(local), -1) for local in locals_])

@@ -34,7 +34,7 @@ class Rolling:
 
     @property
     def patterns(self) -> int:
-        """S."""
+        """S, the number of patterns."""
         return self.harmonics.shape[2]
 
     def first(self, count: int) -> "Rolling":
@@ -42,11 +42,11 @@ class Rolling:
         return replace(self, harmonics=self.harmonics[..., :count])
 
     def angles(self, vectors: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch"]:
-        """(...) angles in radians of rotation vectors (..., 3)."""
+        """Computes (...) angles in radians of rotation vectors (..., 3)."""
         return vectors @ self.axis
 
     def matrices(self, angles: Float[np.ndarray, " times"]) -> Float[np.ndarray, "times modes patterns"]:
-        """M at angles (T,)."""
+        """Returns M at angles (T,)."""
         phases = np.outer(angles, np.arange(1, len(self.harmonics) // 2 + 1))
         terms = np.concatenate([np.ones((len(angles), 1)), np.cos(phases), np.sin(phases)], axis=1)
         flat = self.harmonics.reshape(len(self.harmonics), -1)
@@ -55,7 +55,7 @@ class Rolling:
     def coefficients(
         self, vectors: Float[np.ndarray, "times 3"], patterns: Float[np.ndarray, "times patterns"]
     ) -> Float[np.ndarray, "times modes"]:
-        """(T, K) of the modes, under rotation vectors (T, 3) and amplitudes (T, S) of the patterns."""
+        """Computes (T, K) of the modes, under rotation vectors (T, 3) and amplitudes (T, S) of the patterns."""
         return np.einsum("tkj,tj->tk", self.matrices(self.angles(vectors)), patterns)
 
     def amplitudes(

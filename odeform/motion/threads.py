@@ -20,7 +20,7 @@ def _pool() -> ThreadPoolExecutor:
 
 
 def thread_map(work: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """`work` on each item, in order, one thread per core; each inherits the caller's cancellation."""
+    """Does `work` on each item, in order, one thread per core; each inherits the caller's cancellation."""
     items = list(items)
     contexts = [copy_context() for _ in items]
     return list(_pool().map(lambda context, item: context.run(work, item), contexts, items))

@@ -24,7 +24,7 @@ class Moving(Protocol):
     """Has reduced coordinates over time: one motion, or many."""
 
     def reduced(self, times: Times) -> Float[np.ndarray, "*batch times y"]:
-        """(T,) seconds -> (T, 6 + K), or (B, T, 6 + K)."""
+        """Maps (T,) seconds to (T, 6 + K), or (B, T, 6 + K)."""
         ...
 
 
@@ -43,7 +43,7 @@ class Trajectory(Protocol):
         ...
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) seconds -> (T, 6 + K)."""
+        """Maps (T,) seconds to (T, 6 + K)."""
         ...
 
 
@@ -64,7 +64,7 @@ class Adjusted:
         return self.inner.last_good
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + K)."""
+        """Maps (T,) s to (T, 6 + K)."""
         return self._adjust(times, self.inner.reduced(times))
 
 
@@ -77,7 +77,7 @@ class Shown(Adjusted):
         self._recent: Recent[Floats] = Recent(RECENT)
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + K)."""
+        """Maps (T,) s to (T, 6 + K)."""
         requested = np.asarray(times, dtype=float)
 
         def adjusted() -> Floats:
@@ -112,7 +112,7 @@ class Piecewise:
         return good if good < self._stop or self._later is None else self._later.last_good
 
     def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
-        """(T,) s -> (T, 6 + K)."""
+        """Maps (T,) s to (T, 6 + K)."""
         times = np.asarray(times, dtype=float)
         later = times > self._stop
         if not later.any() or self.inner.last_good < self._stop:

@@ -10,7 +10,7 @@ __all__ = ["truth_errors"]
 
 
 def truth_errors(motion: Motion, truth: RecordedMotion, times: Times) -> Floats:
-    """(T, 3) mm at (T,) s: RMSE and MAE over all coordinates, and the largest distance of a vertex.
+    """Computes (T, 3) mm at (T,) s: RMSE and MAE over all coordinates, and the largest distance of a vertex.
 
     NaN after the end of the record. `motion` must move the mesh of `truth`, vertex by vertex.
     """

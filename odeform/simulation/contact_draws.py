@@ -13,7 +13,7 @@ LEVELS = 10  # bits of each coordinate in the order of the faces
 
 
 def contact_draws(rest: Mesh, forces: tuple[float, float], count: int, seed: list[int]) -> list[tuple[Vector, Vector]]:
-    """`count` pairs of a contact (3,) m on the surface and a force (3,) N, of scrambled Sobol points.
+    """Draws `count` pairs of a contact (3,) m on the surface and a force (3,) N, of scrambled Sobol points.
 
     Contacts are uniform over the area where the sphere fits, directions over the cone about the inward normal, and
     magnitudes from the weakest to the strongest of `forces`. A longer list with the same seed starts with the shorter.
@@ -39,7 +39,8 @@ def contact_draws(rest: Mesh, forces: tuple[float, float], count: int, seed: lis
 
 
 def in_cone_about(axis: Floats, across: float, around: float) -> Vector:
-    """(3,) unit vector in the cone about a unit vector, uniform for `across` and `around` uniform in [0, 1]."""
+    """Computes a unit vector (3,) in the cone about a unit vector, uniform for `across` and `around` uniform in [0,
+    1]."""
     side = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     side /= np.linalg.norm(side)
     cosine = 1.0 - across * (1.0 - np.cos(CONE))

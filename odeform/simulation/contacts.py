@@ -15,7 +15,7 @@ __all__ = ["CONTACT", "FORCE", "MASS", "YOUNG", "complete_push", "contact_parame
 MIDDLING = 0.7  # from the weakest to the strongest force of an object: that of a push that is not given
 CONTACT, FORCE = "contact", "force"
 MASS, YOUNG = "mass", "young"
-"""Of the body in kg and kPa, where they are parameters; otherwise it has its own."""
+"""Names the parameters of the body in kg and kPa, where they are parameters; otherwise it has its own."""
 
 
 def complete_push(given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float]) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def _given(given: Mapping[str, Any], name: str) -> Vector | None:
 
 
 def vector_of(parameters: Parameters, name: str) -> Vector:
-    """(3,) the parameters NAME_x, NAME_y and NAME_z."""
+    """Computes (3,) the parameters NAME_x, NAME_y and NAME_z."""
     return np.array([float(parameters[f"{name}_{axis}"]) for axis in "xyz"])
 
 

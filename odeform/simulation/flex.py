@@ -97,7 +97,7 @@ class FlexBody:
 
     @property
     def timestep(self) -> float:
-        """Seconds."""
+        """The step of the simulation, s."""
         return self.model.opt.timestep
 
     @property

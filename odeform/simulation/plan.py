@@ -14,7 +14,7 @@ __all__ = ["counts", "finished", "plan"]
 
 
 def plan(scene: Scene, count: int, seed: int, objects: Sequence[str] = (), corners: bool = False) -> list[Entry]:
-    """`count` sequences, of each of `objects` in a scene with several (default: all of them).
+    """Plans `count` sequences, of each of `objects` in a scene with several (default: all of them).
 
     Those of one object do not depend on which others are asked for. A longer plan starts with the shorter one, in a
     scene without objects from the scene's own count on. All sequences beyond that count are for training.

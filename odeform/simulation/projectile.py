@@ -15,7 +15,7 @@ SUNK = 0.006  # m; a projectile that overlaps the body by more has passed throug
 
 
 def projectile_xml(centre: Vector, direction: Vector, contact: Contact) -> str:
-    """The body of a projectile with its centre at (3,) m, without weight.
+    """Returns the body of a projectile with its centre at (3,) m, without weight.
 
     A guide lets it move along `direction` (3,) only, without turning. Free, it would roll off a surface that it does
     not meet head-on, to one side or the other: moving a contact by 1 mm changed the motion of a flip-flop by 67 %.
@@ -45,7 +45,7 @@ class StruckBody:
 
     @property
     def timestep(self) -> float:
-        """Seconds."""
+        """The step of the simulation, s."""
         return self.body.timestep
 
     @property

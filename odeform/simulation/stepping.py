@@ -18,7 +18,7 @@ class Body(Protocol):
 
     @property
     def timestep(self) -> float:
-        """Seconds."""
+        """The step of the simulation, s."""
         ...
 
     @property

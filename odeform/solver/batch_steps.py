@@ -38,7 +38,8 @@ class BatchField(Protocol):
     """The right-hand sides of many problems."""
 
     def __call__(self, rows: Rows, times: Each, states: States) -> States:
-        """The slopes (R, n) at states (R, n) and times (R,) in s of the problems `rows` (R,), increasing indices."""
+        """Returns the slopes (R, n) at states (R, n) and times (R,) in s of the problems `rows` (R,), increasing
+        indices."""
         ...
 
 

@@ -55,7 +55,7 @@ class CompiledField:
         return machine_code(self._slope, self.dtype.name), self._shared, self._sizes
 
     def __call__(self, time: float, state: Any) -> Any:
-        """The slope (n,) at a state (n,)."""
+        """Returns the slope (n,) at a state (n,)."""
         from odeform.solver.compiled_loop import slopes_of
 
         code, shared, sizes = self.given
@@ -105,7 +105,8 @@ class Rule(NamedTuple):
 
 
 class Nodes(NamedTuple):
-    """Those of B problems, as `odeform.solver.compiled_loop.advance` writes them; the times of others are infinite."""
+    """Holds the nodes of B problems, as `odeform.solver.compiled_loop.advance` writes them; unused times are
+    infinite."""
 
     times: Float[np.ndarray, "batch nodes"]
     states: Float[np.ndarray, "batch nodes state"]
@@ -118,7 +119,7 @@ class Nodes(NamedTuple):
 
     @classmethod
     def begin(cls, times: Floats, states: Floats, slopes: Floats, bends: bool) -> "Nodes":
-        """The first nodes, at (B,) s: states (B, n) and slopes (B, n)."""
+        """Returns the first nodes, at (B,) s: states (B, n) and slopes (B, n)."""
         count, size = states.shape
 
         def room(first: Floats) -> Floats:
@@ -135,7 +136,7 @@ class Nodes(NamedTuple):
         return cls(every, room(states), room(slopes), middles, ones, rates, tallies, zeros)
 
     def doubled(self) -> "Nodes":
-        """With room for twice as many."""
+        """Returns the same with room for twice as many."""
 
         def grown(part: Floats) -> Floats:
             return np.concatenate([part, np.zeros_like(part)], axis=1)

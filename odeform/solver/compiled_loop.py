@@ -22,7 +22,7 @@ OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 @njit(**OPTIONS)
 @no_type_check
 def slopes_of(slope, own, shared, sizes, states, out):
-    """Fields `out` (B, n) at states (B, n) of problems with numbers `own` (B, k)."""
+    """Computes the fields `out` (B, n) at states (B, n) of problems with numbers `own` (B, k)."""
     for row in range(len(states)):
         slope(states[row], own[row], shared, sizes, out[row])
 
@@ -65,6 +65,24 @@ def _first_step(slope, own, shared, sizes, order, state, first, tolerance, moved
 
 @njit(**OPTIONS)
 @no_type_check
+def _step(slope, own, shared, sizes, stages, state, length, after, kept):
+    """Takes a step of `length` seconds to `after` (n,), from the slope kept[0]; the others (E, n) are added to it."""
+    for stage in range(len(stages)):
+        _add(after, state, length, stages[stage, : stage + 1], kept)
+        slope(after, own, shared, sizes, kept[stage + 1])
+
+
+@njit(**OPTIONS)
+@no_type_check
+def _is_finite(one, other):
+    total = 0.0
+    for k in range(len(one)):
+        total += one[k] + other[k]
+    return math.isfinite(total)
+
+
+@njit(**OPTIONS)
+@no_type_check
 def advance(
     slope, own, shared, sizes, stages, error, middle, order, gains, step, tolerance, most, begin, until,
     times, states, slopes, middles, counts, rates, tallies, ended,
@@ -77,17 +95,15 @@ def advance(
     (B, 2) are the next step and the last ratio of error and tolerance; `tallies` (B, 3) steps taken before the first
     node, rejected steps and evaluations, none where the first slope is not known; `ended` (B,) how each problem ended.
     """
-    size, evaluations = states.shape[2], len(stages)
+    size, evaluations, fixed = states.shape[2], len(stages), step > 0.0
     kept = np.empty((evaluations + 1, size), states.dtype)
     after, apart, nothing = np.empty(size, states.dtype), np.empty(size, states.dtype), np.zeros(size, states.dtype)
     for row in range(len(times)):
-        at, longest = counts[row] - 1, GROW
-        mine, fixed = own[row], step > 0.0
-        ended[row] = DONE
+        at, longest, mine, ended[row] = counts[row] - 1, GROW, own[row], DONE
         if tallies[row, 2] == 0:
             slope(states[row, at], mine, shared, sizes, slopes[row, at])
             tallies[row, 2] = 1
-            if not math.isfinite(_rms(states[row, at]) + _rms(slopes[row, at])):
+            if not _is_finite(states[row, at], slopes[row, at]):
                 ended[row] = NON_FINITE
                 continue
         if not fixed and rates[row, 0] == 0.0:
@@ -109,15 +125,10 @@ def advance(
                 ended[row] = STUCK
                 break
             kept[0] = slopes[row, at]
-            for stage in range(evaluations):
-                _add(after, state, length, stages[stage, : stage + 1], kept)
-                slope(after, mine, shared, sizes, kept[stage + 1])
+            _step(slope, mine, shared, sizes, stages, state, length, after, kept)
             tallies[row, 2] += evaluations
             if fixed:
-                total = 0.0
-                for k in range(size):
-                    total += after[k] + kept[evaluations, k]
-                if not math.isfinite(total):
+                if not _is_finite(after, kept[evaluations]):
                     ended[row] = NON_FINITE
                     break
                 times[row, at + 1] = begin + (taken + 1) * step

@@ -16,7 +16,7 @@ class StiffField(Protocol):
     """A field that knows how to solve for its own steps."""
 
     def __call__(self, time: float, state: Any) -> Any:
-        """The slope (n,) at `time` in s."""
+        """Returns the slope (n,) at `time` in s."""
         ...
 
     def advance(self, time: float, state: Any, step: float) -> tuple[Any, Any, float]:

@@ -58,5 +58,5 @@ class Method(Protocol):
         ...
 
     def stepper(self, start: Any) -> Stepper:
-        """For states like `start`, an array (n,)."""
+        """Returns a stepper for states like `start`, an array (n,)."""
         ...

@@ -19,7 +19,7 @@ METHODS: dict[str, Method] = {
 
 
 def get_method(name: str) -> Method:
-    """The method of that name. Raises `InputError` for an unknown one."""
+    """Returns the method of that name. Raises `InputError` for an unknown one."""
     if name not in METHODS:
         raise InputError(f"unknown solver {name!r}: expected one of {', '.join(METHODS)}")
     return METHODS[name]

@@ -17,7 +17,7 @@ __all__ = ["ExplicitRungeKutta", "Stages", "Weights", "gemv", "weights_of"]
 
 
 def gemv(dtype: np.dtype) -> Callable[..., Any]:
-    """(alpha, a, x, beta=0, y=0) -> alpha a x + beta y: by BLAS, or by numpy in precisions that BLAS lacks."""
+    """Maps (alpha, a, x, beta=0, y=0) to alpha a x + beta y: by BLAS, or by numpy in precisions that BLAS lacks."""
     if dtype.char in "fd":
         return get_blas_funcs(("gemv",), dtype=dtype)[0]
     return lambda alpha, a, x, beta=0.0, y=0.0: alpha * (a @ x) + beta * y

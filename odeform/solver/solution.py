@@ -67,7 +67,8 @@ class Solution:
         return self.times[-1]
 
     def at(self, time: float) -> Any:
-        """(n,) state at `time` in seconds, clamped to the integrated span. Cubic Hermite, or quartic with middles."""
+        """Computes the state (n,) at `time` in seconds, clamped to the integrated span. Cubic Hermite, or quartic with
+        middles."""
         last = self.steps - 1  # once: the solution may be growing
         if last < 0:
             return self.states[0]
@@ -82,7 +83,7 @@ class Solution:
         return between(weights, y0, y1, f0, f1, middle)
 
     def sample(self, times: Floats) -> Any:
-        """(T, n) states at `times` (T,) s, bit-identical to `at`."""
+        """Samples states (T, n) at `times` (T,) s, bit-identical to `at`."""
         if self.steps == 0 or len(times) == 1:
             return np.stack([self.at(float(time)) for time in times])
         nodes = np.asarray(self.times)

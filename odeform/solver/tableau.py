@@ -33,19 +33,19 @@ class Tableau:
 
 
 def rounded(weights: Row, dtype: np.dtype) -> Floats:
-    """The fractions (S,) in a precision, each correctly rounded to double precision at least."""
+    """Returns the fractions (S,) in a precision, each correctly rounded to double precision at least."""
     if dtype.char in "fd":
         return np.array([float(weight) for weight in weights], dtype)
     return np.array([dtype.type(weight.numerator) / dtype.type(weight.denominator) for weight in weights], dtype)
 
 
 def row(text: str) -> Row:
-    """ "1/2 0 1" as fractions."""
+    """Parses "1/2 0 1" as fractions."""
     return tuple(Fraction(number) for number in text.split())
 
 
 def rows(*texts: str) -> tuple[Row, ...]:
-    """A row for each text."""
+    """Parses a row of each text."""
     return tuple(row(text) for text in texts)
 
 

@@ -69,7 +69,8 @@ def _edges(schema: Schema, scale: float) -> list[dict[str, Any]]:
 
 
 def extreme_cases(schema: Schema, methods: tuple[str, ...], count: int, seed: int) -> list[Case]:
-    """`count` distinct cases, fixed by the seed: corners and extremes (some, if `count` is small), then random ones.
+    """Draws `count` distinct cases, fixed by the seed: corners and extremes (some, if `count` is small), then random
+    ones.
 
     Solvers are those of `methods`; a model that is not integrated has none.
     """
@@ -129,7 +130,7 @@ def _controlled(methods: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def random_quality(rng: np.random.Generator, window: float, methods: tuple[str, ...]) -> SolverSettings:
-    """Random solver settings of one of the `methods`, for a window of `window` seconds."""
+    """Draws random solver settings of one of the `methods`, for a window of `window` seconds."""
     dtype = str(rng.choice(DTYPES))
     if rng.random() < 0.5:
         return SolverSettings(str(rng.choice(methods)), step=window / 4.0 ** float(rng.uniform(1.0, 4.0)), dtype=dtype)
@@ -142,13 +143,13 @@ SHAPES = ("one point", "duplicate points", "1e-6 m", "1e6 m", "1e6 m away", "a m
 
 
 def subsampled(rest: Mesh) -> PointCloud:
-    """About 400 points of a body, which represent the motion of all."""
+    """Returns about 400 points of a body, which represent the motion of all."""
     points = np.asarray(rest.points, dtype=np.float32)
     return PointCloud(points[:: max(len(points) // 400, 1)])
 
 
 def shapes(rest: Mesh) -> dict[str, Geometry]:
-    """Some of the body's own points as "body", and odd shapes by name."""
+    """Returns some of the body's own points as "body", and odd shapes by name."""
     points, few = np.asarray(rest.points, dtype=np.float32), subsampled(rest).points
     rng = np.random.default_rng(0)
     centre = points.mean(axis=0)

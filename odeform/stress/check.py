@@ -23,7 +23,7 @@ class Check:
         )
 
     def to_json(self) -> dict[str, Any]:
-        """`holds`, `figure` (None: not finite) and `bound`."""
+        """Returns `holds`, `figure` (None: not finite) and `bound`."""
         return {
             "holds": self.holds,
             "figure": self.figure if math.isfinite(self.figure) else None,

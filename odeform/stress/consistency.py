@@ -15,7 +15,8 @@ SAMPLES = 6
 
 
 def check_consistency(predictor: Predictor, seed: int = 0) -> Checks:
-    """The same motion for any set and order of times, repeated solves, parts of a shape, and both precisions."""
+    """Checks that a motion is the same for any set and order of times, repeated solves, parts of a shape, and both
+    precisions."""
     window, rng = predictor.schema.window, np.random.default_rng(seed)
     times = window.times
     grid = order = again = part = precision = 0.0

@@ -50,7 +50,8 @@ def _order(field: Field, start: Floats, method: Method, span: float) -> float:
 
 
 def check_orders(model: LatentModel, seed: int = 0) -> Checks:
-    """`order_METHOD_deviation`: difference between the observed order and the method's own, on the model's field."""
+    """Returns `order_METHOD_deviation`: difference between the observed order and the method's own, on the model's
+    field."""
     evaluated, schema = model.evaluate_basis(model.rest, 0.0), model.schema
     fields = {dtype: make_field(model.weights, model.config, dtype) for dtype in (np.float64, np.longdouble)}
     methods = methods_of(model)

@@ -15,7 +15,7 @@ SAMPLES = 24
 
 
 def check_physics(predictor: Predictor, seed: int = 0) -> Checks:
-    """The worst figure of each of the scene's checks, over random motions at the trained frames."""
+    """Finds the worst figure of each of the scene's checks, over random motions at the trained frames."""
     scene = find_scene(predictor.schema.scene)
     checks = scene.checks if scene is not None else STANDARD_CHECKS
     worst: dict[str, float | int] = {}

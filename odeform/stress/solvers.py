@@ -25,7 +25,7 @@ HALF_STEP = 0.005  # in halves of the trained range: half a slider step of 1/200
 
 
 def check_field(model: Model, seed: int = 0) -> Checks:
-    """Growth of differences and of the state.
+    """Returns the growth of differences and of the state.
 
     `lyapunov_per_s`: largest finite-time Lyapunov exponent over the window, from the derivative of the final state by
     the initial one; the bound lets rounding in single precision grow to a thousandth. `state_growth`: largest latent
@@ -73,7 +73,7 @@ def _divergence(model: Model, seed: int) -> float:
 
 def check_calibration(model: Model, seed: int = 0) -> Checks:
     """Reported solver errors against those measured with tolerance 1e-11: their rank correlation (Spearman), and the
-    share of solves in which they are within a factor of 2.
+    fraction of solves in which they are within a factor of 2.
 
     Half of the motions are inside the trained box, the others up to ten times beyond it. Settings are the model's
     qualities and random ones; solves without an estimate are left out. `..._inside` counts the trained box alone.

@@ -13,6 +13,7 @@ from odeform.types import Floats, Times
 
 __all__ = ["StabilityMap", "largest_deformation", "map_image", "stability_map"]
 
+MOTIONS = 32  # of the trained box, that tell how large deformations are
 MOMENTS = (0.5, 1.0, 1.5, 3.0, 10.0)
 CELL, GAP = 8, 24  # pixels
 SCALE = np.array([[247, 247, 242], [253, 212, 120], [240, 120, 60], [170, 20, 60]], dtype=float)
@@ -38,10 +39,10 @@ class StabilityMap:
     """The trained range of each parameter, with its unit."""
 
 
-def largest_deformation(predictor: Predictor, count: int = 32, seed: int = 0) -> float:
-    """Largest RMS deformation in metres of `count` random motions of the trained box, within the trained window."""
+def largest_deformation(predictor: Predictor) -> float:
+    """Returns the largest RMS deformation in metres of random motions of the trained box, within the trained window."""
     times = predictor.schema.window.times
-    motions = (predictor.solve(None, parameters) for parameters in inside(predictor.schema, count, seed))
+    motions = (predictor.solve(None, parameters) for parameters in inside(predictor.schema, MOTIONS, 0))
     return max(float(motion.deformation_rms(times).max()) for motion in motions)
 
 
@@ -51,7 +52,6 @@ def stability_map(
     scale: float = 3.0,
     count: int = 25,
     moments: tuple[float, ...] = MOMENTS,
-    quality: str = "balanced",
 ) -> StabilityMap:
     """Solve `count` x `count` values of two parameters (default: the first two), up to `scale` times the trained box.
 
@@ -65,7 +65,7 @@ def stability_map(
     values, sound = np.empty((len(times), count, count)), np.empty((len(times), count, count), dtype=bool)
     for i, j in np.ndindex(count, count):
         given = {first.name: first.denormalise(float(units[j])), second.name: second.denormalise(float(units[i]))}
-        motion = predictor.solve(None, given, quality, until=times[-1])
+        motion = predictor.solve(None, given, until=times[-1])
         values[:, i, j] = motion.deformation_rms(times)
         solved = schema.window.soft_clamped(times) <= motion.last_good
         sound[:, i, j] = solved & [motion.stop_at(time) is None for time in times.tolist()]

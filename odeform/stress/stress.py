@@ -94,7 +94,7 @@ def _status(motion: Motion, times: Times) -> str:
 
 
 def stress(checkpoint: str, count: int = CASES, seed: int = 0, draws: int = DRAWS) -> dict[str, Any]:
-    """`count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
+    """Runs `count` distinct cases, `draws` motions inside the trained box and all checks, as JSON.
 
     Of pushed objects, `draws` pushes until they rest.
 
@@ -189,7 +189,7 @@ def _coarse(case: Case, window: Window) -> bool:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """The result as text, one line per status and check."""
+    """Returns the result as text, one line per status and check."""
     lines = [f"{result['cases']} cases, {result['non_finite_shown']} non-finite frames"]
     lines += [f"{count:>8} {status}" for status, count in result["by_status"].items()]
     if inside := result.get("inside"):

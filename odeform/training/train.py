@@ -115,7 +115,8 @@ def fit(
     seconds = trained.config.get("val", {}).get("seconds", time.process_time() - begin)
     provenance = {**_provenance(dataset, request, seconds), **trained.provenance}
     checkpoint = scored(replace(trained, provenance=provenance), dataset, parts)
-    report(f"test: pooled RMSE {checkpoint.scores['rmse_pooled_mm']:.3f} mm")
+    beyond = "" if window is None else f", with frames outside of {window[0]}:{window[1]}"
+    report(f"test: pooled RMSE {checkpoint.scores['rmse_pooled_mm']:.3f} mm{beyond}")
     return load_model(checkpoint)
 
 
@@ -176,7 +177,7 @@ def _family(model: str, dataset: Dataset) -> str:
 
 
 def scored(checkpoint: Checkpoint, dataset: Dataset, parts: Iterable[tuple[int, int]] = ()) -> Checkpoint:
-    """The checkpoint with its residuals on validation and its scores on the test split."""
+    """Returns the checkpoint with its residuals on validation and its scores on the test split."""
     # errors are those of motions that are watched over
     for measure in (trained_depth, validation_residuals, _calibration):
         checkpoint = replace(checkpoint, arrays={**checkpoint.arrays, **measure(load_model(checkpoint), dataset)})

@@ -23,5 +23,5 @@ class NearestInterpolation:
         self._weights: Float[np.ndarray, "target near"] = weights / weights.sum(axis=1, keepdims=True)
 
     def __call__(self, values: Perpoint) -> Perpoint:
-        """Values (M,) at the targets for `values` (N,) at the sources."""
+        """Returns values (M,) at the targets for `values` (N,) at the sources."""
         return (self._weights * values[self._index]).sum(axis=1)

@@ -30,7 +30,7 @@ class ScaleFitter:
         self._scale: ColorScale | None = None
 
     def fit(self, quantity: str, largest: float) -> ColorScale:
-        """A scale of `quantity` from 0 to at least `largest`, in its unit."""
+        """Fits a scale of `quantity` from 0 to at least `largest`, in its unit."""
         scale = self._scale
         if scale is None or scale.quantity != quantity or not KEPT * scale.top <= largest <= scale.top:
             scale = self._scale = ColorScale(quantity, UNITS[quantity], _round_up(max(largest, SMALLEST)))
@@ -43,7 +43,7 @@ def colors_of(values: Perpoint, scale: ColorScale) -> UInt8[np.ndarray, "points 
 
 
 def gradient_css() -> str:
-    """The colors from 0 to the top, as a CSS gradient."""
+    """Returns the colors from 0 to the top, as a CSS gradient."""
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in STOPS.tolist())
     return f"linear-gradient(to right,{stops})"
 

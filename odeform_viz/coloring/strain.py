@@ -26,7 +26,7 @@ class SurfaceStrain:
         self._weights, self._area = np.maximum(self._weights, 1e-300), area
 
     def __call__(self, points: Points) -> Perpoint:
-        """(N,) strain, 1 for 100 %, of the deformed vertices (N, 3) m."""
+        """Computes (N,) strain, 1 for 100 %, of the deformed vertices (N, 3) m."""
         first, second = _edges(np.asarray(points, dtype=float), self._faces)
         a, b, c = self._inverse
         u, v = first * a[:, None], first * b[:, None] + second * c[:, None]

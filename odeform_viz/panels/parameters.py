@@ -43,7 +43,7 @@ def slider_step(low: float, high: float) -> float:
 
 
 def presets(schema: Schema) -> dict[str, dict[str, float]]:
-    """The defaults, and the corners of the trained range of the first two learned parameters."""
+    """Returns the defaults, and the corners of the trained range of the first two learned parameters."""
     defaults = {p.name: p.default for p in schema.parameters}
     out = {"defaults": defaults}
     first, second = schema.learned[0], schema.learned[min(1, len(schema.learned) - 1)]

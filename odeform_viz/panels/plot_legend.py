@@ -19,7 +19,7 @@ CUT = "The axes fit the trained window. ↑ marks what is cut off after it."
 
 
 def legend_html(lines: Sequence[Line], time: float, large: bool) -> str:
-    """One line: the time, the columns, and a button that presses the hot key `ENLARGE`."""
+    """Returns one line: the time, the columns, and a button that presses the hot key `ENLARGE`."""
     names = "".join(f"<span>{_swatch(color)}{escape(label)}</span>" for label, color, _ in lines)
     size = "smaller" if large else "larger"
     button = f'<a data-hotkey="{ENLARGE}" style="margin-left:auto;cursor:pointer">{size} ⤢</a>'

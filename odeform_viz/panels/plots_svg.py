@@ -60,7 +60,7 @@ def quantities_of(lines: Sequence[Line], rotates: bool) -> list[Quantity]:
 
 
 def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str = "", large: bool = False) -> str:
-    """One plot per quantity, in a row or `large`, in two columns.
+    """Returns one plot per quantity, in a row or `large`, in two columns.
 
     A click on a plot goes to that time, by the number box of the slider with the id `slider`.
     """

@@ -127,7 +127,7 @@ class RegionEditor:
 
 
 def region_like(last: Region | None, kind: str, fit: FittedShape) -> Region:
-    """A "sphere" or "box" in the units of the file: `last`, one of its size, or a first one in the middle."""
+    """Returns a "sphere" or "box" in the units of the file: `last`, one of its size, or a first one in the middle."""
     if last is None:
         last = Sphere(np.median(np.asarray(fit.source.points, dtype=float), axis=0), 0.005 * INITIAL * _extent(fit))
     if _kind_of(last) == kind:

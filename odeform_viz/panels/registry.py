@@ -11,7 +11,7 @@ __all__ = ["PANELS", "Entry", "build_panels"]
 
 @dataclass(frozen=True)
 class Entry:
-    """Where a panel stands (see `Layout`), and its class as "module:Class"."""
+    """Says where a panel stands (see `Layout`), and its class as "module:Class"."""
 
     place: str
     panel: str

@@ -61,7 +61,7 @@ class ShapePanel(Panel):
         return predictor is None or not takes_user_bodies(predictor)
 
     def set(self, fit: FittedShape | None) -> None:
-        """Another shape, or the same in another part or transform; None for the trained body."""
+        """Takes another shape, or the same in another part or transform; None for the trained body."""
         with LOCK:
             if fit is not None:
                 self._name, self._rotation = fit.origin, fit.transform.rotation

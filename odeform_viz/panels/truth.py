@@ -38,7 +38,7 @@ PHYSICS = (
 
 
 def entry_label(entry: Entry, schema: Schema) -> str:
-    """The number of a sequence and its parameters."""
+    """Returns the number of a sequence and its parameters."""
     if contacts_of(schema):
         strength = float(np.linalg.norm(vector_of(entry.parameters, "force")))
         values = f"{entry.parameters[OBJECT]}, {strength:.3g} N"

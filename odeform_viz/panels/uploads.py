@@ -24,7 +24,7 @@ def take_upload(event: viser.GuiEvent) -> viser.UploadedFile:
 
 
 def content_of(file: viser.UploadedFile) -> bytes:
-    """The content; `InputError` for one of more than 256 MiB."""
+    """Returns the content; `InputError` for one of more than 256 MiB."""
     if len(file.content) > LARGEST:
         raise InputError(f"{file.name}: {len(file.content) >> 20} MiB; expected at most {LARGEST >> 20} MiB")
     return file.content

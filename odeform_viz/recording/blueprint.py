@@ -16,7 +16,7 @@ EYE = np.array([-2.2, -1.5, 1.1])  # sizes of the body, from its centre
 
 
 def make_blueprint(columns: Iterable[LoggedColumn]) -> rrb.Blueprint:
-    """A 3D view for each column, and plots below, one per unit."""
+    """Makes a 3D view for each column, and plots below, one per unit."""
     columns = list(columns)
     spaces = [_space(logged) for logged in columns]
     results = [_plot(unit, [f"{quantity}/**" for quantity in quantities]) for unit, quantities in PLOTS.items()]

@@ -47,7 +47,7 @@ class CheckedColumn:
         return not self.problem and self.error <= tolerance and not lacks
 
     def describe(self) -> str:
-        """The result in one line."""
+        """Returns the result in one line."""
         if self.skipped or (self.problem and not self.frames):
             return f"{self.label}: {self.problem or f'skipped, {self.skipped}'}"
         text = f"{self.label}: {self.frames} frames"

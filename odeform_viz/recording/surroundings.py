@@ -61,5 +61,5 @@ def log_arrows(stream: rr.RecordingStream, entity: str, arrows: Sequence[Arrow],
 
 
 def spheres(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
-    """Colors (N, 3), and radii (N,) in m of spheres of the same size: Rerun draws no Gaussians."""
+    """Returns colors (N, 3), and radii (N,) in m of spheres of the same size: Rerun draws no Gaussians."""
     return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)

@@ -23,7 +23,7 @@ class Part:
     faces: Ints
 
     def vertices(self, points: Points) -> Points:
-        """The part's vertices (M, 3) for mesh vertices `points` (N, 3), in their units."""
+        """Returns the part's vertices (M, 3) for mesh vertices `points` (N, 3), in their units."""
         return self.weights @ points
 
 

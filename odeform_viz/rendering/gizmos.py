@@ -146,7 +146,7 @@ class TransformGizmo:
 
 
 def half_extent(region: Region) -> float:
-    """Metres from the centre of a region to its farthest face."""
+    """Returns metres from the centre of a region to its farthest face."""
     return region.radius if isinstance(region, Sphere) else 0.5 * float(np.max(region.size))
 
 

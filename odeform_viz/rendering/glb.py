@@ -66,7 +66,7 @@ class GlbWriter:
         self._colors = np.full((count, 4), 65535, dtype=np.uint16)
 
     def write(self, points: Points, colors: UInt8[np.ndarray, "points 3"]) -> bytes:
-        """The file for vertices (N, 3) in m and their sRGB colors (N, 3)."""
+        """Writes the file for vertices (N, 3) in m and their sRGB colors (N, 3)."""
         self._colors[:, :3] = LINEAR[colors]
         positions = np.ascontiguousarray(points, dtype=np.float32)
         return b"".join((self._head, positions.tobytes(), self._colors.tobytes(), self._index))

@@ -29,7 +29,7 @@ class Clock:
         return self._playing
 
     def time(self) -> float:
-        """The current time of the motion, in s."""
+        """Returns the current time of the motion, in s."""
         with self._lock:
             return self._time()
 

@@ -153,7 +153,7 @@ def simulate_user_body(report: Report, item: Any, parameters: dict[str, Any], ra
 
 
 def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:
-    """A shape as a soft body (`UserBody`)."""
+    """Makes a soft body of a shape (`UserBody`)."""
     from odeform.models.modal.user_body import user_body
 
     return user_body(geometry, name)

@@ -159,7 +159,7 @@ def test_points_with_colors_and_lines(tmp_path: Path) -> None:
     assert isinstance(cloud, PointCloud)
     assert cloud.colors is not None
     np.testing.assert_array_equal(cloud.colors, [[255, 0, 0]] * 4)
-    assert "1 parts of lines left out" in cloud.notes
+    assert "1 part of lines left out" in cloud.notes
     file.tree["meshes"][0]["primitives"] = [{**file.primitive, "mode": 1}]
     with pytest.raises(InputError, match=r"expected a mesh in a scene, got none.*lines"):
         read_geometry(file.glb(tmp_path / "a.glb"))

@@ -151,7 +151,7 @@ def test_what_is_missing_is_noted(tmp_path: Path) -> None:
     (tmp_path / "a.mtl").write_text("newmtl a\nKd 0 1 0\nmap_Kd C:\\none.png\n")
     mesh = _read(tmp_path / "a.obj", SEAMS.replace("none.mtl", "a.mtl") + "l 1 2\nl 2 3\nf 1 2\nf 1 2 3\n")
     assert mesh.notes == (
-        "1 faces of fewer than three corners left out",
+        "1 face of fewer than three corners left out",
         "2 lines left out",
         r"the texture C:\none.png left out: no such file",
     )

@@ -94,7 +94,7 @@ def test_strips_beside_no_faces_and_beside_faces(tmp_path: Path) -> None:
     assert alone.notes == ()
     both = _read(tmp_path / "b.ply", _head(VERTEX + FACE + STRIP) + ROWS + LISTS + "4 0 1 2 3\n")
     assert len(both.faces) == 4
-    assert both.notes == ("1 strips beside the faces left out",)
+    assert both.notes == ("1 strip beside the faces left out",)
 
 
 def test_other_elements_are_noted(tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def test_splats_far_away_keep_their_places(tmp_path: Path) -> None:
 
 def test_what_follows_the_last_row_is_noted(tmp_path: Path) -> None:
     text = _read(tmp_path / "a.ply", _head(VERTEX + FACE) + ROWS + LISTS + "3 0 1 2\n")
-    assert (len(text.faces), text.notes) == (4, ("1 lines after the last row left out",))
+    assert (len(text.faces), text.notes) == (4, ("1 line after the last row left out",))
     faces = b"".join(struct.pack("<B3i", 3, *face) for face in FACES)
     data = _head(VERTEX + FACE, "binary_little_endian").encode() + np.array(XYZ, "<f4").tobytes() + faces
     assert _read(tmp_path / "b.ply", data).notes == ()

@@ -66,8 +66,8 @@ def test_faces_beside_solid_cells_and_lines_are_noted(tmp_path: Path) -> None:
     mesh = _read(tmp_path / "a.vtk", vtk_bytes(CUBE, cells, types))
     assert _volume(mesh) == pytest.approx(1.0)
     assert mesh.notes == (
-        "1 cells that are neither solid nor faces left out",
-        "1 faces beside the solid cells left out",
+        "1 cell, neither solid nor a face, left out",
+        "1 face beside the solid cells left out",
     )
 
 

@@ -6,6 +6,7 @@ from soft_block import SIZE, Block
 
 from odeform.compiling import compiles
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.flat import parts_of
 from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
 from odeform.mechanics.step import Mechanics, Projectile
@@ -35,6 +36,23 @@ def test_states_slopes_and_errors_agree_to_rounding(block: Block) -> None:
         np.testing.assert_allclose(compiled(rows, times, states), slopes, rtol=1e-9, atol=1e-10 * np.abs(slopes).max())
         states = known[0]
     assert np.abs(states[:2, :3]).max() > 1e-3, "they have been pushed"
+
+
+@pytest.mark.parametrize("begin", [0.0, 1.0], ids=["pushed", "free"])
+@pytest.mark.parametrize("spin", [[0.0, 0.0, 0.0], [60.0, 0.0, 0.0], [0.0, -60.0, 20.0]])
+def test_they_agree_for_bodies_that_fall_and_spin_fast(block: Block, spin: list[float], begin: float) -> None:
+    """In long steps, whose errors are large, and in which contacts begin."""
+    reference, compiled = bodies(block)
+    rows, steps, states = np.arange(3), np.full(3, 4e-3), reference.start
+    moving = parts_of(states)[-1].start
+    states[:, 2], states[:, moving : moving + 6] = [4e-3, 8e-3, 2e-2], [0.1, 0.0, -3.0, *spin]
+    for index in range(10):
+        times = begin + index * steps
+        known, found = (each.advance(rows, times, states, steps) for each in (reference, compiled))
+        for one, other in zip(known, found, strict=True):
+            np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-8 * np.abs(one).max())
+        states = known[0]
+    assert (states[:, moving + 2] > -1.0).all(), "they have met the floor"
 
 
 def test_a_motion_is_the_same_to_the_bit_in_any_batch(block: Block) -> None:

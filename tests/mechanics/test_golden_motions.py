@@ -14,7 +14,7 @@ from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.elasticity import elastic_modes, tangent_stiffness
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import make_push
-from odeform.mechanics.rolling.contact import first_law
+from odeform.mechanics.rolling.contact import initial_contact
 from odeform.mechanics.rolling.dynamics import RollingDynamics
 from odeform.mechanics.rolling.support import support_of
 from odeform.mechanics.step import Mechanics, Projectile
@@ -85,12 +85,14 @@ def test_objects_move_as_they_did(name: str) -> None:
 
 
 def thrown() -> Floats:
-    """(8,) of a ball of two materials, thrown down with spin under the law that trainings start from, after 0.35 s."""
-    law = first_law(2, 0)
-    law = law.like(law.flat() + 0.05 * np.random.default_rng(0).normal(size=law.flat().shape))
+    """(8,) of a ball of two materials, thrown down with spin under initial contact parameters, after 0.35 s."""
+    contact = initial_contact(2, 0)
+    contact = contact.like(contact.flat() + 0.05 * np.random.default_rng(0).normal(size=contact.flat().shape))
     support = support_of(octasphere(0.1, 5).points, np.array([0.0, 1.0, 0.0]))
     start = np.array([0.0, 0.05, 0.0, 1.0, -1.0, -5.0, 0.0, 0.0])
-    return RollingDynamics(law, support, 0.1, np.array([[0.3, -0.4]])).roll_out(start[:, None], 700, 1, 5e-4)[-1, :, 0]
+    return RollingDynamics(contact, support, 0.1, np.array([[0.3, -0.4]])).roll_out(start[:, None], 700, 1, 5e-4)[
+        -1, :, 0
+    ]
 
 
 THROWN = [0.155528, -0.00292502, 0.816889, 0.311361, -0.428208, 2.96578, 0.0903846, 0.0466594]

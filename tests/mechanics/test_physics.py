@@ -99,6 +99,27 @@ def test_a_thrown_body_falls_freely_and_its_modes_vibrate(block: Block) -> None:
     np.testing.assert_allclose(damped.modes[0, :2], (swing - preload / stiff)[:2], atol=5e-5)
 
 
+@pytest.mark.parametrize("speed", [NOTHING, np.array([3.0, -2.0, 1.0])])
+def test_the_error_of_a_step_in_flight_is_that_of_the_fall(block: Block, speed: Floats) -> None:
+    """However fast: two half steps of first order end g h^2 / 4 above a whole one, with the same velocities."""
+    free, step = Free(block, ContactParameters(), 1e-3), 1e-3
+    stiff, preload = free.modal
+    start = free.state(np.array([0.0, 0.0, 1.0]), NOTHING, speed, NOTHING, -preload / stiff)
+    assert free.steps.advance(start, step)[1][0] == pytest.approx(0.25 * GRAVITY * step**2, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("speed", "spin"), [([0.0, 0.0, -3.0], NOTHING), ([0.0, 0.0, 0.5], [60.0, 0.0, 0.0]), (NOTHING, [0.0, 60.0, 0.0])]
+)
+def test_a_step_feels_the_floor_that_is_reached_within_it(block: Block, speed: Floats, spin: Floats) -> None:
+    """Also by an edge that turns down."""
+    free, step = Free(block, ContactParameters(), 5e-3), 5e-3
+    above = 5e-3 if np.any(spin) else 3e-3
+    start = free.state(np.array([0.0, 0.0, above]), NOTHING, np.array(speed), np.array(spin))
+    falling = speed[2] - GRAVITY * step
+    assert free.steps.advance(start, step)[0].velocity[0, 2] > falling + 0.01
+
+
 @pytest.mark.parametrize("turn", [[0.0, 0.0, 0.0], [0.3, 0.2, 0.0]])
 def test_a_bounce_without_damping_keeps_the_energy(block: Block, turn: list[float]) -> None:
     """Also on an edge, where most of it goes into spin."""

@@ -129,7 +129,7 @@ def test_what_a_batch_is(kick: Predictor) -> None:
     assert len(batch) == 4
     np.testing.assert_array_equal(batch.parameters["mass"], masses)
     assert batch.parameters["force"].tolist() == [140.0] * 4
-    assert list(batch.parameters) == kick.schema.names
+    assert tuple(batch.parameters) == kick.schema.names
     assert batch.vertices(0.1).shape == (4, 7, 3)
     assert batch.vertices(np.array([0.1])).shape == (4, 1, 7, 3)
     assert batch.pose(0.1).shape == (4, 4, 4)

@@ -85,4 +85,4 @@ def test_gradients_far_away_are_those_of_the_values() -> None:
     for axis in range(3):
         shift = step * np.eye(3)[axis]
         slope = (basis.values(points + shift).astype(float) - basis.values(points - shift)) / (2.0 * step)
-        assert np.abs(slopes[:, :, axis] - slope).max() < 0.02 * np.abs(slopes).max()
+        assert np.abs(slopes[:, :, axis] - slope).max() < 1e-4 * np.abs(slopes).max()

@@ -9,6 +9,7 @@ from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.motion.caveats import caveats
 from odeform.motion.reduced_motion import ReducedMotion, as_reduced
+from odeform.schema import Window
 
 SINKING = {"mass": 1.3, "bending": 0.335, "force": 39.7, "azimuth": 0.0, "elevation": 0.947}
 
@@ -29,6 +30,21 @@ def test_parameters_and_times_outside(kick: Predictor) -> None:
     assert times == "1 of 3 frames are outside the trained window, 0 to 1 s: there the motion is extrapolated"
     (far,) = caveats(kick.solve(), np.array([0.0, 9.0]))
     assert far.endswith("soon after 4 s it stands still")
+
+
+def test_the_error_band_is_that_of_the_trained_body(kick: Predictor) -> None:
+    times, egg = np.array([0.1, 0.5]), replace(kick.rest, points=kick.rest.points * np.float32([1.0, 1.0, 0.7]))
+    motion = kick.solve()
+    band = motion.error_band(times)
+    assert band is not None
+    np.testing.assert_array_equal(band, kick.error_band(motion.parameters, times))
+    assert kick.solve(egg).error_band(times) is None
+
+
+def test_the_reach_of_a_window_counts_from_its_end(kick: Predictor) -> None:
+    motion = as_reduced(kick.solve())
+    later = replace(motion, schema=replace(motion.schema, window=Window(0.5, 1.0, 120.0, reach=2.0)))
+    assert any(said.endswith("soon after 2 s it stands still") for said in caveats(later, np.array([2.5])))
 
 
 class Moment(ReducedMotion):

@@ -114,6 +114,8 @@ def test_a_vertex_without_a_face_is_inside() -> None:
     assert shell.surface is not None
     assert solid.surface is None
     assert ReducedSpace.from_parts(solid.to_json(), solid.arrays(), Mesh(points, faces)).surface is None
+    for largest in ((np.inf, 1.0), (1.0, np.inf)):  # JSON has no such number
+        assert "largest" not in replace(solid, largest=largest).to_json()
     old = {name: value for name, value in shell.to_json().items() if name != "surface"}
     assert ReducedSpace.from_parts(old, shell.arrays(), Mesh(points[:-1], faces)).surface is not None
 

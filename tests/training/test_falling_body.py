@@ -1,4 +1,4 @@
-"""Training on a ball that falls straight, whose law of contact is known."""
+"""Training on a ball that falls straight, whose contact of contact is known."""
 
 from dataclasses import replace
 

@@ -44,6 +44,52 @@ class SpringModel(odeform.NeuralModel):
 odeform.register_model("springs", SpringModel)
 
 
+class Energy(torch.nn.Module):
+    """q' = dH/dp, p' = -dH/dq, with an energy H of the state and the parameters."""
+
+    def __init__(self, parameters: int, coordinates: int) -> None:
+        super().__init__()
+        self.energy = torch.nn.Sequential(
+            torch.nn.Linear(2 * coordinates + parameters, 8), torch.nn.Tanh(), torch.nn.Linear(8, 1)
+        )
+        self.start = torch.nn.Linear(parameters, 2 * coordinates)
+
+    def initial_state(self, theta: torch.Tensor) -> torch.Tensor:
+        return self.start(theta)
+
+    def vector_field(self, t: float, z: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        with torch.enable_grad():
+            at = z if z.requires_grad else z.detach().requires_grad_()
+            energy = self.energy(torch.cat([at, theta], dim=1)).sum() + at.square().sum()
+            (slope,) = torch.autograd.grad(energy, at, create_graph=True)
+        by_position, by_momentum = slope.chunk(2, dim=1)
+        return 4.0 * torch.cat([by_momentum, -by_position], dim=1)
+
+    def readout(self, t: torch.Tensor, z: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        return z.chunk(2, dim=1)[0]
+
+
+class EnergyModel(odeform.NeuralModel):
+    model, network = "energy", Energy
+
+
+odeform.register_model("energy", EnergyModel)
+
+
+class SingleOnly(Springs):
+    """Fails in double precision, in which solutions are compared: its matrix is no buffer."""
+
+    def vector_field(self, t: float, z: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
+        return super().vector_field(t, z @ torch.eye(z.shape[1]), theta)
+
+
+class SingleOnlyModel(odeform.NeuralModel):
+    model, network = "single-only", SingleOnly
+
+
+odeform.register_model("single-only", SingleOnlyModel)
+
+
 def arrays(count: int = 20) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Balls that bob on a spring and flatten."""
     stiffness = np.linspace(20.0, 60.0, count)
@@ -142,6 +188,25 @@ def test_a_resumed_vector_field_is_the_same_as_one_that_was_not_interrupted(tmp_
     part.write_bytes(b"no state")
     with pytest.raises(InputError, match="not a state of a training"):
         odeform.fit(balls(), "springs", steps=8, resume=part, report=quiet)
+
+
+def test_a_vector_field_may_be_the_derivative_of_an_energy() -> None:
+    fitted = odeform.fit(balls(), "energy", steps=3, report=quiet)
+    assert np.isfinite(fitted.solve().vertices(TIMES)).all()
+
+
+def test_a_module_that_cannot_predict_is_found_before_it_is_trained() -> None:
+    lines: list[str] = []
+    with pytest.raises(RuntimeError, match="dtype"):
+        odeform.fit(balls(), "single-only", steps=3, report=lines.append)
+    assert not any("step" in line for line in lines)
+
+
+def test_where_a_score_counts_frames_that_were_not_trained_it_says_so() -> None:
+    lines: list[str] = []
+    odeform.fit(balls(), "nearest", window=(0, 7), report=lines.append)
+    assert lines[-1].startswith("test: pooled RMSE ")
+    assert lines[-1].endswith(", with frames outside of 0:7")
 
 
 @pytest.mark.slow

@@ -1,21 +1,21 @@
-"""Training on a ball whose law of contact is known."""
+"""Training on a ball whose contact of contact is known."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from rolls import AXIS, BALL, RADIUS, rolls, true_law
+from rolls import AXIS, BALL, RADIUS, rolls, true_contact
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.errors import InputError
-from odeform.mechanics.rolling.contact import first_law
+from odeform.mechanics.rolling.contact import initial_contact
 from odeform.mechanics.rolling.support import support_of
 from odeform.models.base import Predictor
 from odeform.models.rolling.model import RollingModel
 from odeform.models.rolling.start import push_inputs
-from odeform.models.rolling.training.contact_fit import fit_law, law_error_mm
+from odeform.models.rolling.training.contact_fit import contact_error_mm, fit_contact
 from odeform.models.rolling.training.fit import fit_rolling_body, motions_of
 from odeform.models.training.request import TrainRequest
 from odeform.motion.reduced_space import POSE, motion_rmse
@@ -54,16 +54,16 @@ def test_a_dent_that_stays_below_needs_few_patterns(data: TrainingData, dataset:
 
 
 @pytest.mark.usefixtures("unchecked")
-def test_the_true_law_explains_the_motions_and_a_fit_approaches_it(data: TrainingData) -> None:
+def test_the_true_parameters_explain_the_motions_and_a_fit_approaches_it(data: TrainingData) -> None:
     support, motions = support_of(BALL.points, AXIS), motions_of(data, "train", AXIS, [0])
-    start, true = first_law(1, 0), true_law()
+    start, true = initial_contact(1, 0), true_contact()
     some = motions.some(np.arange(12))
-    before, known = (law_error_mm(law, support, RADIUS, some) for law in (start, true))
+    before, known = (contact_error_mm(contact, support, RADIUS, some) for contact in (start, true))
     free = np.arange(start.terms.size)
-    fitted = fit_law(start, free, support, RADIUS, some, 6, silent)
+    fitted = fit_contact(start, free, support, RADIUS, some, 6, silent)
     assert known < 0.7  # what differences of frames make of the velocity
     assert before > 5.0 * known
-    assert law_error_mm(fitted, support, RADIUS, some) < 0.4 * before
+    assert contact_error_mm(fitted, support, RADIUS, some) < 0.4 * before
 
 
 @pytest.mark.slow

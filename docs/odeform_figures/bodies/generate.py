@@ -47,7 +47,7 @@ def generate(name: str, variant: int | None = None, factors: Mapping[str, float]
 
 
 def proportions(name: str, variant: int | None) -> dict[str, float]:
-    """The proportions of a variant, factors on the standard instance's: uniform over the class's ranges."""
+    """Returns the proportions of a variant, factors on the standard instance's: uniform over the class's ranges."""
     if variant is None:
         return {}
     rng = np.random.default_rng([variant, OBJECTS.index(name)])
@@ -55,7 +55,8 @@ def proportions(name: str, variant: int | None) -> dict[str, float]:
 
 
 def surface(name: str, factors: Mapping[str, float]) -> Mesh:
-    """The surface of an instance, about `COUNT` even triangles' vertices, in metres; the middle surface of the chip.
+    """Returns the surface of an instance, about `COUNT` even triangles' vertices, in metres; the middle surface of the
+    chip.
 
     `InputError` for a proportion that the class does not have.
     """

@@ -28,7 +28,7 @@ COLORS = {
 
 
 def draw_object(name: str) -> Picture:
-    """An object on a plain floor, filling a tile of `SIZE` pixels."""
+    """Draws an object on a plain floor, filling a tile of `SIZE` pixels."""
     mesh, view = get_object(name).rest_mesh(), View(np.zeros(3), 1.0, (SIZE, SIZE))
     seen = np.asarray(mesh.points, dtype=float) @ view.axes.T
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) @ view.axes

@@ -19,13 +19,13 @@ Position = Sequence[float] | Floats
 
 
 def smooth_union(first: Perpoint, second: Perpoint, blend: float) -> Perpoint:
-    """The union of two solids, with a fillet about `blend` metres wide where they meet."""
+    """Returns the union of two solids, with a fillet about `blend` metres wide where they meet."""
     fraction = np.clip(0.5 + 0.5 * (second - first) / blend, 0.0, 1.0)
     return second * (1.0 - fraction) + first * fraction - blend * fraction * (1.0 - fraction)
 
 
 def smooth_intersection(first: Perpoint, second: Perpoint, blend: float) -> Perpoint:
-    """The intersection of two solids, with edges rounded over about `blend` metres."""
+    """Returns the intersection of two solids, with edges rounded over about `blend` metres."""
     return -smooth_union(-first, -second, blend)
 
 
@@ -47,7 +47,7 @@ def capsule(points: Floats, start: Position, end: Position, radius: float, end_r
 
 
 def tube(points: Points, path: Sequence[Sequence[float]], radius: float, end_radius: float) -> Perpoint:
-    """A round tube along the cubic spline through `path` (K, 3) m, tapering from `radius` to `end_radius`."""
+    """Makes a round tube along the cubic spline through `path` (K, 3) m, tapering from `radius` to `end_radius`."""
     knots = np.asarray(path, dtype=float)
     centres = CubicSpline(np.arange(len(knots)), knots)(np.linspace(0.0, len(knots) - 1.0, 24))
     radii = np.linspace(radius, end_radius, len(centres))

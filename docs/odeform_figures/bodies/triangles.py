@@ -15,7 +15,7 @@ SLIVER = 0.1  # smallest area of a triangle, in squares of the edge; an even one
 
 
 def triangulate(outline: Callable[[Floats], Perpoint], extent: float, edge: float) -> tuple[Floats, Faces]:
-    """Vertices (N, 2) m and counter-clockwise triangles (F, 3) with edges of about `edge` m.
+    """Makes vertices (N, 2) m and counter-clockwise triangles (F, 3) with edges of about `edge` m.
 
     `outline` maps points (N, 2) m to signed distances (N,) m, negative inside; all of that is within `extent` m of the
     origin.

@@ -23,7 +23,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--shape", nargs="+", action="extend", default=[], metavar="MESH", help="scanned solids to measure as well"
     )
     parser.add_argument(
-        "--data", metavar="DATASET", help="training data: each class is then also left out of the law, and predicted"
+        "--data",
+        metavar="DATASET",
+        help="training data: each class is also predicted by contact parameters of the others",
     )
     parser.add_argument(
         "--object", nargs="+", action="extend", default=[], metavar="NAME", help="classes of instances (default: all)"

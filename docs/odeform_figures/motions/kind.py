@@ -32,7 +32,7 @@ class Kind:
         return np.arange(self.frames) / self.rate
 
     def draws(self, seed: int) -> list[dict[str, float]]:
-        """Parameters of all sequences, evenly spread over their ranges (scrambled Sobol points)."""
+        """Draws the parameters of all sequences, evenly spread over their ranges (scrambled Sobol points)."""
         low, high = np.array(list(self.ranges.values())).T
         points = qmc.Sobol(len(low), rng=seed).random_base2(max(self.sequences - 1, 1).bit_length())
         scaled = qmc.scale(points[: self.sequences], low, high)

@@ -29,7 +29,7 @@ DAY, SUNSHINE = 0.92, np.array([0.52, 0.47, 0.36])
 
 
 def room(radius: float, rng: np.random.Generator) -> Surfels:
-    """The room, with the shadow of a ball of `radius` m on the floor."""
+    """Makes the room, with the shadow of a ball of `radius` m on the floor."""
     return joined_surfels([_floor(radius, rng), *_walls(), _window(), *_skirting()])
 
 

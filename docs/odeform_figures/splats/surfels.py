@@ -26,7 +26,7 @@ class Surfels:
 
 
 def grid(one: Floats, other: Floats) -> tuple[Floats, Floats]:
-    """The (N,) coordinates of all pairs."""
+    """Returns the (N,) coordinates of all pairs."""
     first, second = np.meshgrid(one, other)
     return first.ravel(), second.ravel()
 
@@ -42,7 +42,7 @@ def tiles(
 
 
 def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
-    """`count` white round surfels on a sphere of `radius` m, evenly spread along a Fibonacci spiral."""
+    """Makes `count` white round surfels on a sphere of `radius` m, evenly spread along a Fibonacci spiral."""
     index = np.arange(count) + 0.5
     z, angle = 1.0 - 2.0 * index / count, index * np.pi * (3.0 - np.sqrt(5.0))
     flat = np.sqrt(1.0 - z**2)
@@ -53,12 +53,12 @@ def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
 
 
 def joined_surfels(parts: list[Surfels]) -> Surfels:
-    """All parts as one."""
+    """Returns all parts as one."""
     return Surfels(*(np.concatenate([vars(part)[name] for part in parts]) for name in vars(parts[0])))
 
 
 def splats_of(surfels: Surfels) -> GaussianSplats:
-    """The surfels as flat Gaussian splats."""
+    """Returns the surfels as flat Gaussian splats."""
     normals = np.cross(surfels.along, surfels.across)
     axes = [surfels.along * surfels.sizes[:, :1], surfels.across * surfels.sizes[:, 1:], THICKNESS * normals]
     half = np.stack(axes, axis=2)

@@ -35,7 +35,8 @@ FILE = Similarity(rotation=UPRIGHT["-y"].T)
 
 
 def volleyball_in_room() -> GaussianSplats:
-    """The scene in metres, z up, with the ball on the floor at the origin and its splats first. Deterministic."""
+    """Makes the scene in metres, z up, with the ball on the floor at the origin and its splats first.
+    Deterministic."""
     return splats_of(joined_surfels([_ball(), room(RADIUS, np.random.default_rng(7))]))
 
 

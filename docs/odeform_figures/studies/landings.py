@@ -39,7 +39,8 @@ def _simulated(name: str, until: float, parameters: Parameters) -> MotionSequenc
 
 
 def pictures(names: list[str]) -> Image.Image:
-    """One column for each extreme of each scene: predicted above, simulated below. `InputError` for scenes without."""
+    """Draws one column for each extreme of each scene: predicted above, simulated below. `InputError` for scenes
+    without."""
     columns = []
     for name in names:
         model = load(name)

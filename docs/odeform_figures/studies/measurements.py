@@ -26,7 +26,7 @@ Figures = dict[str, float | None]
 
 
 def whole_motion(sequence: MotionSequence) -> slice:
-    """All frames."""
+    """Returns all frames."""
     return slice(0, len(sequence.times))
 
 

@@ -31,11 +31,11 @@ from odeform_figures.output import write_or_print
 
 __all__ = ["Outside", "compared", "fitted", "outside", "summary"]
 
-SHARES = (0.1, 0.25)
+FRACTIONS = (0.1, 0.25)
 """How far outside: of the end of a range, or of the range where that end is zero."""
 FIT, TEST = 11, 23
 """Seeds of the motions that a band is fitted to, and of those that say how right it is."""
-SCATTER = (0.7, 1.3)  # times these shares, for corners of the first
+SCATTER = (0.7, 1.3)  # times these fractions, for corners of the first
 
 
 class Outside(NamedTuple):
@@ -49,27 +49,27 @@ class Outside(NamedTuple):
     """(T, 2) mm."""
 
 
-def outside(schema: Schema, share: float, seed: int) -> list[tuple[str, dict[str, float]]]:
+def outside(schema: Schema, fraction: float, seed: int) -> list[tuple[str, dict[str, float]]]:
     """Names and parameters: one beyond each end of each range, the others inside; then all beyond, at each corner."""
-    rng, rows = np.random.default_rng(seed + round(100 * share)), []
+    rng, rows = np.random.default_rng(seed + round(100 * fraction)), []
 
     def inside() -> dict[str, float]:
         return {p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in schema.parameters}
 
     for p in schema.learned:
         for side in (-1, 1):
-            rows.append((f"{p.name} {'-+'[side > 0]}", {**inside(), p.name: _beyond(p, side, share)}))
+            rows.append((f"{p.name} {'-+'[side > 0]}", {**inside(), p.name: _beyond(p, side, fraction)}))
     for sides in itertools.product((-1, 1), repeat=len(schema.learned)):
         row = inside()
         for p, side in zip(schema.learned, sides, strict=True):
-            row[p.name] = _beyond(p, side, share * (1.0 if seed == TEST else rng.uniform(*SCATTER)))
+            row[p.name] = _beyond(p, side, fraction * (1.0 if seed == TEST else rng.uniform(*SCATTER)))
         rows.append((f"corner {''.join('-+'[side > 0] for side in sides)}", row))
     return rows
 
 
-def _beyond(p: Parameter, side: int, share: float) -> float:
+def _beyond(p: Parameter, side: int, fraction: float) -> float:
     end = p.low if side < 0 else p.high
-    return end + side * share * (abs(end) if end else p.high - p.low)
+    return end + side * fraction * (abs(end) if end else p.high - p.low)
 
 
 def _simulated(scene: str, keep: Path | None, job: tuple[str, dict[str, float]]) -> Frames:
@@ -87,12 +87,12 @@ def _simulated(scene: str, keep: Path | None, job: tuple[str, dict[str, float]])
 
 
 def compared(model: Predictor, seed: int, workers: int, keep: Path | None = None) -> dict[float, list[Outside]]:
-    """The motions of each of `SHARES`, whose simulations are kept in the folder `keep`."""
+    """The motions of each of `FRACTIONS`, whose simulations are kept in the folder `keep`."""
     scene, times, found = model.schema.scene, model.schema.window.times, {}
-    for share in SHARES:
-        jobs = [(f"{scene}-{seed}-{share:g}-{name}", row) for name, row in outside(model.schema, share, seed)]
-        truths = parallel_map(f"outside {share:g}", partial(_simulated, scene, keep), jobs, workers)
-        found[share] = [_compared(model, times, *job, truth) for job, truth in zip(jobs, truths, strict=True)]
+    for fraction in FRACTIONS:
+        jobs = [(f"{scene}-{seed}-{fraction:g}-{name}", row) for name, row in outside(model.schema, fraction, seed)]
+        truths = parallel_map(f"outside {fraction:g}", partial(_simulated, scene, keep), jobs, workers)
+        found[fraction] = [_compared(model, times, *job, truth) for job, truth in zip(jobs, truths, strict=True)]
     return found
 
 
@@ -163,7 +163,7 @@ def main() -> None:
     except InputError as error:
         parser.error(str(error))
     write_or_print(
-        {"command": command, **{f"{share:g}": summary(motions) for share, motions in test.items()}}, args.json
+        {"command": command, **{f"{fraction:g}": summary(motions) for fraction, motions in test.items()}}, args.json
     )
 
 

@@ -65,7 +65,8 @@ def _row(
 
 
 def study(scene_name: str, count: int, seed: int, workers: int) -> dict[str, Any]:
-    """The figures of `count` sequences: the scene's extremes first, then space-filling samples of the trained box."""
+    """Measures the figures of `count` sequences: the scene's extremes first, then space-filling samples of the trained
+    box."""
     scene = get_scene(scene_name)
     if scene.schema.objects:
         raise InputError(

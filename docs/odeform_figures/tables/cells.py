@@ -14,24 +14,24 @@ Runs = Mapping[Run, Result]
 
 
 def paragraph(*parts: str) -> list[str]:
-    """Lines of Markdown of at most 118 characters."""
+    """Returns the lines of Markdown of at most 118 characters."""
     return textwrap.wrap(" ".join(parts), 118, break_long_words=False, break_on_hyphens=False)
 
 
 def table(head: Row, rows: Iterable[Row]) -> list[str]:
-    """Lines of a Markdown table, and an empty one."""
+    """Returns the lines of a Markdown table, and an empty one."""
     return ["| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)] + [""]
 
 
 def number(value: float | None) -> str:
-    """Three significant digits, all digits from 1,000 on; a dash for None."""
+    """Returns three significant digits, all digits from 1,000 on; a dash for None."""
     if value is None:
         return "–"
     return f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def spread(values: Sequence[float]) -> str:
-    """Mean and standard deviation over seeds."""
+    """Returns the mean and standard deviation over seeds."""
     if not values:
         return "–"
     return number(float(np.mean(values))) + (f" ± {_deviation(values):.2g}" if len(values) > 1 else "")
@@ -43,7 +43,7 @@ def _deviation(values: Sequence[float]) -> float:
 
 
 def scored_rows(scores: Mapping[str, Sequence[Sequence[float]]]) -> list[list[str]]:
-    """Rows of a table from the scores of its columns, one for each seed, by the label of the row."""
+    """Returns rows of a table from the scores of its columns, one for each seed, by the label of the row."""
     columns = [_led(column) for column in zip(*scores.values(), strict=True)]
     return [[label, *row] for label, row in zip(scores, zip(*columns, strict=True), strict=True)]
 

@@ -33,7 +33,7 @@ PAIR = (METRICS[0], SHAPE)
 
 
 def page(found: Mapping[str, Any]) -> str:
-    """Markdown of the results that `odeform_figures.tables.tables` collects."""
+    """Returns Markdown of the results that `odeform_figures.tables.tables` collects."""
     runs: Mapping[str, Runs] = found["runs"]
     fraction = f" --fraction {found['share']:g}" if found["share"] != 1.0 else ""
     commands = dict.fromkeys(

@@ -31,7 +31,8 @@ def hold_last(observed: int) -> SimplePredictor:
 
 
 def ballistic(observed: int, gravity: float = GRAVITY) -> SimplePredictor:
-    """Ballistic flight of the shape of the last of the first `observed` frames, from the velocity of its centre.
+    """Predicts the ballistic flight of the shape of the last of the first `observed` frames, from the velocity of its
+    centre.
 
     `gravity` is in m/s^2, along -z.
     """

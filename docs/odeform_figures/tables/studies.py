@@ -15,7 +15,7 @@ LABELS = {
     "clock": "the clock of the decoders",
     "parameters": "the parameters of the decoders",
     "random-features": "random features",
-    "network": "the network of the contact law",
+    "network": "the network of the contact coefficients",
     "corners": "the corners of the mesh, and the place that it rested on",
 }
 
@@ -59,7 +59,7 @@ def _pair(runs: Runs, scene: str, **attributes: Any) -> list[list[float]]:
 
 
 def learning_curve(runs: Runs) -> list[str]:
-    """A table for each scene: models by number of training sequences."""
+    """Returns a table for each scene: models by number of training sequences."""
     sections = []
     for scene, counts in FEWER.items():
         names = models(runs, scene=scene)

@@ -19,5 +19,5 @@ RANDOM = 1  # seed of the moderate proportions
 
 
 def factors_of(name: str) -> dict[str, dict[str, float]]:
-    """The proportions of both instances of a class, by the names of the instances."""
+    """Returns the proportions of both instances of a class, by the names of the instances."""
     return {f"{name}-moderate": proportions(name, RANDOM), f"{name}-extreme": EXTREMES[name]}

@@ -49,7 +49,8 @@ def contact_parameters_without(
 
 
 def without(trained: PerObject, name: str, contact_parameters: ContactParameters) -> PerObject:
-    """The model as if it had been trained without an object: the others, all with these `contact_parameters`."""
+    """Returns the model as if it had been trained without an object: the others, all with these
+    `contact_parameters`."""
     checkpoint = trained.checkpoint
     parts = {other: part for other, part in checkpoint.config["objects"].items() if other != name}
     config = {
@@ -61,7 +62,8 @@ def without(trained: PerObject, name: str, contact_parameters: ContactParameters
 
 
 def left_out_shape(dataset: Dataset, name: str, trained: PerObject) -> UnseenShape:
-    """An object with its first test motions at the window's rate, like the most similar of the objects of `trained`."""
+    """Returns an object with its first test motions at the window's rate, like the most similar of the objects of
+    `trained`."""
     window = dataset.schema.window
     item = get_object(name)
     recorded = (

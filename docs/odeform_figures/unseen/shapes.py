@@ -61,7 +61,7 @@ def scan(path: Path) -> UnseenShape:
 
 
 def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:
-    """`count` contacts and forces on a body, as parameters of the scene: the same draw for every shape."""
+    """Draws `count` contacts and forces on a body, as parameters of the scene: the same draw for every shape."""
     drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed])
     named = [(("contact", contact), ("force", force)) for contact, force in drawn]
     return [

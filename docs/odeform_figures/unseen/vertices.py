@@ -32,7 +32,8 @@ def held_out(count: int, fraction: float, seed: int) -> Bools:
 
 
 def without_vertices(dataset: Dataset, fraction: float, seed: int) -> Dataset:
-    """The same motions, in which a fraction of the vertices has no weight: the same ones in all motions of a body."""
+    """Returns the same motions, in which a fraction of the vertices has no weight: the same ones in all motions of a
+    body."""
 
     def read(entry: Entry) -> MotionSequence:
         sequence = dataset.read(entry)

@@ -22,7 +22,7 @@ DISTANCE = 0.3  # m, from which a click comes, along the normal
 
 
 def click(model: Predictor, messages: int) -> dict[str, float]:
-    """Latency of clicks on different points of the default object of a model, one after the other."""
+    """Measures the latency of clicks on different points of the default object of a model, one after the other."""
     rest = model.rest_of(model.complete({}))
     targets, directions = _targets(rest, messages)
     node = f"/world/column_0/body/part_{len(checkerboard_parts(rest)) - 1}"

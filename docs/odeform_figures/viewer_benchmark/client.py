@@ -156,14 +156,14 @@ class LoopbackClient:
             self._send("FileTransferPart", **ids, part_index=index, content=part)
 
     def collect(self, seconds: float) -> list[dict[str, Any]]:
-        """All messages of the next `seconds`."""
+        """Collects all messages of the next `seconds`."""
         out, end = [], time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             out += self.receive(left) or []
         return out
 
     def receive(self, timeout: float) -> list[dict[str, Any]] | None:
-        """The next batch of messages, or None after `timeout` seconds."""
+        """Receives the next batch of messages, or None after `timeout` seconds."""
         try:
             raw = self._socket.recv(timeout=timeout)
         except TimeoutError:
@@ -225,16 +225,17 @@ class LoopbackClient:
         return next((bytes(self.downloads[name]) for name in names), None)
 
     def text(self) -> str:
-        """All visible Markdown and HTML of the page."""
+        """Returns all visible Markdown and HTML of the page."""
         return "\n".join(filter(None, (control.text for control in self._controls.values())))
 
     def wait_vertices(self, node: str, timeout: float = DEADLINE) -> np.ndarray | None:
-        """Vertices (N, 3) of the next update of a mesh node, in m; None after `timeout` seconds."""
+        """Waits for the vertices (N, 3) of the next update of a mesh node, in m; None after `timeout` seconds."""
         vertices = self._wait_update(node, "vertices", timeout)
         return None if vertices is None else vertices.reshape(-1, 3)
 
     def wait_splats(self, node: str, timeout: float = DEADLINE) -> np.ndarray | None:
-        """Centres (N, 3) of the next update of a node of splats, in its units; None after `timeout` seconds."""
+        """Waits for the centres (N, 3) of the next update of a node of splats, in its units; None after `timeout`
+        seconds."""
         buffer = self._wait_update(node, "buffer", timeout)
         if buffer is None:
             return None

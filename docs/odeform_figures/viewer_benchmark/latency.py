@@ -31,7 +31,8 @@ SPLATS = 100_000
 
 
 def drag(models: list[Predictor], truth: Column | None, messages: int, points: int) -> dict[str, float]:
-    """Latency of dragging the first slider, with all models on a round mesh of `points`, and the truth if given.
+    """Measures the latency of dragging the first slider, with all models on a round mesh of `points`, and the truth if
+    given.
 
     The answers are the vertices of the last column, which are sent last. Every message asks for another value, so an
     answer tells which message it serves.
@@ -58,7 +59,7 @@ def drag(models: list[Predictor], truth: Column | None, messages: int, points: i
 
 
 def scrub_splats(model: Predictor, messages: int) -> dict[str, float]:
-    """Latency of scrubbing the time of 100,000 splats with covariances, around the largest deformation."""
+    """Measures the latency of scrubbing the time of 100,000 splats with covariances, around the largest deformation."""
     splats, values = round_splats(SPLATS, model), largest_deformation_times(model, messages)
     motion = model.solve(splats)
     expected = np.array([motion.deformed(float(v))[0] for v in np.round(values, 4)])
@@ -73,7 +74,8 @@ def scrub_splats(model: Predictor, messages: int) -> dict[str, float]:
 
 
 def play_free_flight(model: Predictor) -> dict[str, float]:
-    """Bytes for each frame of the free flight before the impact, played for two seconds at a tenth of the speed."""
+    """Measures the bytes for each frame of the free flight before the impact, played for two seconds at a tenth of the
+    speed."""
     assert model.schema.impact is not None
     with served([Column(model.model, model, model.rest)], 0.02) as client:
         client.set("speed", "1/10")
@@ -86,13 +88,13 @@ def play_free_flight(model: Predictor) -> dict[str, float]:
 
 
 def largest_deformation_times(model: Predictor, count: int) -> Floats:
-    """(T,) seconds, T = `count`, around the largest deformation of a bundled scene."""
+    """Finds (T,) seconds, T = `count`, around the largest deformation of a bundled scene."""
     return (0.288 if model.schema.impact else 0.005) + np.linspace(0.0, 0.025, count)
 
 
 @contextlib.contextmanager
 def served(columns: list[Column], moment: float) -> Iterator[LoopbackClient]:
-    """A client of a viewer with these columns, paused at `moment` in s."""
+    """Returns a client of a viewer with these columns, paused at `moment` in s."""
     app = App(columns, port=0)
     try:
         with LoopbackClient(app.server.get_port()) as client:

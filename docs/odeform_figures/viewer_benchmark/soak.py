@@ -57,7 +57,8 @@ class Soak:
 
     @property
     def allocated(self) -> tuple[float, float] | None:
-        """The same of the memory that is allocated: it grows with what is kept, and not with gaps between pieces."""
+        """Returns the same of the memory that is allocated: it grows with what is kept, and not with gaps between
+        pieces."""
         return _first_and_last(self.allocated_mb) if self.allocated_mb else None
 
     @property

@@ -19,7 +19,7 @@ __all__ = ["stages"]
 
 
 def stages(model: Predictor, messages: int) -> dict[str, float]:
-    """Median times of scrubbing 100,000 splats: from the request to arrays, and from these to messages."""
+    """Returns the median times of scrubbing 100,000 splats: from the request to arrays, and from these to messages."""
     splats, session = round_splats(SPLATS, model), Session(model.schema)
     columns = Columns.of([Column("splats", model, splats)]).all
     parameters = model.schema.complete({})

@@ -81,5 +81,5 @@ def _on_a_grid(values: Floats, step: float, error: float) -> tuple[float, Floats
 
 
 def short(number: float) -> str:
-    """A number for a message, with all digits of integers."""
+    """Returns a number for a message, with all digits of integers."""
     return f"{number:.6g}" if abs(number) < 1e5 else f"{float(number):.17g}"

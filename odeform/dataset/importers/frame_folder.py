@@ -38,7 +38,7 @@ def frame_folder(folder: Path) -> Recording:
 
 
 def recorded_files(files: Sequence[Path], where: str, times: Times | None = None, counted: bool = False) -> Recording:
-    """Files in their order, of VTK perhaps with points that a field displaces."""
+    """Returns files in their order, of VTK perhaps with points that a field displaces."""
     field = displacement_field(files, where) if files[0].suffix.lower() in VTK and len(files) > 1 else ""
     notes = _left_out(files[0])
     if field:

@@ -51,7 +51,7 @@ def has_table(root: Path) -> bool:
 
 
 def find_table(root: Path) -> Path:
-    """The table in a folder, whatever the case of its name. Raises `InputError` for none, two, or a workbook."""
+    """Finds the table in a folder, whatever the case of its name. Raises `InputError` for none, two, or a workbook."""
     files = [path for path in visible(root) if path.is_file()]
     found = [path for path in files if path.name.lower() in TABLES]
     if len(found) > 1:
@@ -64,7 +64,7 @@ def find_table(root: Path) -> Path:
 
 
 def read_rows(table: Path) -> ParameterTable:
-    """The content of a table. Raises `InputError` that names the row for any mistake in it."""
+    """Reads the content of a table. Raises `InputError` that names the row for any mistake in it."""
     records, notes = _json_records(table) if table.suffix.lower() == ".json" else _csv_records(table)
     if not records or not all(SEQUENCE in record for _, record in records):
         raise InputError(f"import {table}: expected rows with a column {SEQUENCE!r}")

@@ -15,7 +15,7 @@ from odeform.dataset.importers.frame_reading import DISPLACEMENT, VTK
 from odeform.dataset.importers.recording import Recording
 from odeform.dataset.importers.unpacking import Unpacked
 from odeform.dataset.motion_arrays import read_motion_arrays
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.motion_capture import read_c3d
 from odeform.formats.vtk_files import read_grid
 from odeform.formats.vtk_grid import Grid, outside_of
@@ -41,7 +41,7 @@ def folder_recording(folder: Path) -> Recording:
 
 
 def npz_recording(path: Path) -> Recording:
-    """Vertices (T, N, 3), perhaps times (T,) s and faces (F, 3), in an `.npz` file."""
+    """Reads vertices (T, N, 3), perhaps times (T,) s and faces (F, 3), in an `.npz` file."""
     where = f"import {path}"
     motion = read_motion_arrays(_content(path, MEMORY // 4), where)
 
@@ -56,10 +56,10 @@ def npz_recording(path: Path) -> Recording:
 
 
 def c3d_recording(path: Path) -> Recording:
-    """The markers of a C3D file, as points without faces."""
+    """Reads the markers of a C3D file, as points without faces."""
     where = f"import {path}"
     capture = read_c3d(_content(path, MEMORY // 4), where)
-    notes = (*capture.notes, f"{len(capture.labels)} markers as points: {', '.join(capture.labels[:8])}"
+    notes = (*capture.notes, f"{counted(len(capture.labels), 'marker')} as points: {', '.join(capture.labels[:8])}"
              f"{' …' if len(capture.labels) > 8 else ''}")  # fmt: skip
     return Recording(
         where, len(capture.times), lambda: (capture.points, NO_FACES), capture.times, metric=True, notes=notes
@@ -67,7 +67,7 @@ def c3d_recording(path: Path) -> Recording:
 
 
 def zip_recording(path: Path) -> Recording:
-    """The frames in a zipped folder."""
+    """Reads the frames in a zipped folder."""
     archive = Unpacked(path)
     with archive.named():
         found = folder_recording(archive.root)
@@ -81,7 +81,7 @@ def zip_recording(path: Path) -> Recording:
 
 
 def vtk_recording(path: Path) -> Recording:
-    """One file of VTK with a field of displacements for each frame: displacement0, displacement1, ..."""
+    """Reads one file of VTK with a field of displacements for each frame: displacement0, displacement1, ..."""
     where = f"import {path}"
     grid = read_grid(path, where)
     numbered = {}
@@ -113,7 +113,7 @@ def vtk_recording(path: Path) -> Recording:
 
 
 def listed_frames(path: Path) -> Recording:
-    """The frames that a `.pvd` or `.series` file of ParaView lists, with their times."""
+    """Reads the frames that a `.pvd` or `.series` file of ParaView lists, with their times."""
     where = f"import {path}"
     data = _content(path, LARGEST_LIST)
     listed = _collection(data, where) if path.suffix.lower() == LISTS[0] else _series(data, where)

@@ -15,7 +15,7 @@ PROPOSED = ("mm", "cm", "um")
 
 
 def body_size(points: Points) -> float:
-    """The largest extent of (N, 3) points along an axis, to three digits."""
+    """Returns the largest extent of (N, 3) points along an axis, to three digits."""
     return float(f"{np.ptp(points.astype(float), axis=0).max():.3g}")
 
 

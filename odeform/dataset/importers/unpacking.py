@@ -49,12 +49,12 @@ class Unpacked:
         self.root = inside[0] if len(inside) == 1 and inside[0].is_dir() else self._folder
 
     def renamed(self, message: str) -> str:
-        """A message with the path of the archive in place of the temporary folder."""
+        """Returns a message with the path of the archive in place of the temporary folder."""
         return message.replace(str(self._folder), str(self._path))
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """A context in which an `InputError` names the archive instead of the temporary folder."""
+        """Returns a context in which an `InputError` names the archive instead of the temporary folder."""
         try:
             yield
         except InputError as error:

@@ -53,7 +53,7 @@ def read_floats(document: Document, index: object, width: int, count: int | None
 
 
 def read_indices(document: Document, index: object, count: int) -> NDArray[np.int64]:
-    """(M,) indices below `count`. `InputError` for anything else."""
+    """Reads (M,) indices below `count`. `InputError` for anything else."""
     numbers = read_accessor(document, index)
     if numbers.shape[1] != 1 or numbers.dtype.kind not in "iu":
         raise InputError(f"{document.where}: accessor {index}: expected whole numbers as indices")

@@ -77,7 +77,7 @@ class Document:
         return items[index]
 
     def number(self, of: Tree, name: str, default: int | None = None) -> int:
-        """A whole number of at least 0. Raises `InputError` for anything else."""
+        """Reads a whole number of at least 0. Raises `InputError` for anything else."""
         value = of.get(name, default)
         if isinstance(value, float) and value.is_integer():
             value = int(value)
@@ -86,7 +86,7 @@ class Document:
         return value
 
     def extension(self, of: Tree, name: str) -> Tree | None:
-        """What an extension says of an object; None without."""
+        """Returns what an extension says of an object; None without."""
         extensions = of.get("extensions")
         found = extensions.get(name) if isinstance(extensions, dict) else None
         return found if isinstance(found, dict) else None

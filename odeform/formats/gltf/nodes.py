@@ -34,7 +34,7 @@ class Scene:
         self._walk()
 
     def placed(self) -> Iterator[tuple[Tree, Tree, NDArray[np.float64]]]:
-        """Node, mesh and the places (K, 4, 4) of its copies, of each node with a mesh."""
+        """Lists node, mesh and the places (K, 4, 4) of its copies, of each node with a mesh."""
         document, total = self._document, 0
         for index, matrix in self.world.items():
             node = self._nodes[index]

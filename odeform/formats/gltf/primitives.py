@@ -36,7 +36,7 @@ class Primitive:
 
 
 def read_primitive(document: Document, primitive: Tree, weights: Floats, joints: Floats | None) -> Primitive:
-    """A part with morph targets added by `weights` (T,) and moved by `joints` (J, 4, 4), bound pose to world.
+    """Reads a part with morph targets added by `weights` (T,) and moved by `joints` (J, 4, 4), bound pose to world.
 
     Raises:
         InputError: For compressed or damaged data.
@@ -60,7 +60,7 @@ def read_primitive(document: Document, primitive: Tree, weights: Floats, joints:
 
 
 def attributes_of(document: Document, primitive: Tree) -> Tree:
-    """The attributes of a primitive. Raises `InputError` without positions."""
+    """Returns the attributes of a primitive. Raises `InputError` without positions."""
     attributes = primitive.get("attributes")
     if not isinstance(attributes, dict) or "POSITION" not in attributes:
         raise InputError(f"{document.where}: expected a primitive with positions")
@@ -96,12 +96,12 @@ def _skinned(document: Document, points: Floats, attributes: Tree, joints: Float
         if not all(name in attributes for name in names):
             break
         bones = read_floats(document, attributes[names[0]], 4, len(points)).astype(int)
-        shares = read_floats(document, attributes[names[1]], 4, len(points))
+        influences = read_floats(document, attributes[names[1]], 4, len(points))
         if len(bones) and not 0 <= bones.min() <= bones.max() < len(joints):
             raise InputError(f"{document.where}: a vertex refers to bone {bones.max()}, of {len(joints)}")
         for k in range(4):
-            blend += shares[:, k, None, None] * joints[bones[:, k]]
-        total += shares.sum(axis=1)
+            blend += influences[:, k, None, None] * joints[bones[:, k]]
+        total += influences.sum(axis=1)
     if len(total) and not (total > 1e-6).all():
         raise InputError(f"{document.where}: expected weights of bones for every vertex, got none for some")
     moved = np.einsum("nij,nj->ni", blend[:, :3, :3], points) + blend[:, :3, 3]

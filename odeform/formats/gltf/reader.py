@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from odeform.budget import require_memory
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.formats.gltf.document import Document, Tree, read_document
 from odeform.formats.gltf.materials import Materials
 from odeform.formats.gltf.nodes import Scene
@@ -24,7 +24,7 @@ Colors = UInt8[np.ndarray, "vertices 3"]
 
 @dataclass
 class _Parts:
-    """What has been placed so far; `colors` has None for parts without."""
+    """Holds what has been placed so far; `colors` has None for parts without."""
 
     points: list[Floats] = field(default_factory=list)
     faces: list[Faces] = field(default_factory=list)
@@ -78,21 +78,21 @@ def read_gltf(path: Path, merge: bool) -> Geometry:
     if document.items("animations"):
         document.note("animation left out: the shape is in the pose of the file's nodes")
     if lines:
-        document.note(f"{lines} parts of lines left out")
+        document.note(f"{counted(lines, 'part')} of lines left out")
     return _joined(document, meshes, clouds, splats)
 
 
 def _joined(document: Document, meshes: _Parts, clouds: _Parts, splats: list[GaussianSplats]) -> Geometry:
     if splats:
         if meshes.count or clouds.count:
-            document.note(f"{meshes.count + clouds.count:,} points of meshes beside the splats left out")
+            document.note(f"{counted(meshes.count + clouds.count, 'point')} of meshes beside the splats left out")
         whole = joined(splats)
         return GaussianSplats(
             whole.points, whole.covariances, whole.harmonics, whole.opacities, tuple(document.notes), UP
         )
     if meshes.count:
         if clouds.count:
-            document.note(f"{clouds.count:,} points beside the mesh left out")
+            document.note(f"{counted(clouds.count, 'point')} beside the mesh left out")
         faces, colors = np.concatenate(meshes.faces), meshes.painted()
         corners = None if colors is None else colors[faces]
         return Mesh(np.concatenate(meshes.points), faces, corners, tuple(document.notes), UP)
@@ -118,7 +118,7 @@ def _place(parts: _Parts, part: Primitive, colors: Colors | None, copies: Floats
 
 
 def _weights(document: Document, node: Tree, mesh: Tree) -> Floats:
-    """(T,) shares of the morph targets."""
+    """(T,) weights of the morph targets."""
     values = node.get("weights", mesh.get("weights", []))
     try:
         weights = np.array(values, dtype=float).reshape(-1)

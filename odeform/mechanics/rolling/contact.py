@@ -22,7 +22,7 @@ __all__ = [
     "PLAIN",
     "REACHING",
     "RollingContact",
-    "first_law",
+    "initial_contact",
     "material_terms",
 ]
 
@@ -32,16 +32,16 @@ COEFFICIENTS = {
     "damping": -0.1,  # s/m at a depth of 1 cm
     "damping_power": -2.0,  # of the depth that damping grows with: the logarithm of its odds
     "friction": -0.8,  # Coulomb coefficient
-    "grip": -1.7,  # m/s of sliding at which friction sets in
+    "regularisation": -1.7,  # m/s of sliding at which friction sets in
     "rolling": -6.5,  # lever in m by which the push brakes rolling
     "inertia": -0.4,  # about the axis, relative to mass and squared radius
-    "corners": -0.5,  # share of the mesh's corners that is felt
+    "corners": -0.5,  # weight of the corners of the mesh
 }
-"""Logarithms to start from, by name. Besides, `touch` and `radius` are quadratic functions themselves."""
-PLAIN = {"touch": 1.0, "radius": 0.0}
-"""mm above the height at rest from which on the floor is touched, and the lever of friction, in tenths of a radius more
-than one."""
-ADJUSTED = ("stiffness", "damping", "friction", "rolling", "grip", "corners")
+"""Logarithms to start from, by name. Besides, `height` and `radius` are quadratic functions themselves."""
+PLAIN = {"height": 1.0, "radius": 0.0}
+"""The contact height: mm above the height at rest from which on the floor is touched, and the lever of friction, in
+tenths of a radius more than one."""
+ADJUSTED = ("stiffness", "damping", "friction", "rolling", "regularisation", "corners")
 """Coefficients whose logarithm the network adds to."""
 PLACES, REACHING = np.linspace(-0.6, 0.6, 13), 0.1
 """Angles in rad about the place that the body rested on, where its weight has settled it, and how far each reaches."""
@@ -52,7 +52,7 @@ INPUTS = 4
 
 @dataclass(frozen=True, eq=False)
 class RollingContact:
-    """The numbers of one law."""
+    """Holds the contact parameters of a rolling body, and their network."""
 
     terms: Float[np.ndarray, "coefficients terms"]
     """Coefficients of quadratic functions of the material, in the order of `COEFFICIENTS` and `PLAIN`."""
@@ -63,17 +63,17 @@ class RollingContact:
     last: Float[np.ndarray, "hidden adjusted"]
 
     def flat(self) -> Float[np.ndarray, " numbers"]:
-        """All numbers in one axis."""
+        """Returns all numbers in one axis."""
         return np.concatenate([getattr(self, field.name).ravel() for field in fields(self)])
 
     def like(self, flat: Float[np.ndarray, " numbers"]) -> "RollingContact":
-        """A law of the same sizes with the numbers (n,) of `flat`."""
+        """Makes contact parameters of the same sizes with the numbers (n,) of `flat`."""
         shapes = [getattr(self, field.name).shape for field in fields(self)]
         parts = np.split(flat, np.cumsum([np.prod(shape) for shape in shapes])[:-1])
         return RollingContact(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
     def coefficients(self, material: Float[np.ndarray, "motions materials"]) -> dict[str, Floats]:
-        """By name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
+        """Returns by name (M,), for materials (M, Q): logarithms of `COEFFICIENTS`, and `PLAIN`."""
         found = self.terms @ material_terms(material).T
         return dict(zip([*COEFFICIENTS, *PLAIN], found, strict=True))
 
@@ -84,18 +84,19 @@ class RollingContact:
     @classmethod
     def from_arrays(cls, arrays: Arrays, materials: int) -> "RollingContact":
         """KeyError for a missing array, ValueError unless they are finite and of their shapes."""
-        like = first_law(materials, 0)
+        like = initial_contact(materials, 0)
         return cls(**finite_arrays(arrays, "law.", {f.name: getattr(like, f.name).shape for f in fields(cls)}))
 
 
 def material_terms(material: Float[np.ndarray, "motions materials"]) -> Float[np.ndarray, "motions terms"]:
-    """(M, Q) -> (M, 1 + Q + Q (Q + 1) / 2): one, the values, and their products."""
+    """Maps (M, Q) to (M, 1 + Q + Q (Q + 1) / 2): one, the values, and their products."""
     left, right = np.triu_indices(material.shape[1])
     return np.concatenate([np.ones((len(material), 1)), material, material[:, left] * material[:, right]], axis=1)
 
 
-def first_law(materials: int, seed: int) -> RollingContact:
-    """The law that a training starts from: independent of the material, with a network that adds nothing yet."""
+def initial_contact(materials: int, seed: int) -> RollingContact:
+    """Makes the contact parameters that a training starts from: they do not depend on the material, and the network
+    adds nothing yet."""
     rng, inputs = np.random.default_rng(seed), INPUTS + materials
     starts = [*COEFFICIENTS.values(), *PLAIN.values()]
     terms = np.zeros((len(starts), material_terms(np.zeros((1, materials))).shape[1]))

@@ -1,9 +1,9 @@
-"""The right-hand side of the ODE of a round body that flies, lands and rolls under a learned law of contact.
+"""The right-hand side of the ODE of a round body that flies, lands and rolls under learned contact parameters.
 
 The state of a body that moves in a vertical plane has eight numbers: how far it is ahead (m), how high (m), its angle
 (rad), their rates, and two memories of how deep it was (cm), which fade in `FADING` seconds. With the depth d in cm,
 
-    N = k d^p max(1 - c d^q z', 0),   F = -mu N tanh(u / grip),
+    N = k d^p max(1 - c d^q z', 0),   F = -mu N tanh(u / s),
 
 are the accelerations by which the floor pushes up, and brakes a contact that slides with the speed u. The depth depends
 on the angle: a mesh has corners, and its own weight has settled the body where it rested. That turns it, too.
@@ -23,13 +23,13 @@ __all__ = [
     "AHEAD",
     "AROUND",
     "CLEAR",
+    "CORNER_WEIGHTS",
     "DEEP",
     "DEPTHS",
     "EXPONENTS",
     "FADING",
     "MOVING",
     "POWERS",
-    "SHARES",
     "SPIN",
     "STATE",
     "UPWARD",
@@ -42,12 +42,12 @@ MOVING = 3
 """Coordinates of the position, which come first; their rates come next."""
 FADING = (0.008, 0.025)
 STATE = 2 * MOVING + len(FADING)
-CLEAR = 2e-3  # m above the touch from which on nothing touches, corners included
+CLEAR = 2e-3  # m above the contact height from which on nothing touches, corners included
 FASTEST = 60.0  # m/s and rad/s: rates beyond are no motion, and are kept from overflowing
 DEEP, UPWARD, AHEAD = 2.0, 2.0, 2.0  # units of the network's inputs: cm, m/s, m/s
 EXPONENTS = (-12.0, 8.0)
 POWERS = (-3.0, 2.0)  # the logarithm
-SHARES = (-6.0, 1.0)  # the logarithm of the corners' share
+CORNER_WEIGHTS = (-6.0, 1.0)  # the logarithm of the weight of corners
 DEPTHS = (1e-9, 1e3)  # cm: what is shallower does not touch, what is deeper is lost
 AROUND = float(PLACES[-1]) + 4.0 * REACHING  # rad: beyond, nothing has settled
 SPIN = 1.0  # rad/s, from which on rolling is braked fully
@@ -83,8 +83,8 @@ class Contacts:
     """The push (m/s^2) without its damping."""
     damped: Floats
     """Its factor; below zero, the floor does not push."""
-    grip: Floats
-    """Share of the friction that acts, with its sign."""
+    mobilised: Floats
+    """The fraction of the friction that acts, with its sign."""
     brake: Floats
     """The lever in m by which the push brakes rolling."""
     push: Floats
@@ -97,28 +97,28 @@ class RollingDynamics:
     """The field of M motions at once."""
 
     def __init__(
-        self, law: RollingContact, support: Support, radius: float, material: Float[np.ndarray, "motions materials"]
+        self, contact: RollingContact, support: Support, radius: float, material: Float[np.ndarray, "motions materials"]
     ) -> None:
         """`radius` is that of the body in m, `material` that of each motion."""
-        self.law, self.support, self.radius, self.material = law, support, radius, material
-        self.logs = logs = law.coefficients(material)
+        self.contact, self.support, self.radius, self.material = contact, support, radius, material
+        self.logs = logs = contact.coefficients(material)
         linear = np.concatenate([np.ones((len(material), 1)), material], axis=1)
-        self.settled = 1e-3 * linear @ law.settled.T
+        self.settled = 1e-3 * linear @ contact.settled.T
         """(M, places) m by which the bodies stand higher at each of `PLACES`."""
-        self.touch, self.lever = 1e-3 * logs["touch"], radius * (1.0 + 0.1 * logs["radius"])
+        self.contact_height, self.lever = 1e-3 * logs["height"], radius * (1.0 + 0.1 * logs["radius"])
         self.inertia = np.exp(logs["inertia"]) * radius**2
         self.power = np.exp(np.clip(logs["power"], *POWERS))
         self.damping_power = 1.0 / (1.0 + np.exp(-logs["damping_power"]))
-        self.share = np.exp(np.clip(logs["corners"], *SHARES))
+        self.corner_weight = np.exp(np.clip(logs["corners"], *CORNER_WEIGHTS))
         self.bases = np.stack([logs[name] for name in ADJUSTED], axis=1)
-        self.bias = law.bias + material @ law.first[INPUTS:]
+        self.bias = contact.bias + material @ contact.first[INPUTS:]
 
     def slopes(self, states: Float[np.ndarray, "states motions"]) -> Floats:
-        """(8, M) -> (8, M)."""
+        """Maps states (8, M) to their slopes (8, M)."""
         return self.with_contacts(states)[0]
 
     def with_contacts(self, states: Float[np.ndarray, "states motions"]) -> tuple[Floats, Contacts]:
-        """The `slopes` (8, M), and what causes them."""
+        """Returns the `slopes` (8, M), and what causes them."""
         out = np.empty_like(states)
         out[:MOVING] = states[MOVING : 2 * MOVING]
         out[MOVING : 2 * MOVING] = np.array([0.0, -GRAVITY, 0.0])[:, None]
@@ -133,7 +133,7 @@ class RollingDynamics:
         return out, touching
 
     def _contacts(self, states: Floats) -> Contacts:
-        rows = np.flatnonzero(self.touch + CLEAR > states[1])
+        rows = np.flatnonzero(self.contact_height + CLEAR > states[1])
         height, angle = states[1, rows], states[2, rows]
         moving = fast, up, spin = states[MOVING : 2 * MOVING, rows]
         corners, corner_slopes = self.support.at(angle)
@@ -142,20 +142,20 @@ class RollingDynamics:
         reached = np.exp(-0.5 * apart**2) * (np.abs(turned) < AROUND)[:, None]
         settled = reached * self.settled[rows]
         settled_slopes = -(apart * settled).sum(axis=1) / REACHING
-        gap = self.touch[rows] + settled.sum(axis=1) - height + self.share[rows] * corners
+        gap = self.contact_height[rows] + settled.sum(axis=1) - height + self.corner_weight[rows] * corners
         depth = np.clip(100.0 * gap, *DEPTHS)
         lever = self.lever[rows]
         sliding = fast - lever * spin
         inputs = np.stack([depth / DEEP, up / UPWARD, np.abs(sliding), np.abs(fast) / AHEAD], axis=1)
-        hidden = np.tanh(inputs @ self.law.first[:INPUTS] + self.bias[rows])
-        exponents = self.bases[rows] + hidden @ self.law.last
+        hidden = np.tanh(inputs @ self.contact.first[:INPUTS] + self.bias[rows])
+        exponents = self.bases[rows] + hidden @ self.contact.last
         strong = np.exp(np.clip(exponents, *EXPONENTS))
-        stiffness, damping, friction, rolling, slow, felt = strong.T
+        stiffness, damping, friction, rolling, regularisation, felt = strong.T
         spring = stiffness * depth ** self.power[rows]
         damped = 1.0 - damping * depth ** self.damping_power[rows] * up
         push = spring * np.maximum(damped, 0.0)
-        grip = np.tanh(sliding / slow)
-        drag = -friction * push * grip
+        mobilised = np.tanh(sliding / regularisation)
+        drag = -friction * push * mobilised
         brake = rolling * np.tanh(spin / SPIN)
         torque = -drag * lever - push * (brake + felt * corner_slopes + settled_slopes)
         return Contacts(
@@ -175,7 +175,7 @@ class RollingDynamics:
             strong=strong,
             spring=spring,
             damped=damped,
-            grip=grip,
+            mobilised=mobilised,
             brake=brake,
             push=push,
             drag=drag,

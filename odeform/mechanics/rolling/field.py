@@ -36,7 +36,7 @@ __all__ = ["make_field", "units_of"]
 FULL = 2.0 * math.pi
 FIRST, ALONG, COUNT = float(PLACES[0]), float(PLACES[1] - PLACES[0]) / REACHING, len(PLACES)
 STRONG = len(ADJUSTED)
-# where the numbers of one motion begin, after those that are named in `_slope`, and those of the law
+# where the numbers of one motion begin, after those that are named in `_slope`, and those of the contact
 BASES, BIAS, BUMPS, LEANING = np.cumsum([7, STRONG, HIDDEN, COUNT]).tolist()
 LAST, HEIGHTS = INPUTS * HIDDEN, (INPUTS + STRONG) * HIDDEN
 
@@ -49,23 +49,26 @@ def units_of(radius: float) -> Float[np.ndarray, "8"]:
     return units
 
 
-def make_field(law: RollingContact, support: Support, radius: float, material: Floats) -> Field:
-    """(t, state (8,) in `units_of(radius)`) -> its slope, for the material (Q,) of one body of `radius` m."""
-    dynamics = RollingDynamics(law, support, radius, material[None])
+def make_field(contact: RollingContact, support: Support, radius: float, material: Floats) -> Field:
+    """Maps (t, state (8,) in `units_of(radius)`) to its slope, for the material (Q,) of one body of `radius` m."""
+    dynamics = RollingDynamics(contact, support, radius, material[None])
     if not compiles():
         return _in_numpy(dynamics)
     settled = dynamics.settled[0]
     # evenly spaced Gaussians are one Gaussian times a polynomial of an exponential, highest power first
     bumps = (settled * np.exp(-0.5 * (ALONG * np.arange(COUNT)) ** 2))[::-1]
     leaning = ALONG * np.arange(COUNT)[::-1] * bumps
-    numbers = [getattr(dynamics, name)[0] for name in ("touch", "lever", "inertia", "share", "power", "damping_power")]
+    numbers = [
+        getattr(dynamics, name)[0]
+        for name in ("contact_height", "lever", "inertia", "corner_weight", "power", "damping_power")
+    ]
     own = np.concatenate([[*numbers, radius], dynamics.bases[0], dynamics.bias[0], bumps, leaning])
-    return CompiledField(_slope, own, shared_numbers(law, support), np.array([len(support.heights)]))
+    return CompiledField(_slope, own, shared_numbers(contact, support), np.array([len(support.heights)]))
 
 
-def shared_numbers(law: RollingContact, support: Support) -> Float[np.ndarray, " numbers"]:
+def shared_numbers(contact: RollingContact, support: Support) -> Float[np.ndarray, " numbers"]:
     """Collects what all motions have in common, as `_slope` is given it."""
-    return np.concatenate([law.first[:INPUTS].ravel(), law.last.ravel(), support.heights, support.slopes])
+    return np.concatenate([contact.first[:INPUTS].ravel(), contact.last.ravel(), support.heights, support.slopes])
 
 
 def _in_numpy(dynamics: RollingDynamics) -> Field:
@@ -82,13 +85,21 @@ def _in_numpy(dynamics: RollingDynamics) -> Field:
 @no_type_check
 def _slope(state: Floats, own: Floats, shared: Floats, sizes: Floats, out: Floats) -> None:
     """See `odeform.mechanics.rolling.dynamics`, whose arithmetic this is, for one state in `units_of` its radius."""
-    touch, lever, inertia, share, power, damping_power, radius = own[0], own[1], own[2], own[3], own[4], own[5], own[6]
+    contact_height, lever, inertia, corner_weight, power, damping_power, radius = (
+        own[0],
+        own[1],
+        own[2],
+        own[3],
+        own[4],
+        own[5],
+        own[6],
+    )
     height, angle, ahead, rising, spin = state[1], state[2] / radius, state[3], state[4], state[5] / radius
     if not math.isfinite(height + angle + ahead + rising + spin):  # the integration ends here, with a status
         out[:] = np.nan
         return
     fast, rise, turn, depth = 0.0, 0.0, 0.0, 0.0
-    if touch + CLEAR > height:
+    if contact_height + CLEAR > height:
         places = sizes[0] - 1
         place = angle / FULL % 1.0 * places
         index = min(int(place), places - 1)
@@ -97,7 +108,7 @@ def _slope(state: Floats, own: Floats, shared: Floats, sizes: Floats, out: Float
         corner = shared[at] + part * (shared[at + 1] - shared[at])
         at += sizes[0]
         corner_slope = shared[at] + part * (shared[at + 1] - shared[at])
-        gap, tilt = touch - height + share * corner, 0.0
+        gap, tilt = contact_height - height + corner_weight * corner, 0.0
         turned = (angle + math.pi) % FULL - math.pi
         if abs(turned) < AROUND:
             apart = (turned - FIRST) / REACHING
@@ -118,9 +129,9 @@ def _slope(state: Floats, own: Floats, shared: Floats, sizes: Floats, out: Float
                 strong[k] += hidden * shared[LAST + j * STRONG + k]
         for k in range(STRONG):
             strong[k] = math.exp(min(max(strong[k], EXPONENTS[0]), EXPONENTS[1]))
-        stiffness, damping, friction, rolling, grip, felt = strong
+        stiffness, damping, friction, rolling, regularisation, felt = strong
         rise = stiffness * depth**power * max(1.0 - damping * depth**damping_power * rising, 0.0)
-        fast = -friction * rise * math.tanh(sliding / grip)
+        fast = -friction * rise * math.tanh(sliding / regularisation)
         brake = rolling * math.tanh(spin / SPIN)
         turn = (-fast * lever - rise * (brake + felt * corner_slope + tilt)) / inertia
     out[0], out[1], out[2] = ahead, rising, state[5]

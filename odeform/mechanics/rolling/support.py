@@ -24,14 +24,14 @@ class Support:
     """m per rad."""
 
     def at(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Heights and slopes (...) at angles (...) in rad, of any size."""
-        index, share = self._place(angles)
+        """Returns heights and slopes (...) at angles (...) in rad, of any size."""
+        index, part = self._place(angles)
         return tuple(  # pyright: ignore
-            table[index] + share * (table[index + 1] - table[index]) for table in (self.heights, self.slopes)
+            table[index] + part * (table[index + 1] - table[index]) for table in (self.heights, self.slopes)
         )
 
     def bends(self, angles: Floats) -> Floats:
-        """(...) derivatives of the slopes at angles (...) in rad, m per rad^2."""
+        """Computes (...) derivatives of the slopes at angles (...) in rad, m per rad^2."""
         index, _ = self._place(angles)
         return (self.slopes[index + 1] - self.slopes[index]) * (len(self.slopes) - 1) / (2.0 * np.pi)
 
@@ -50,8 +50,8 @@ def support_of(points: Points, axis: Vector) -> Support:
     # a positive angle turns the direction ahead downwards
     depths = np.outer(np.sin(angles), ahead) - np.outer(np.cos(angles), points @ UP)
     deepest, rounded = depths.max(axis=1), ROUNDED * np.linalg.norm(points, axis=1).mean()
-    shares = np.exp((depths - deepest[:, None]) / rounded)
-    heights = deepest + rounded * np.log(shares.sum(axis=1))
+    weights = np.exp((depths - deepest[:, None]) / rounded)
+    heights = deepest + rounded * np.log(weights.sum(axis=1))
     turned = np.outer(np.cos(angles), ahead) + np.outer(np.sin(angles), points @ UP)
-    slopes = (shares * turned).sum(axis=1) / shares.sum(axis=1)
+    slopes = (weights * turned).sum(axis=1) / weights.sum(axis=1)
     return Support(heights - heights[0], slopes)

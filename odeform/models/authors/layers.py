@@ -20,12 +20,12 @@ Rows = Float[np.ndarray, "rows _"]
 
 
 def chunks(count: int) -> Iterator[slice]:
-    """Slices that split `count` points into chunks of at most `CHUNK`."""
+    """Returns slices that split `count` points into chunks of at most `CHUNK`."""
     return (slice(begin, begin + CHUNK) for begin in range(0, count, CHUNK))
 
 
 def waves(points: Points) -> Rows:
-    """(N, 3) -> (N, 39): the coordinates, then their sines and cosines at six frequencies, three axes together."""
+    """Maps (N, 3) to (N, 39): the coordinates, then their sines and cosines at six frequencies, three axes together."""
     phases = [np.float32(2.0**k * np.pi) * points for k in range(FREQUENCIES)]
     return np.concatenate([points, *(f(phase) for phase in phases for f in (np.sin, np.cos))], axis=1)
 
@@ -47,7 +47,7 @@ class Affine:
 
     @classmethod
     def read(cls, arrays: Arrays, name: str, norm: str | None = None) -> "Affine":
-        """The layer of that name, followed by the batch norm `norm` with its stored statistics.
+        """Reads the layer of that name, followed by the batch norm `norm` with its stored statistics.
 
         KeyError for missing arrays, ValueError for wrong sizes.
         """

@@ -113,7 +113,7 @@ class Networks:
         offset: Float[np.ndarray, " offsets"],
         times: Times,
     ) -> tuple[Float[np.ndarray, "times offsets"], Frames]:
-        """Offsets (T, 1 or 3) and shapes (T, N, 3) at the (T,) times, all in the units of the networks.
+        """Returns offsets (T, 1 or 3) and shapes (T, N, 3) at the (T,) times, all in the units of the networks.
 
         `points` (N, 3), parameters `theta` and the first `offset` are normalised. Points are processed in chunks.
         """

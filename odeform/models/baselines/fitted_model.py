@@ -29,7 +29,7 @@ class FittedModel(ReducedModel):
     @staticmethod
     @abstractmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
-        """Arrays and settings of the checkpoint, from which `_read` restores the model."""
+        """Fits the arrays and settings of the checkpoint, from which `_read` restores the model."""
 
     def _check_inputs(self, theta: Floats) -> None:
         """Raise `ValueError` unless theta is (S, P), with the scene's P parameters."""

@@ -37,7 +37,7 @@ class FrameTrajectory:
         return float("inf")
 
     def reduced(self, times: Floats) -> Floats:
-        """(T,) seconds -> (T, 6 + K), zero at the first frame."""
+        """Maps (T,) seconds to (T, 6 + K), zero at the first frame."""
         return self._spline(np.clip(times, self._times[0], self._times[-1])) - self._origin
 
     @property

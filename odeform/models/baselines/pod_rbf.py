@@ -48,7 +48,8 @@ class PodRbf(FittedModel):
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
-        """Modes of the training motions; the kernel and smoothing with the smallest RMS displacement on validation."""
+        """Fits modes to the training motions; the kernel and smoothing with the smallest RMS displacement on
+        validation."""
         pod = fit_trajectory_pod(data)
 
         def error(kernel: str, smoothing: float) -> float:

@@ -26,16 +26,17 @@ class TrajectoryPod:
     """Coefficients of the training motions; the modes are orthonormal."""
 
     def project(self, reduced: Floats) -> Float[np.ndarray, "sequences modes"]:
-        """Coefficients of trajectories (S, T, 6 + K)."""
+        """Returns the coefficients of trajectories (S, T, 6 + K)."""
         return ((reduced * self.weight).reshape(len(reduced), -1) - self.mean) @ self.modes.T
 
     def error(self, coefficients: Floats, reduced: Floats) -> float:
-        """RMS distance in m between (S, modes) `coefficients` and trajectories (S, T, 6 + K), over the sequences."""
+        """Returns the RMS distance in m between (S, modes) `coefficients` and trajectories (S, T, 6 + K), over the
+        sequences."""
         target = (reduced * self.weight).reshape(len(reduced), -1)
         return float(np.sqrt(((self.mean + coefficients @ self.modes - target) ** 2).sum(axis=1).mean()))
 
     def arrays(self) -> Arrays:
-        """Mean and modes in the units of the coordinates, for a checkpoint."""
+        """Returns the mean and modes in the units of the coordinates, for a checkpoint."""
         unweight = np.tile(1.0 / self.weight, len(self.mean) // len(self.weight))
         return {
             "pod.mean": (self.mean * unweight).astype(np.float64),

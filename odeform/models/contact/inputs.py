@@ -43,11 +43,11 @@ class ContactInputs:
         return {}
 
     def frames(self, frame: str) -> Rotations:
-        """(S, 3, 3) rotations from the axes of the body to those of one of `FRAMES`."""
+        """Computes (S, 3, 3) rotations from the axes of the body to those of one of `FRAMES`."""
         return self._in(frame)[0]
 
     def features(self, frame: str) -> tuple[list[Floats], Rows]:
-        """Groups of inputs (S, n), and the force (S, 3) in that frame.
+        """Returns the groups of inputs (S, n), and the force (S, 3) in that frame.
 
         In the body's own axes these are contact and force alone, else contact, normal, force, its part along the normal
         and its torque about the centre of mass.

@@ -122,7 +122,7 @@ class ContactRegression:
         return _Expert(scaling, logs, regression, arrays[f"{name}.mean"].astype(float))
 
     def predict(self, inputs: ContactInputs) -> Float[np.ndarray, "sequences times y"]:
-        """The motions of S contacts."""
+        """Predicts the motions of S contacts."""
         parts = []
         for part, experts in self._experts.items():
             turned = part != "deformation"
@@ -138,7 +138,8 @@ class ContactRegression:
 def fit_contact_regression(
     known: ContactInputs, asked: ContactInputs, times: Floats, train: Motions, val: Asked, energy: float = ENERGY
 ) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and settings of a checkpoint, from training and validation motions (S, T, 6 + K), times (T,) and inputs.
+    """Fits the arrays and settings of a checkpoint, from training and validation motions (S, T, 6 + K), times (T,) and
+    inputs.
 
     Kernels maximise the marginal likelihood; validation sets the blend. Modes of the trajectories of deformation hold
     the fraction `energy` of them. The setting `errors` has, for each part, the root of the mean squared norm of what

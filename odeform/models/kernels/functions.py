@@ -31,7 +31,8 @@ def matern(
 
 
 def matern_slope(difference: Inputs, order: int = 2) -> Inputs:
-    """(rows, inputs): the derivative of the kernel by the first input, at differences `difference` from the second."""
+    """Computes (rows, inputs): the derivative of the kernel by the first input, at differences `difference` from the
+    second."""
     r = np.sqrt((2 * order + 1) * (difference**2).sum(axis=1))
     pull = np.polyval(_polynomial(order - 1), r) * np.exp(-r)
     return -(2 * order + 1) / (2 * order - 1) * pull[:, None] * difference
@@ -40,7 +41,7 @@ def matern_slope(difference: Inputs, order: int = 2) -> Inputs:
 def scaled_distance(
     one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2
 ) -> Float[np.ndarray, "rows columns"]:
-    """sqrt(2 p + 1) times the Euclidean distance."""
+    """Returns sqrt(2 p + 1) times the Euclidean distance."""
     squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
     return np.sqrt((2.0 * order + 1.0) * np.maximum(squares, 0.0))
 

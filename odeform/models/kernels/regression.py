@@ -45,7 +45,8 @@ class Kernel:
         return out
 
     def slopes(self, x: Float[np.ndarray, " inputs"], other: Inputs) -> Float[np.ndarray, "inputs rows"]:
-        """(D, S): derivatives of the covariances with S others by each input; Matern kernels without a linear term."""
+        """Computes (D, S): derivatives of the covariances with S others by each input; Matern kernels without a linear
+        term."""
         assert self.order is not None
         assert self.linear is None
         return (matern_slope((x - other) / self.scales, self.order) / self.scales).T
@@ -67,6 +68,6 @@ class KernelRegression:
         return out if self.trend is None else self.trend[0] + x @ self.trend[1:] + out
 
     def jet(self, x: Float[np.ndarray, " inputs"]) -> Float[np.ndarray, "jet outputs"]:
-        """(1 + D, M) at one input (D,): the value, and its derivatives by each input."""
+        """Computes (1 + D, M) at one input (D,): the value, and its derivatives by each input."""
         slopes = self.kernel.slopes(x, self.inputs) @ self.weights
         return np.concatenate([self(x[None]), slopes if self.trend is None else slopes + self.trend[1:]])

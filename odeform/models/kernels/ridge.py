@@ -35,7 +35,7 @@ class Ridge:
     error: float = float("inf")
 
     def fit(self, x: Inputs, outputs: Float[np.ndarray, "known outputs"]) -> KernelRegression:
-        """The regression of outputs (S, M) on inputs (S, D)."""
+        """Fits the regression of outputs (S, M) on inputs (S, D)."""
         return KernelRegression(self.kernel, x, cho_solve(self._factor(x), outputs))
 
     def leave_one_out(self, x: Inputs, outputs: Floats) -> tuple[Floats, KernelRegression]:
@@ -49,8 +49,8 @@ class Ridge:
         return weights / np.diag(inverse)[:, None], KernelRegression(self.kernel, x, weights)
 
     def rms(self, x: Inputs, outputs: Floats, asked: Floats, expected: Floats) -> float:
-        """RMS error, over sequences, of outputs (S, M) at `x` (S, D), each predicted from all the others, and of those
-        `expected` (A, M) at `asked` (A, D)."""
+        """Returns the RMS error, over sequences, of outputs (S, M) at `x` (S, D), each predicted from all the
+        others, and of those `expected` (A, M) at `asked` (A, D)."""
         left_out, regression = self.leave_one_out(x, outputs)
         residual = regression(asked) - expected
         return float(np.hypot(np.linalg.norm(left_out), np.linalg.norm(residual)) / np.sqrt(len(x) + len(asked)))

@@ -51,7 +51,7 @@ class ModelConfig:
         return [slice(0, split), slice(split, None)] if self.rigid else [slice(0, None)]
 
     def latent(self, branch: str) -> int:
-        """Size of the latent state of a branch."""
+        """Returns the size of the latent state of a branch."""
         return self.rigid_latent if branch == "rigid" else self.local_latent
 
     def sizes(self, branch: str) -> dict[str, list[int]]:

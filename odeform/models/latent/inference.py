@@ -50,8 +50,8 @@ def _mlp(layers: Layers, x: Floats, activation: Callable[[Floats], Floats]) -> F
 
 
 def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, areas: Floats) -> list[Floats]:
-    """Features of a shape for each branch: points (N, 3) in units of the radius of gyration, areas (N,) as fractions of
-    the whole.
+    """Pools the features of a shape for each branch: points (N, 3) in units of the radius of gyration, areas (N,) as
+    fractions of the whole.
 
     They stay zero where no feature counts, as in a model trained on one shape: a million points take seconds.
     """
@@ -66,7 +66,7 @@ def pool_shape(weights: Arrays, config: ModelConfig, points: Floats, areas: Floa
 
 
 def make_encoder(weights: Arrays, config: ModelConfig) -> Encoder:
-    """The encoder of all branches: features (C,) of each branch and theta (P,) -> the state (L,) at time 0. Of
+    """Makes the encoder of all branches: features (C,) of each branch and theta (P,) -> the state (L,) at time 0. Of
     many motions: (B, C) and (B, P) -> (B, L)."""
     statistics = encoder_statistics(weights, config)
     heads = [read_layers(weights, f"{branch}_encoder.head", np.float64) for branch in config.branches]

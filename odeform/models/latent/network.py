@@ -19,7 +19,7 @@ __all__ = ["Decoder", "ODeformNet", "ShapeEncoder"]
 
 
 def mlp(sizes: list[int], activation: type[nn.Module]) -> nn.Sequential:
-    """Linear layers of these widths with the activation between them."""
+    """Builds linear layers of these widths with the activation between them."""
     layers: list[nn.Module] = []
     for before, after in itertools.pairwise(sizes):
         layers += [nn.Linear(before, after), activation()]
@@ -44,7 +44,7 @@ class ShapeEncoder(nn.Module):
         self.register_buffer("pooled_gain", torch.zeros(sizes["encoder.points"][-1]))
 
     def pool(self, points: torch.Tensor, weights: torch.Tensor) -> torch.Tensor:
-        """(N, 3) points in units of the radius of gyration and (N,) weights summing to 1 -> (width,)."""
+        """Maps (N, 3) points in units of the radius of gyration and (N,) weights summing to 1 to (width,)."""
         return weights @ self.points(points)
 
     @torch.no_grad()
@@ -57,7 +57,7 @@ class ShapeEncoder(nn.Module):
         self.pooled_gain.copy_(torch.where(spread > 1e-2, 1.0 / spread.clamp_min(1e-12), 0.0))
 
     def forward(self, pooled: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(B, width) pooled features and (B, P) parameters in [-1, 1] -> (B, latent)."""
+        """Maps (B, width) pooled features and (B, P) parameters in [-1, 1] to (B, latent)."""
         features = (pooled - self.pooled_mean) * self.pooled_gain
         return self.head(torch.cat([features, theta], dim=-1))
 
@@ -83,7 +83,7 @@ class Decoder(nn.Module):
         self.readout = nn.Linear(*sizes["decoder.readout"], bias=False)
 
     def features(self, states: torch.Tensor, conditions: torch.Tensor) -> torch.Tensor:
-        """(T, B, latent), (T, B, 1 + P) -> (T, B, F), relative to the first of the T."""
+        """Maps (T, B, latent), (T, B, 1 + P) to (T, B, F), relative to the first of the T."""
         inputs = self.random_inputs(states, conditions)
         features = inputs[..., : -conditions.shape[-1]]
         if self.random is not None:
@@ -91,7 +91,7 @@ class Decoder(nn.Module):
         return features - features[:1]
 
     def random_inputs(self, states: torch.Tensor, conditions: torch.Tensor) -> torch.Tensor:
-        """The inputs of random features, (T, B, latent + width + 1 + P): the state, its trained features, and the
+        """Draws the inputs of random features, (T, B, latent + width + 1 + P): the state, its trained features, and the
         conditions."""
         return torch.cat([states, self.hidden(torch.cat([states, conditions], dim=-1)), conditions], dim=-1)
 
@@ -146,7 +146,7 @@ class ODeformNet(nn.Module):
         return ([self.rigid_decoder] if self.config.rigid else []) + [self.local_decoder]
 
     def encode(self, shape: tuple[torch.Tensor, torch.Tensor], theta: torch.Tensor) -> torch.Tensor:
-        """One shape (points (N, 3), weights (N,)) and (B, P) parameters -> (B, state)."""
+        """Maps one shape (points (N, 3), weights (N,)) and (B, P) parameters to (B, state)."""
         return torch.cat(
             [e(e.pool(*shape).expand(len(theta), -1), theta) for e in self.encoders],
             dim=-1,
@@ -168,13 +168,13 @@ class ODeformNet(nn.Module):
         return roll_out(start, steps, branches)
 
     def conditions(self, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(T,) seconds, (B, P) -> (T, B, 1 + P): the clock and the parameters, for the decoders."""
+        """Maps (T,) seconds, (B, P) to (T, B, 1 + P): the clock and the parameters, for the decoders."""
         clock = 2.0 * times / (times + self.config.clock) - 1.0
         shape = len(times), len(theta), -1
         return self.visible_conditions * torch.cat([clock[:, None, None].expand(*shape), theta.expand(*shape)], dim=-1)
 
     def decode(self, states: torch.Tensor, times: torch.Tensor, theta: torch.Tensor) -> torch.Tensor:
-        """(T, B, state) at (T,) seconds, (B, P) -> (T, B, 6 + K) whitened, relative to the first of the T."""
+        """Maps (T, B, state) at (T,) seconds, (B, P) to (T, B, 6 + K) whitened, relative to the first of the T."""
         conditions = self.conditions(times, theta)
         out = [
             decoder.readout(decoder.features(states[..., part], conditions))

@@ -124,7 +124,8 @@ def _make_decoder(weights: Arrays, config: ModelConfig) -> Callable[[Floats, Tim
 
 
 def make_sensitivities(weights: Arrays, config: ModelConfig) -> Sensitivities:
-    """(pooled shape, theta (P,) in [-1, 1], quality, (T,) seconds) -> jet (1 + P, T, 6 + K) of reduced coordinates.
+    """Maps (pooled shape, theta (P,) in [-1, 1], quality, (T,) seconds) to jet (1 + P, T, 6 + K) of reduced
+    coordinates.
 
     NaN from where the integration failed.
     """

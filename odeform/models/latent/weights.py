@@ -37,7 +37,7 @@ def _shapes(config: ModelConfig) -> dict[str, tuple[int, ...]]:
 
 
 def encoder_statistics(weights: Arrays, config: ModelConfig) -> list[tuple[Floats, Floats]]:
-    """Mean (C,) and scale (C,) of the pooled shape features of each branch, in double precision."""
+    """Returns the mean (C,) and scale (C,) of the pooled shape features of each branch, in double precision."""
     names = [(f"{branch}_encoder.pooled_mean", f"{branch}_encoder.pooled_gain") for branch in config.branches]
     return [(weights[mean].astype(float), weights[scale].astype(float)) for mean, scale in names]
 

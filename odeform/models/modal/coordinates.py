@@ -34,12 +34,12 @@ class Coordinates:
     """(P,) i and j."""
 
     def along(self, directions: Float[np.ndarray, "modes directions"]) -> "Coordinates":
-        """The same maps from amplitudes of directions of deformation, whose first K are modes themselves."""
+        """Returns the same maps from amplitudes of directions of deformation, whose first K are modes themselves."""
         maps = {name: getattr(self, name) @ directions for name in ("shifts", "modal_rotations", "coefficients")}
         return replace(self, **maps)
 
     def reduced(self, shift: Vectors, rotation: Rotations, modes: Floats) -> Float[np.ndarray, "times y"]:
-        """(T, 6 + B): the body's motion as shift, rotation vector and coefficients, in m and radians."""
+        """Computes (T, 6 + B): the body's motion as shift, rotation vector and coefficients, in m and radians."""
         one, other = self.pairs
         arcs = (modes[:, one] * modes[:, other]) @ self.arcs
         turned = rotation @ rotation_from_vector(modes @ self.modal_rotations.T + arcs[:, 3:POSE])
@@ -100,7 +100,8 @@ def _arcs(body: ElasticBody, i: int) -> Float[np.ndarray, "pairs points 3"]:
 
 
 def space_of(body: ElasticBody, basis: Basis, largest: tuple[float, float]) -> ReducedSpace:
-    """The reduced space of a body, from its basis at the surface and the largest trained shift and deformation in m.
+    """Returns the reduced space of a body, from its basis at the surface and the largest trained shift and deformation
+    in m.
 
     It follows from the body: checkpoints need not hold it.
     """

@@ -67,7 +67,7 @@ class ElasticBody:
         return {"rest.points": self.points.astype(np.float32), "rest.faces": self.faces.astype(np.int32)}
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers of a checkpoint."""
+        """Returns the numbers of a checkpoint."""
         numbers = {key: value for key, value in asdict(self.solid).items() if key != "inertia"}
         return {**numbers, "dynamic": self.dynamic}
 

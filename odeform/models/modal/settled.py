@@ -46,7 +46,7 @@ class SettledBody:
         return np.concatenate([shift, vector_from_rotation(turn), y[:, POSE:] - self.y[POSE:]], axis=1)
 
     def absolute(self, pose: Float[np.ndarray, "times 6"]) -> Floats:
-        """(T, 6) the inverse of `relative`, of rigid motions."""
+        """Computes (T, 6) the inverse of `relative`, of rigid motions."""
         turn = rotation_from_vector(pose[:, 3:])
         return np.concatenate([pose[:, :3] + turn @ self.y[:3], vector_from_rotation(turn @ self.turn)], axis=1)
 

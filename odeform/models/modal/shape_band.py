@@ -50,7 +50,7 @@ class ShapeBand:
     """(T, 2) logarithms of the median and of the quantile `NOMINAL`."""
 
     def at(self, size: float, distance: float, times: Times) -> Floats:
-        """(T,) s -> (T, 2) mm for a motion of RMS displacement `size` mm. After the window it grows with time."""
+        """Maps (T,) s to (T, 2) mm for a motion of RMS displacement `size` mm. After the window it grows with time."""
         scale = np.exp(self.level) * size**self.by_size * (1.0 + distance / NEAR) ** self.by_distance
         frames = np.concatenate([[0.0], self.times])
         columns = np.concatenate([[[0.0, 0.0]], np.exp(self.profile)])
@@ -58,7 +58,7 @@ class ShapeBand:
         return scale * profile * np.maximum(times / self.times[-1], 1.0)[:, None]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Returns plain values."""
         return asdict(self)
 
     @classmethod

@@ -20,7 +20,7 @@ class Arithmetic(Protocol):
     """The operations that numpy and torch name differently, on arrays (..., features)."""
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any:
-        """x @ weight.T + bias for x (..., inputs): (..., outputs)."""
+        """Returns x @ weight.T + bias for x (..., inputs): (..., outputs)."""
         ...
 
     def join(self, parts: list[Any]) -> Any:
@@ -32,7 +32,7 @@ class Arithmetic(Protocol):
         ...
 
     def act(self, name: str, x: Any) -> Any:
-        """The activation function `name`, elementwise; any shape (...)."""
+        """Returns the activation function `name`, elementwise; any shape (...)."""
         ...
 
 
@@ -57,7 +57,7 @@ class Numpy:
     }
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any:
-        """x @ weight.T + bias for x (..., inputs): (..., outputs)."""
+        """Returns x @ weight.T + bias for x (..., inputs): (..., outputs)."""
         return x @ weight.T + bias
 
     def join(self, parts: list[Any]) -> Any:
@@ -69,7 +69,7 @@ class Numpy:
         return np.stack(parts)
 
     def act(self, name: str, x: Any) -> Any:
-        """The activation function `name`, elementwise; any shape (...). `KeyError` for an unknown name."""
+        """Returns the activation function `name`, elementwise; any shape (...). `KeyError` for an unknown name."""
         return self.acts[name](x)
 
 
@@ -81,7 +81,7 @@ class Net:
         self.join, self.stack, self.act = arithmetic.join, arithmetic.stack, arithmetic.act
 
     def layers(self, part: str, x: Any, act: str = "silu") -> Any:
-        """(..., inputs) -> (..., outputs): linear layers with `act` between them."""
+        """Maps (..., inputs) to (..., outputs): linear layers with `act` between them."""
         check_cancelled()
         index = 0
         while True:
@@ -92,7 +92,7 @@ class Net:
             x = self.act(act, x)
 
     def clock(self, times: Any) -> Any:
-        """(...) times in windows -> (..., CLOCK): the time, and its sines and cosines over octaves.
+        """Maps (...) times in windows to (..., CLOCK): the time, and its sines and cosines over octaves.
 
         Contacts last a few frames: without these features a network is too smooth in time at first, and trains slowly.
         """

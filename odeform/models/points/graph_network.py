@@ -24,7 +24,7 @@ class GraphNetwork(nn.Module):
         self.decoder = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 3))
 
     def forward(self, nodes: torch.Tensor, edges: torch.Tensor, along: torch.Tensor) -> torch.Tensor:
-        """(B M, features) nodes of B bodies, (2, B E) edges and (B E, 4) offsets -> (B M, 3) displacements."""
+        """Maps (B M, features) nodes of B bodies, (2, B E) edges and (B E, 4) offsets to (B M, 3) displacements."""
         state = self.encoder(nodes)
         for layer in self.layers:
             state = state + nn.functional.silu(layer(state, edges, along))

@@ -42,8 +42,8 @@ class NodeGraph:
     def features(
         self, schema: Schema, theta: Float[np.ndarray, "cases parameters"]
     ) -> Float[np.ndarray, "cases nodes _"]:
-        """Inputs of the network at each node, float32: its position, the parameters `theta` in [-1, 1], and, in scenes
-        with a contact, offset and distance from the contact and the torque about the centre of mass."""
+        """Returns the inputs of the network at each node, float32: its position, the parameters `theta` in [-1, 1],
+        and, in scenes with a contact, offset and distance from the contact and the torque about the centre of mass."""
         shape = (len(theta), len(self.nodes))
         parts = [np.broadcast_to(self.nodes, (*shape, 3)), np.broadcast_to(theta[:, None], (*shape, theta.shape[1]))]
         if has_contact(schema):
@@ -63,7 +63,8 @@ class NodeGraph:
         return (contact - np.array(self.frame.anchor)) / self.frame.gyration_radius, force / largest
 
     def interpolated(self, moved: Float[np.ndarray, "nodes 3"], x: Floats) -> Floats:
-        """(N, 3) displacements of points `x` (N, 3) in radii of gyration, by inverse distance between nodes."""
+        """Computes (N, 3) displacements of points `x` (N, 3) in radii of gyration, by inverse distance between
+        nodes."""
         count = min(BETWEEN, len(self.nodes))
         distance, index = KDTree(self.nodes).query(x, count)
         weights = 1.0 / np.maximum(distance.reshape(-1, count), NEAR) ** 2

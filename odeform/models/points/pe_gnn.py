@@ -28,7 +28,7 @@ __all__ = ["PeGnn", "new_network"]
 
 
 def new_network(features: int, width: int, layers: int) -> "GraphNetwork":
-    """An untrained network. Raises `InputError` without the extra `gnn`."""
+    """Builds an untrained network. Raises `InputError` without the extra `gnn`."""
     try:
         from odeform.models.points.graph_network import GraphNetwork
     except ModuleNotFoundError:

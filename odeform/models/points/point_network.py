@@ -53,7 +53,7 @@ class PointNet(ABC):
 
     @abstractmethod
     def sizes(self, parameters: int, width: int) -> Sizes:
-        """Layer widths of each part of the network, for P parameters."""
+        """Returns the layer widths of each part of the network, for P parameters."""
 
     @abstractmethod
     def predict(self, net: Net, batch: PointBatch) -> list[Any]:
@@ -61,7 +61,7 @@ class PointNet(ABC):
 
 
 def sum_of(parts: list[Any]) -> Any:
-    """The displacement (F, B, 3) from its parts."""
+    """Returns the displacement (F, B, 3) from its parts."""
     total = parts[0]
     for part in parts[1:]:
         total = total + part

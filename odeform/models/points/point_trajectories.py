@@ -35,7 +35,7 @@ class MomentaryPoints:
         return SolveStats("none: a network of the time", 0, 0, 0, "ok", 0.0, lambda: None)
 
     def displacements(self, times: Times) -> Frames:
-        """(T,) seconds -> (T, N, 3) metres, canonical."""
+        """Maps (T,) seconds to (T, N, 3) metres, canonical."""
         count, out = len(self._x), np.empty((len(times), len(self._x), 3), dtype=np.float32)
         scaled = in_windows(times, self._window)
         together = max(CHUNK // count, 1)
@@ -94,7 +94,7 @@ class FramedPoints:
         return SolveStats(solver, steps, steps * self.stages, 0, "ok", self._wall_ms, self._error_mm)
 
     def displacements(self, times: Times) -> Frames:
-        """(T,) seconds -> (T, N, 3) metres, canonical."""
+        """Maps (T,) seconds to (T, N, 3) metres, canonical."""
         # the window always comes first: products with more rows round differently
         frames = self._computed(LATER)
         if (times > self._window.stop).any():

@@ -1,5 +1,5 @@
-"""ODeform for a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under a learned law of
-contact."""
+"""The rolling model, of a round body that falls, or is pushed, flies and rolls: the ODE is its motion, under learned
+contact parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -47,8 +47,8 @@ UNTURNED = np.array([0.0, 1.0, 0.0])
 
 
 def axes_of(axis: Vector) -> Float[np.ndarray, "3 6"]:
-    """What a unit of way ahead (m), of height (m) and of angle (rad), about the level unit vector `axis`, adds to shift
-    (m) and rotation vector. The same of their rates."""
+    """Returns what a unit of way ahead (m), of height (m) and of angle (rad), about the level unit vector `axis`,
+    adds to shift (m) and rotation vector. The same of their rates."""
     out = np.zeros((MOVING, POSE))
     out[0, :3], out[1, :3], out[2, 3:] = np.cross(axis, UP), UP, axis
     return out
@@ -62,8 +62,8 @@ def trained(theta: Floats) -> Floats:
 class RollingModel(Model):
     """The motion of one round body in a plane, or up and down.
 
-    Mechanics goes on past the trained ranges: start, law and ODE follow the parameters themselves. The deformation and
-    the correction, which are learned, follow inputs that are clipped (`trained`).
+    Mechanics goes on past the trained ranges: start, contact and ODE follow the parameters themselves. The deformation
+    and the residual, which are learned, follow inputs that are clipped (`trained`).
     """
 
     model = "rolling"
@@ -77,7 +77,7 @@ class RollingModel(Model):
     fallback = SolverSettings("rk4", step=1e-3, dtype="float64")
     finer = MappingProxyType(FINER)
     ablations: ClassVar[Mapping[str, str]] = {
-        "network": "coefficients of the contact law depend on the material alone",
+        "network": "coefficients of the contact depend on the material alone",
         "corners": "the body rolls over a smooth floor on a smooth rim",
         "residual": "what is left unexplained is not regressed",
     }
@@ -102,9 +102,9 @@ class RollingModel(Model):
         self._axes, self._radius = axes_of(self._axis), float(config["radius_m"])
         self._units = units_of(self._radius)
         self._lowest = float(config["lowest_m"])
-        self.law = RollingContact.from_arrays(arrays, len(self._materials))
+        self.contact = RollingContact.from_arrays(arrays, len(self._materials))
         regression = read_start(arrays, push_inputs(self.schema, np.zeros((1, len(learned)))).shape[1])
-        self._start = Start(regression, self.schema, self.law)
+        self._start = Start(regression, self.schema, self.contact)
         self._readout = Readout.from_arrays(arrays, len(self._materials), self.space.coordinates - POSE)
         self.residual = parameter_residual(arrays, self.space.coordinates, len(learned))
         # the body that viewers show is smoother than the one whose corners it rolls over
@@ -134,7 +134,7 @@ class RollingModel(Model):
         return lambda: BatchProblem(self._together(theta), start, readout, self.begin)
 
     def _field(self, theta: Floats) -> Field:
-        return make_field(self.law, self._support, self._radius, theta[self._materials])
+        return make_field(self.contact, self._support, self._radius, theta[self._materials])
 
     def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> BatchField:
         return Together([self._field(each) for each in theta])
@@ -166,12 +166,12 @@ class RollingModel(Model):
     def _decoder(self, theta: Float[np.ndarray, "*batch parameters"]) -> Callable[[Floats], Floats]:
         """States (..., T, 8) under theta (..., P) -> coordinates (..., T, 6 + S)."""
         bodies = np.atleast_2d(theta)[:, self._materials]
-        touch, material = 1e-3 * self.law.coefficients(bodies)["touch"], trained(bodies)
+        heights, material = 1e-3 * self.contact.coefficients(bodies)["height"], trained(bodies)
 
         def decoded(states: Float[np.ndarray, "*batch times states"]) -> Float[np.ndarray, "*batch times y"]:
             rows, times = states.reshape(-1, STATE), states.shape[-2]
             repeated = 1 if len(bodies) == 1 else times  # of one body, they are broadcast
-            of_rows = (np.repeat(part, repeated, axis=0) for part in (touch, material))
+            of_rows = (np.repeat(part, repeated, axis=0) for part in (heights, material))
             inputs = inputs_of(rows.T, *of_rows)
             y = np.concatenate([self._placed(rows[:, :MOVING]), self._readout(inputs)], axis=1)
             return y.reshape(*states.shape[:-1], -1)

@@ -11,8 +11,8 @@ from odeform.types import Arrays
 
 __all__ = ["SIZE", "Readout", "inputs_of"]
 
-NEAR = 0.02  # m above the touch over which a contact that comes is felt
-HIGHEST = 0.03  # m above the touch from which on heights are alike
+NEAR = 0.02  # m above the contact height over which a contact that comes is felt
+HIGHEST = 0.03  # m above the contact height from which on heights are alike
 TURNS = np.arange(1, 17)  # how often each wave goes around the body: its mesh has corners
 INPUTS = 7 + 2 * len(TURNS)  # besides the material
 SIZE = 192
@@ -20,7 +20,9 @@ SIZE = 192
 
 
 def inputs_of(
-    states: Float[np.ndarray, "states rows"], touch: Float[np.ndarray, "#rows"], material: Float[np.ndarray, "#rows q"]
+    states: Float[np.ndarray, "states rows"],
+    contact_height: Float[np.ndarray, "#rows"],
+    material: Float[np.ndarray, "#rows q"],
 ) -> Float[np.ndarray, "rows inputs"]:
     """Computes what the deformation follows from: depths now and before, how the contact moves, and which side is down.
 
@@ -28,7 +30,7 @@ def inputs_of(
     """
     assert len(states) == STATE
     _, height, angle, ahead, rising, spin, one, two = states
-    above = height - touch
+    above = height - contact_height
     near = np.exp(-np.maximum(above, 0.0) / NEAR)
     sides = angle[:, None] * TURNS
     out = np.empty((len(angle), INPUTS + material.shape[1]))
@@ -61,7 +63,7 @@ class Readout:
     last_bias: Float[np.ndarray, " patterns"]
 
     def __call__(self, inputs: Float[np.ndarray, "rows inputs"]) -> Float[np.ndarray, "rows patterns"]:
-        """Amplitudes (R, S) in m."""
+        """Predicts amplitudes (R, S) in m."""
         x = ((inputs - self.mean) / self.scale).astype(self.first.dtype)
         x = _silu(x @ self.first + self.first_bias)
         return _silu(x @ self.middle + self.middle_bias) @ self.last + self.last_bias

@@ -38,10 +38,12 @@ def push_inputs(schema: Schema, theta: Float[np.ndarray, "motions parameters"]) 
     100 m/s^2. The parameters as they are in a scene without force, elevation or mass."""
     if not is_pushed(schema):
         return theta
-    own = {p.name: np.array([p.denormalise(float(u)) for u in theta[:, i]]) for i, p in enumerate(schema.learned)}
-    force, elevation, mass = (own[name] for name in (*PUSHES, MASS))
-    strength = force / (UNIT * mass)
-    material = [theta[:, i] for i, p in enumerate(schema.learned) if p.name not in PUSHES]
+    own, material = {}, []
+    for normalised, parameter in zip(theta.T, schema.learned, strict=True):
+        own[parameter.name] = np.array([parameter.denormalise(float(u)) for u in normalised])
+        if parameter.name not in PUSHES:
+            material.append(normalised)
+    strength, elevation = own["force"] / (UNIT * own[MASS]), own["elevation"]
     return np.stack([*material, strength * np.cos(elevation), strength * np.sin(elevation)], axis=1)
 
 
@@ -71,12 +73,13 @@ class Start:
 
     Past them, it is asked for a push of that direction that was trained, and its answer is scaled: so is the spin. But
     a push that lifts the body adds its impulse to the velocity; what presses it onto the floor is carried by the floor,
-    and braked by the law's friction.
+    and braked by friction.
     """
 
-    def __init__(self, regression: KernelRegression, schema: Schema, law: RollingContact) -> None:
-        self._regression, self._schema, self._law = regression, schema, law
-        if is_pushed(schema):
+    def __init__(self, regression: KernelRegression, schema: Schema, contact: RollingContact) -> None:
+        self._regression, self._schema, self._contact = regression, schema, contact
+        self._pushed = is_pushed(schema)
+        if self._pushed:
             strengths = regression.inputs[:, -2:]
             self._strongest = float(np.linalg.norm(strengths, axis=1).max())
             # what a steep push adds, in the middle of what was trained, is its impulse alone
@@ -87,13 +90,13 @@ class Start:
     def __call__(self, theta: Floats) -> Vector6:
         """(P,) normalised parameters, as they are asked for."""
         asked, inside = push_inputs(self._schema, theta[None])[0], np.clip(theta, -1.0, 1.0)
-        if not is_pushed(self._schema) or np.array_equal(theta, inside):
+        if not self._pushed or np.array_equal(theta, inside):
             return self._regression(asked[None])[0]
         out = self._scaled(asked, self._strongest)
         out[TURNED] = self._scaled(asked, TRUSTED * self._strongest)[TURNED]
         ahead, up = asked[-2:]
-        share = max(_between(float(np.arctan2(up, ahead)), LIFTING), _between(-up, PRESSING))
-        out[STRAIGHT] += share * (self._straight(asked, inside) - out[STRAIGHT])
+        part = max(_between(float(np.arctan2(up, ahead)), LIFTING), _between(-up, PRESSING))
+        out[STRAIGHT] += part * (self._straight(asked, inside) - out[STRAIGHT])
         return out
 
     def _scaled(self, asked: Floats, strongest: float) -> Vector6:
@@ -107,12 +110,12 @@ class Start:
         begun, (ahead, up) = self._regression(known[None])[0, STRAIGHT], asked[-2:] - known[-2:]
         if asked[-1] < 0.0:
             # what is pressed stays down
-            friction = float(np.exp(self._law.coefficients(known[None, :-2])["friction"][0]))
+            friction = float(np.exp(self._contact.coefficients(known[None, :-2])["friction"][0]))
             ahead, up, begun[1::2] = ahead + friction * asked[-1], 0.0, np.minimum(begun[1::2], 0.0)
         return begun + np.array([ahead, up]) @ self._impulse
 
 
 def _between(value: float, ends: tuple[float, float]) -> float:
     """From 0 to 1 between two ends, smoothly."""
-    share = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
-    return share**2 * (3.0 - 2.0 * share)
+    part = min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
+    return part**2 * (3.0 - 2.0 * part)

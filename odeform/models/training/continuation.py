@@ -83,7 +83,7 @@ def _regression(features: Floats, near: Floats, outputs: Floats, rng: np.random.
     return spread_regression(centers, np.linalg.solve(normal, values.T @ outputs))
 
 
-def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: int = 0) -> Dynamics:
+def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float) -> Dynamics:
     """Fit to parameters (S, P) in [-1, 1] and motions (S, T, 6 + K) of at least `FEWEST` frames, which nothing but the
     ground drives."""
     before, now, after = (reduced[:, k : reduced.shape[1] - 2 + k].reshape(-1, reduced.shape[2]) for k in range(3))
@@ -95,7 +95,7 @@ def fit_dynamics(theta: Floats, reduced: Floats, gyration_radius: float, seed: i
     empty = spread_regression(np.zeros((0, 0)), np.zeros((0, 0)))
     dynamics = Dynamics(gravity, contact_height, WIDTH * depth, inverse_lengths, empty, empty)
     features, near = dynamics.features(before, now, conditions)
-    residual, rng = after - dynamics.flight(before, now), np.random.default_rng(seed)
+    residual, rng = after - dynamics.flight(before, now), np.random.default_rng(0)
     return replace(
         dynamics,
         pose=_regression(without_side(features), near, residual[:, :POSE], rng),
@@ -132,7 +132,7 @@ def predicted_errors(model: ReducedModel, data: TrainingData) -> Floats | None:
 
 
 def with_continuation(model: ReducedModel, data: TrainingData) -> Checkpoint:
-    """The checkpoint of a trained `model` with the dynamics that continue it and their validation errors.
+    """Returns the checkpoint of a trained `model` with the dynamics that continue it and their validation errors.
 
     It is unchanged where these dynamics predict worse than motions that stop.
     """

@@ -73,13 +73,14 @@ def descend(
 
 
 def cosine_decay(fraction: float) -> float:
-    """Factor of the learning rate at this fraction of the training: from 1 to 0 (Loshchilov & Hutter 2017)."""
+    """Returns the factor of the learning rate at this fraction of the training: from 1 to 0 (Loshchilov & Hutter
+    2017)."""
     return 0.5 * (1.0 + math.cos(math.pi * fraction))
 
 
 @contextmanager
 def small_batches() -> Iterator[None]:
-    """One thread of the processor, and no denormal numbers.
+    """Computes on one thread of the processor, without denormal numbers.
 
     Batches are small; with one thread the results do not depend on the number of cores, and the threads of a product
     do not wait for each other beside other programs. Denormal numbers slow training thirty-fold on some processors.

@@ -18,7 +18,7 @@ from odeform.models.training.qualities import Validation, with_qualities
 from odeform.models.training.run import Run
 from odeform.motion.reduced_space import POSE
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats
+from odeform.types import Arrays, Floats
 
 __all__ = ["train_neural"]
 
@@ -37,10 +37,18 @@ def train_neural(model: type[NeuralModel], run: Run) -> Checkpoint:
     """Train on the data of `run`; an interrupted training is continued from `run.part`."""
     data = run.reduced_data(patterns=True)
     learner = _Learner(model, data, run)
+
+    def made(weights: Arrays, val: dict[str, float]) -> Checkpoint:
+        arrays = {**weights, "scale": learner.scale}
+        return run.reduced_checkpoint(data, arrays, {"network": dict(model.settings), "qualities": {}, "val": val})
+
+    # what the module cannot do in a prediction is found before it is trained
+    untrained = model(made(network_arrays(learner.module), {}))
+    body = untrained.evaluate_basis(untrained.rest, 0.0)
+    for settings in (CANDIDATES[0], EXACT):
+        untrained.integrate(data.theta["train"][0], body, settings, float(data.times[1]))
     val = learner.train()
-    arrays = {**learner.best[1], "scale": learner.scale}
-    checkpoint = run.reduced_checkpoint(data, arrays, {"network": dict(model.settings), "qualities": {}, "val": val})
-    known = Validation.of(data)
+    checkpoint, known = made(learner.best[1], val), Validation.of(data)
     few = Validation(known.theta[:FEW], known.times, known.reduced[:FEW], known.observed[:FEW])
     return with_qualities(checkpoint, few, EXACT, CANDIDATES)
 

@@ -18,11 +18,11 @@ def growth_outside(
     rmse: Float[np.ndarray, "motions times"],
     bands: Float[np.ndarray, "motions times 2"],
 ) -> Float[np.ndarray, "2 parameters"]:
-    """The growth that `odeform.models.error_band.OUTSIDE` names, from motions outside of the trained ranges.
+    """Returns the growth that `odeform.models.error_band.OUTSIDE` names, from motions outside of the trained ranges.
 
     `theta` are their normalised parameters, `rmse` their errors in mm at times after 0, and `bands` those of the
     nearest trained parameters. The growth of each side is fitted to the errors' root mean squares, and is none where
-    they do not grow; then all are widened until a share `NOMINAL` of all errors is covered.
+    they do not grow; then all are widened until a fraction `NOMINAL` of all errors is covered.
     """
     excess = excess_of(theta).reshape(len(theta), -1)
     grown = np.log(_rms(rmse) / _rms(bands[..., 0]))

@@ -11,7 +11,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.dataset.training_data import TrainingData, prepare
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.models.per_object import joined
 from odeform.models.registry import model_class
 from odeform.models.training.body import body_arrays
@@ -57,14 +57,14 @@ class Run:
         modes, rolling = data.space.basis.modes, data.space.rolling
         self.report(
             f"{request.model} on {len(data.theta['train'])} sequences of {len(data.times)} frames; "
-            f"{modes} POD mode{'s' if modes > 1 else ''}"
+            f"{counted(modes, 'POD mode')}"
             f"{f', or {rolling.patterns} in axes that do not roll with the body' if rolling else ''}; "
             f"the rest of the deformation is {data.truncation_mm['val']:.3f} mm RMS on validation"
         )
         return data
 
     def reduced_checkpoint(self, data: TrainingData, arrays: Arrays, settings: Mapping[str, Any]) -> Checkpoint:
-        """The checkpoint of a model of reduced coordinates, with the arrays and settings of its own."""
+        """Returns the checkpoint of a model of reduced coordinates, with the arrays and settings of its own."""
         checkpoint = self.with_body({**arrays, **data.space.arrays()}, data.theta["train"])
         config = {"space": data.space.to_json(), **settings}
         return Checkpoint(

@@ -58,17 +58,18 @@ FIXED = {
 
 
 def mass(low: float, high: float, default: float) -> Parameter:
-    """The parameter `mass`, with its range in kg."""
+    """Returns the parameter `mass`, with its range in kg."""
     return Parameter("mass", "kg", low, high, default, scale="log", description="mass of the ball")
 
 
 def bending(high: float) -> Parameter:
-    """The parameter `bending`, up to `high` N m."""
+    """Returns the parameter `bending`, up to `high` N m."""
     return Parameter("bending", "N m", 0.3, high, 0.6, scale="log", description="bending stiffness EI of its wall")
 
 
 def sphere(segments: int = SEGMENTS) -> Mesh:
-    """The mesh of the ball about the origin, resting on the middle of a triangle and symmetric about the plane y = 0.
+    """Makes the mesh of the ball about the origin, resting on the middle of a triangle and symmetric about the plane
+    y = 0.
 
     On a single vertex it would be unstable and roll in a direction that rounding decides. On three of them it rests,
     and a drop stays within 0.2 mm of its line. Raises `ValueError` for a multiple of 3 segments.
@@ -83,7 +84,8 @@ def sphere(segments: int = SEGMENTS) -> Mesh:
 
 
 def relaxed(mesh: Mesh, radius: float, thickness: float, material: Material) -> tuple[Mesh, Mesh]:
-    """The stress-free ball: (`reference` for the simulator, `rest` shape of mean radius `radius` m, centred at 0).
+    """Relaxes the stress-free ball: (`reference` for the simulator, `rest` shape of mean radius `radius` m, centred at
+    0).
 
     A sphere inflates as soon as it is simulated, so the reference is rescaled until its equilibrium has the radius.
     """

@@ -17,7 +17,7 @@ TOLERANCE = 1e-6  # of the constraint solver; at 1e-8 positions differ by 1 micr
 
 
 def contact_of(material: SoftMaterial) -> Contact:
-    """How bodies of this material meet others."""
+    """Returns how bodies of this material meet others."""
     return Contact(material.friction, CONTACT_TIME)
 
 

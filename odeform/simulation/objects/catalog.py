@@ -14,7 +14,7 @@ OBJECTS = ("bottle", "cat", "dog", "donut", "chip", "flip-flop", "pillow")
 
 @cache
 def get_object(name: str) -> SoftObject:
-    """One of the seven objects, as bundled. Raises `InputError` for another name."""
+    """Returns one of the seven objects, as bundled. Raises `InputError` for another name."""
     if name not in OBJECTS:
         raise InputError(f"object {name!r}: expected one of {', '.join(OBJECTS)}")
     return read_object(bundled("objects") / f"{name}.npz")

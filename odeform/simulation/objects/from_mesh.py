@@ -44,7 +44,7 @@ def placed_object(
     up: str | None = None,
     unit: float | None = None,
 ) -> PlacedObject:
-    """A solid of a closed or nearly closed surface, repaired, turned, and settled on the floor.
+    """Makes a solid of a closed or nearly closed surface, repaired, turned, and settled on the floor.
 
     Args:
         mesh: In any unit and axes. Defects are repaired: seams, holes, self-intersections, parts that overlap.

@@ -14,7 +14,7 @@ COARSE = 0.012  # m, spacing of the grid that finds its extent
 
 
 def surface_of(distance: Callable[[Points], Perpoint], edge: float) -> Mesh:
-    """The surface at distance 0, watertight and outward, with edges up to about `edge` metres.
+    """Makes the surface at distance 0, watertight and outward, with edges up to about `edge` metres.
 
     `distance` maps points (N, 3) m to signed distances (N,) m, negative inside. It is tabulated on a grid first:
     calling it for single points, as `manifold3d` does, takes a hundred times as long.

@@ -28,7 +28,7 @@ FINE = 9000  # vertices before remeshing
 
 
 def repaired(mesh: Mesh) -> Mesh:
-    """A fine closed surface around the solid that `mesh` bounds, in its units and axes.
+    """Makes a fine closed surface around the solid that `mesh` bounds, in its units and axes.
 
     Raises `InputError` for meshes that enclose no volume, or several bodies.
     """
@@ -47,7 +47,7 @@ def repaired(mesh: Mesh) -> Mesh:
 
 
 def even_surface(fine: Mesh, count: int) -> Mesh:
-    """About `count` even vertices on a fine surface.
+    """Spreads about `count` even vertices on a fine surface.
 
     It is the first of some attempts that is closed; else the last, whose defects fTetWild mends.
     """

@@ -75,7 +75,7 @@ class SoftObject:
         return np.bincount(nearest, self.masses, count) / self.mass
 
     def changed(self, mass: float, young: float) -> "SoftObject":
-        """The same body of another mass in kg and Young's modulus in Pa, where it then comes to rest.
+        """Returns the same body of another mass in kg and Young's modulus in Pa, where it then comes to rest.
 
         It takes some seconds, unless it was asked for before. Raises `SimulationError` where it collapses.
         """
@@ -84,7 +84,7 @@ class SoftObject:
         return _changed(self, float(mass), float(young))
 
     def rest_mesh(self) -> Mesh:
-        """The surface of the settled body: S vertices in metres."""
+        """Returns the surface of the settled body: S vertices in metres."""
         return Mesh(self.settled[: self.surface_count].astype(np.float32), self.faces)
 
 

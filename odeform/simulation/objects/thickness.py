@@ -10,12 +10,12 @@ __all__ = ["median_thickness", "thicknesses"]
 
 
 def median_thickness(surface: Mesh) -> float:
-    """Median of `thicknesses` in metres."""
+    """Returns the median of `thicknesses` in metres."""
     return float(np.median(thicknesses(surface)))
 
 
 def thicknesses(surface: Mesh) -> Perpoint:
-    """(N,) metres from each vertex along its inward normal to the other side of a closed surface."""
+    """Computes (N,) metres from each vertex along its inward normal to the other side of a closed surface."""
     points = np.asarray(surface.points, dtype=float)
     inward = -vertex_normals(points, surface.faces)
     a, b, c = (points[surface.faces[:, i]] for i in range(3))

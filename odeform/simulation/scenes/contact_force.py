@@ -72,7 +72,7 @@ def simulate(
     report: Callable[[float], None] = lambda _: None,
     until: float | None = None,
 ) -> MotionSequence:
-    """One motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
+    """Simulates one motion of one of the seven objects, with frames at `rate` Hz (default: the window's).
 
     See `simulate_object`.
     """
@@ -135,7 +135,7 @@ def changed_object(item: SoftObject, parameters: Parameters) -> SoftObject:
 
 
 def _check_orientation(item: SoftObject, nodes: Points) -> None:
-    """Raise `SimulationError` if tetrahedra stay inside out at the end: too strong a pulse for this material law."""
+    """Raise `SimulationError` if tetrahedra stay inside out at the end: too strong a pulse for this material."""
     if inverted := int(inside_out(nodes, item.elements).sum()):
         raise SimulationError(f"{inverted} of {len(item.elements)} tetrahedra are inside out at the end")
 
@@ -169,7 +169,7 @@ def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
 
 
 def rest_mesh(name: str = OBJECTS[0]) -> Mesh:
-    """The settled surface of an object."""
+    """Returns the settled surface of an object."""
     return get_object(name).rest_mesh()
 
 

@@ -48,12 +48,13 @@ SCHEMA = Schema(
 
 
 def pulse_direction(elevation: float) -> Floats:
-    """Unit vector of the pulse in its own frame (x is the azimuth, z is up)."""
+    """Returns the unit vector of the pulse in its own frame (x is the azimuth, z is up)."""
     return np.array([math.cos(elevation), 0.0, math.sin(elevation)])
 
 
 def pulse_weights(rest: Floats, elevation: float) -> Floats:
-    """(N,) fraction of the pulse at each vertex, exp(-(angle / 25 deg)^2) around the struck point, summing to 1."""
+    """Computes the fraction (N,) of the pulse at each vertex, exp(-(angle / 25 deg)^2) around the struck point,
+    summing to 1."""
     outward = rest / np.linalg.norm(rest, axis=1, keepdims=True)
     angle = np.arccos(np.clip(-outward @ pulse_direction(elevation), -1.0, 1.0))
     weights = np.exp(-((angle / SPREAD) ** 2))
@@ -68,7 +69,7 @@ def simulate(
     report: Callable[[float], None] = lambda _: None,
     until: float = SCHEMA.window.stop,
 ) -> MotionSequence:
-    """One motion up to `until` seconds, with frames at `rate` Hz (default: the window's).
+    """Simulates one motion up to `until` seconds, with frames at `rate` Hz (default: the window's).
 
     `step` is in seconds, `resolution` in segments of the ball's mesh; `report` gets the fraction done. The mesh is
     oriented with the pulse: the azimuth is a symmetry of the scene, and a mesh that turns with it keeps this symmetry

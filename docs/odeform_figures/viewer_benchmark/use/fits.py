@@ -32,7 +32,7 @@ def fit(visitors: Visitors) -> None:
 
 
 def choose_truth(visitors: Visitors) -> None:
-    """Another sequence than the present one."""
+    """Chooses another sequence than the present one."""
     control = visitors.first.controls["test sequence"]
     others = [option for option in control.props["options"] if option not in (NONE, control.value)]
     visitors.first.set("test sequence", str(visitors.rng.choice(others)))

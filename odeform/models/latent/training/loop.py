@@ -96,6 +96,6 @@ def train_network(
 
 
 def network_weights(net: ODeformNet) -> Arrays:
-    """Arrays of a checkpoint: single precision, except for readouts, whose large weights cancel."""
+    """Returns the arrays of a checkpoint: single precision, except for readouts, whose large weights cancel."""
     state = {name: value.detach().cpu() for name, value in net.state_dict().items()}
     return {k: (v if k.endswith("readout.weight") else v.float()).numpy() for k, v in state.items()}

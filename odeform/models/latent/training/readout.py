@@ -31,7 +31,8 @@ class NormalEquations:
         self._gram: torch.Tensor | None = None
 
     def add(self, features: torch.Tensor, truth: torch.Tensor, weights: torch.Tensor) -> None:
-        """(T, B, F) and (T, B, outputs), with weights (T, B) of squares; without frame 0, where both vanish."""
+        """Adds features (T, B, F) and targets (T, B, outputs), with weights (T, B) of squares; without frame 0,
+        where both vanish."""
         features, truth = (weights.sqrt()[..., None] * v for v in (features, truth))
         x, y = (v[1:].flatten(0, 1).double() for v in (features, truth))
         gram, cross = _squared(x), x.T @ y
@@ -53,7 +54,8 @@ def random_layer(
     sharpness: float,
     generator: torch.Generator,
 ) -> dict[str, torch.Tensor]:
-    """Weights of two linear layers: whitened principal components of the inputs, and random directions in them.
+    """Draws the weights of two linear layers: whitened principal components of the inputs, and random directions in
+    them.
 
     `inputs` are chunks (rows, inputs), of which the last columns, the clock and `parameters` in [-1, 1], are passed on
     unchanged. Weights are rounded to single precision, as checkpoints store them.

@@ -15,7 +15,7 @@ CLOCK_SLOPES = (3.0, 30.0)  # of features of the clock, at first: contacts are s
 
 
 def build_network(data: TrainingData, seed: int) -> ODeformNet:
-    """A new network, whitened by the training data alone."""
+    """Builds a network, whitened by the training data alone."""
     torch.manual_seed(seed)
     train = data.reduced["train"]
     config = ModelConfig(parameters=data.theta["train"].shape[1], modes=train.shape[-1] - POSE)
@@ -49,5 +49,5 @@ def build_network(data: TrainingData, seed: int) -> ODeformNet:
 
 
 def training_shape(data: TrainingData) -> tuple[torch.Tensor, torch.Tensor]:
-    """Points (N, 3) in units of the radius of gyration, and their weights (N,)."""
+    """Returns the points (N, 3) in units of the radius of gyration, and their weights (N,)."""
     return torch.as_tensor(data.rest / data.space.gyration_radius).float(), torch.as_tensor(data.weights).float()

@@ -155,7 +155,7 @@ class Trainer:
 
     @torch.no_grad()
     def errors_mm(self, split: str) -> tuple[float, float]:
-        """Pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
+        """Returns the pooled RMSE over coordinates, in mm: of the rigid part and of the deformation."""
         predicted = self.net.decode(self.paths(split)[::2], self.times, self.theta[split])
         residual = self.metric(predicted[1:], self.truth[split][1:], self.observed[split][1:])
         rigid, local = (torch.stack(residual) / 3.0).sqrt().tolist()

@@ -20,7 +20,7 @@ NAMES = tuple(asdict(ContactParameters()))
 
 
 def relative_errors(pushes: Pushes, predicted: Floats) -> Floats:
-    """(S, T - 1, 6 + K): errors in units of the RMS rigid motion and the RMS deformation, without frame 0."""
+    """Computes (S, T - 1, 6 + K): errors in units of the RMS rigid motion and the RMS deformation, without frame 0."""
     error = ((predicted - pushes.reduced) * pushes.scale)[:, 1:]
     truth = (pushes.reduced * pushes.scale)[:, 1:]
     for part in (slice(0, POSE), slice(POSE, None)):
@@ -37,7 +37,8 @@ def fit_contact_parameters(
     report: Callable[[str], None] = print,
     evaluations: int | None = None,
 ) -> ContactParameters:
-    """The contact parameters with the smallest squared relative errors over all bodies, by Gauss-Newton in logarithms.
+    """Fits the contact parameters with the smallest squared relative errors over all bodies, by Gauss-Newton in
+    logarithms.
 
     Rigid motion and deformation of each body count alike. Errors and their derivatives are evaluated `EVALUATIONS`
     times, or as often as `evaluations` says.

@@ -58,7 +58,7 @@ class Pushes:
         return float(np.sqrt(left / max(total, 1e-30)))
 
     def some(self, count: int, seed: int) -> "Pushes":
-        """`count` of them (or all), at random."""
+        """Returns `count` of them (or all), at random."""
         kept = np.random.default_rng(seed).permutation(len(self.contacts))[:count]
         names = ("contacts", "normals", "centres", "forces", "reduced", "left_out")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})

@@ -40,7 +40,7 @@ VALIDATED = 256  # validation motions of a point
 
 
 def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dict[str, torch.Tensor]:
-    """Uniform within 1 / sqrt(inputs of the layer), as `torch.nn.Linear` draws them."""
+    """Draws weights, uniform within 1 / sqrt(inputs of the layer), as `torch.nn.Linear` draws them."""
     generator, out = torch.Generator().manual_seed(seed), {}
     inputs = 1
     for name, shape in shapes:

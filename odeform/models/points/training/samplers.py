@@ -51,7 +51,7 @@ class Sampler(ABC):
 
     @abstractmethod
     def all_frames(self, sequence: torch.Tensor, point: torch.Tensor) -> Sample:
-        """Every frame of the motions of points (B,) of sequences (B,), for validation."""
+        """Returns every frame of the motions of points (B,) of sequences (B,), for validation."""
 
     def draw(self, fraction: float, generator: torch.Generator) -> Sample:
         """A random training step at this fraction of the training."""
@@ -63,11 +63,11 @@ class Sampler(ABC):
         return Sample(sequence, _below(points, generator, batch), frames)
 
     def to_visible(self, sequence: torch.Tensor, frames: torch.Tensor) -> torch.Tensor:
-        """The frames to train on in place of drawn ones: here the same."""
+        """Returns the frames to train on in place of drawn ones: here the same."""
         return frames
 
     def batch(self, sample: Sample) -> tuple[PointBatch, torch.Tensor, torch.Tensor]:
-        """Inputs, and the true displacements (F, B, 3) of the points and of the body's centre."""
+        """Returns the inputs, and the true displacements (F, B, 3) of the points and of the body's centre."""
         sequence, point, frames = (index.to(self.device) for index in (sample.sequence, sample.point, sample.frames))
         truth, centre = self.moved[sequence, frames, point], self.centre[sequence, frames]
         return self.inputs(sequence, point, frames, truth), truth, centre

@@ -12,7 +12,7 @@ class Torch:
     """Arithmetic on tensors, differentiable."""
 
     def linear(self, x: Any, weight: Any, bias: Any) -> Any:
-        """x @ weight.T + bias for x (..., inputs): (..., outputs)."""
+        """Returns x @ weight.T + bias for x (..., inputs): (..., outputs)."""
         return linear(x, weight, bias)
 
     def join(self, parts: list[Any]) -> Any:
@@ -24,5 +24,6 @@ class Torch:
         return torch.stack(parts)
 
     def act(self, name: str, x: Any) -> Any:
-        """The activation function `name`, elementwise; any shape (...). `AttributeError` for an unknown name."""
+        """Returns the activation function `name`, elementwise; any shape (...). `AttributeError` for an unknown
+        name."""
         return silu(x) if name == "silu" else getattr(torch, name)(x)

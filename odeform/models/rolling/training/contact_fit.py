@@ -1,4 +1,4 @@
-"""Fits a law of contact to motions of a rolling body: Gauss-Newton on whole roll-outs, with their exact derivatives."""
+"""Fits contact parameters to motions of a rolling body: Gauss-Newton on whole roll-outs, with exact derivatives."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from odeform.mechanics.rolling.sensitivities import roll_out_with_sensitivities
 from odeform.mechanics.rolling.support import Support
 from odeform.types import Bools, Floats, Ints
 
-__all__ = ["ROBUST", "Motions", "fit_law", "law_error_mm", "roll_out"]
+__all__ = ["ROBUST", "Motions", "contact_error_mm", "fit_contact", "roll_out"]
 
 STEP = 1.05e-3  # s
 HEIGHTS = 2.5  # times what other errors count: they decide when a landing comes, and how deep it is
@@ -22,7 +22,7 @@ EVERY, FEW = 3, 90  # frames: of more than a few, only some are compared
 STEEP = 300.0  # largest derivative that is believed
 TOGETHER = 128  # motions whose derivatives are computed at once
 LANDING = 0.217  # s that a landing takes at most
-PRIOR = 1e-4  # towards the law that a fit starts from
+PRIOR = 1e-4  # towards the parameters that a fit starts from
 TRIES = 7  # of a step, each more cautious
 ENOUGH = 5e-4  # relative gain of a step, below which the fit ends
 
@@ -53,16 +53,16 @@ class Motions:
         """How many frames on the next one is compared: where there are few, or some are not of the data, all."""
         return EVERY if self.seen.all() and len(self.moved) > FEW else 1
 
-    def landings(self, share: float) -> "Motions":
-        """Up to that share of the frames from the first landing on only, and at least to the end of that landing."""
+    def landings(self, fraction: float) -> "Motions":
+        """Keeps that fraction of the frames from the first landing on, at least to the end of that landing."""
         landed = int((self.moved[..., 1] < CLEAR).any(axis=1).argmax())
-        count = landed + max(round(share * (len(self.moved) - landed)), round(LANDING / self.frame))
+        count = landed + max(round(fraction * (len(self.moved) - landed)), round(LANDING / self.frame))
         return replace(self, moved=self.moved[:count], seen=self.seen[:count])
 
 
-def roll_out(law: RollingContact, support: Support, radius: float, motions: Motions) -> Floats:
-    """(T, 8, M) states in the frames of `motions`."""
-    dynamics = RollingDynamics(law, support, radius, motions.material)
+def roll_out(contact: RollingContact, support: Support, radius: float, motions: Motions) -> Floats:
+    """Computes (T, 8, M) states in the frames of `motions`."""
+    dynamics = RollingDynamics(contact, support, radius, motions.material)
     return dynamics.roll_out(motions.start, *_half_frames(motions))[1::2]
 
 
@@ -82,9 +82,9 @@ def _missed(states: Floats, motions: Motions, radius: float, robust: float) -> t
     return np.arcsinh(apart), scale / np.sqrt(1.0 + apart**2)
 
 
-def law_error_mm(law: RollingContact, support: Support, radius: float, motions: Motions) -> float:
-    """Pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
-    states = roll_out(law, support, radius, motions)[:, :MOVING]
+def contact_error_mm(contact: RollingContact, support: Support, radius: float, motions: Motions) -> float:
+    """Returns the pooled RMSE of the pose in mm, over the frames (T,) of the data and the motions (M,)."""
+    states = roll_out(contact, support, radius, motions)[:, :MOVING]
     apart = (states.swapaxes(1, 2) - motions.moved) * np.array([1.0, 1.0, radius * np.sqrt(2.0 / 3.0)])
     return float(1e3 * np.sqrt(np.square(apart)[motions.seen].mean()))
 
@@ -100,25 +100,25 @@ class _Normal:
 
 
 def _normal(
-    law: RollingContact, free: Ints, support: Support, radius: float, motions: Motions, robust: float
+    contact: RollingContact, free: Ints, support: Support, radius: float, motions: Motions, robust: float
 ) -> _Normal:
     total = _Normal(0.0, np.zeros((len(free), len(free))), np.zeros(len(free)))
-    count, share = len(motions.material), 1.0 / (MOVING * motions.seen[:: motions.every].sum())
+    count, weight = len(motions.material), 1.0 / (MOVING * motions.seen[:: motions.every].sum())
     for at in range(0, count, TOGETHER):
         some = motions.some(np.arange(at, min(at + TOGETHER, count)))
-        dynamics, (half, frames, step) = RollingDynamics(law, support, radius, some.material), _half_frames(motions)
+        dynamics, (half, frames, step) = RollingDynamics(contact, support, radius, some.material), _half_frames(motions)
         states, changes = roll_out_with_sensitivities(dynamics, free, some.start, half, frames, step)
         errors, by_position = _missed(states[1::2], some, radius, robust)
         jacobian = by_position[..., None].astype(np.float32) * changes[1::2][:: some.every]
         jacobian = np.clip(np.nan_to_num(jacobian), -STEEP, STEEP).reshape(-1, len(free))
-        total.cost += share * float(np.square(errors).sum())
-        total.square += share * (jacobian.T @ jacobian)
-        total.slope += share * (jacobian.T @ errors.ravel())
+        total.cost += weight * float(np.square(errors).sum())
+        total.square += weight * (jacobian.T @ jacobian)
+        total.slope += weight * (jacobian.T @ errors.ravel())
     return total
 
 
-def fit_law(
-    law: RollingContact,
+def fit_contact(
+    contact: RollingContact,
     free: Ints,
     support: Support,
     radius: float,
@@ -129,9 +129,9 @@ def fit_law(
     robust: float = ROBUST,
     damping: float = 1e-2,
 ) -> RollingContact:
-    """The law after at most `steps` steps of Levenberg and Marquardt, in which the numbers with the indices
+    """Takes at most `steps` steps of Levenberg and Marquardt from `contact`, in which the numbers with the indices
     `free` (F,) change; `radius` is in m, and errors count in full up to about `robust` mm.
-    `damping` is that of the first step: 1 where the law is far off, and its derivatives tell little.
+    `damping` is that of the first step: 1 where they are far off, and their derivatives tell little.
 
     It ends earlier where a step gains hardly anything, and when `go_on` says so.
     """
@@ -141,7 +141,7 @@ def fit_law(
         missed = _missed(states, motions, radius, robust)[0]
         return float(np.square(missed).sum() / (MOVING * motions.seen[:: motions.every].sum()))
 
-    now, first = law, law.flat()[free]
+    now, first = contact, contact.flat()[free]
     for step in range(steps):
         if not go_on():
             break
@@ -152,14 +152,14 @@ def fit_law(
             change = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), -slope)
             trial = numbers.copy()
             trial[free] += np.clip(change, -1.0, 1.0)
-            cost = cost_of(law.like(trial))
+            cost = cost_of(contact.like(trial))
             if cost < known.cost:
                 break
             damping *= 6.0
         else:
             break
-        now, damping = law.like(trial), max(damping / 4.0, 1e-6)
-        report(f"contact law, step {step + 1}: robust pose error {robust * np.sqrt(cost):.2f} mm (train)")
+        now, damping = contact.like(trial), max(damping / 4.0, 1e-6)
+        report(f"contact parameters, step {step + 1}: robust pose error {robust * np.sqrt(cost):.2f} mm (train)")
         if known.cost - cost < ENOUGH * known.cost:
             break
     return now

@@ -1,5 +1,5 @@
-"""The training of ODeform for a round body: where the push leaves it, the law of contact, how it is deformed, and how
-wrong it is beyond the window."""
+"""Trains the rolling model of a round body: where the push leaves it, its contact parameters, how it is deformed, and
+how wrong it is beyond the window."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -15,7 +15,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.training_data import TrainingData
 from odeform.errors import InputError
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.rolling.contact import ADJUSTED, COEFFICIENTS, RollingContact, first_law
+from odeform.mechanics.rolling.contact import ADJUSTED, COEFFICIENTS, RollingContact, initial_contact
 from odeform.mechanics.rolling.dynamics import CLEAR, MOVING, STATE
 from odeform.mechanics.rolling.support import Support, support_of
 from odeform.models.continuation import LATER_ERRORS
@@ -24,7 +24,7 @@ from odeform.models.kernels.ridge import search_ridge
 from odeform.models.rolling.model import UNTURNED, RollingModel
 from odeform.models.rolling.readout import inputs_of
 from odeform.models.rolling.start import PUSHES, push_inputs, start_arrays
-from odeform.models.rolling.training.contact_fit import ROBUST, STEP, Motions, fit_law, law_error_mm, roll_out
+from odeform.models.rolling.training.contact_fit import ROBUST, STEP, Motions, contact_error_mm, fit_contact, roll_out
 from odeform.models.rolling.training.readout_fit import ReadoutRows, fit_readout
 from odeform.models.training.continuation import HELD_OUT
 from odeform.models.training.part import read_part, write_part
@@ -44,19 +44,19 @@ __all__ = ["fit_rolling_body", "later_errors", "motions_of", "train_rolling"]
 
 @dataclass(frozen=True)
 class Stage:
-    """A part of the fit of the law."""
+    """Describes a part of the fit of contact parameters."""
 
     steps: int
     frames: float = 1.0
-    """Share of the frames from the first landing on."""
+    """Fraction of the frames from the first landing on."""
     linear: bool = False
-    """Whether the law is linear in the material and has no network yet."""
+    """Whether they are linear in the material, without the network."""
     robust: float = ROBUST
     """mm."""
     step: float = STEP
     """s."""
     damping: float = 1e-2
-    """Damping of the first step; see `fit_law`."""
+    """Damping of the first step; see `fit_contact`."""
 
 
 COARSE = 50.0  # mm
@@ -72,7 +72,7 @@ FALLING = (
 )
 """The first landings come first: what is wrong about one, the next amplify until nothing can be learned from them."""
 
-SHARE = 0.7  # of the budget for the law
+BUDGET = 0.7  # of the time, for contact parameters
 SMALL = 0.2  # how much deformations that are not large count in the training of the network
 LEVEL = 1e-3  # height that a unit axis may have
 ROUND = 0.02  # by which points may be nearer to the axis than others, relative
@@ -103,7 +103,7 @@ def train_rolling(run: Run) -> Checkpoint:
 def fit_rolling_body(
     data: TrainingData, request: TrainRequest, report: Callable[[str], None], part: Path | None = None
 ) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays and settings of the checkpoint, without the correction.
+    """Fits the arrays and settings of the checkpoint, without the residual.
 
     Contact parameters are kept in `part` after each stage; a resumed training continues after the last one.
 
@@ -121,36 +121,36 @@ def fit_rolling_body(
     start = _start(data, motions)
 
     def go_on() -> bool:
-        return request.steps is not None or time.process_time() - begin < 60.0 * SHARE * request.minutes
+        return request.steps is not None or time.process_time() - begin < 60.0 * BUDGET * request.minutes
 
     stages = FALLING if data.space.rolling is None else PUSHED
     counts = _steps(stages, request.steps)
-    law = _without(first_law(len(materials), request.seed), without)
+    contact = _without(initial_contact(len(materials), request.seed), without)
     training = {"data": data.identity, "seed": request.seed, "without": list(without), "steps": counts}
     known: dict[str, Any] = {"stages": 0, "seconds": 0.0}
     if request.resume and part is not None:
         known = read_part(part, training)
-        law = law.like(known["numbers"].numpy())
+        contact = contact.like(known["numbers"].numpy())
         report(f"continues after {known['seconds'] / 60.0:.1f} min, with stage {known['stages'] + 1}")
     begin = time.process_time() - known["seconds"]
     for index, (stage, steps) in enumerate(zip(stages, counts, strict=True)):
         motions = {split: replace(of, step=stage.step) for split, of in motions.items()}
         if index < known["stages"]:
             continue
-        some, free = motions["train"].landings(stage.frames), _free(law, without, stage.linear)
-        law = fit_law(law, free, support, radius, some, steps, report, go_on, stage.robust, stage.damping)
+        some, free = motions["train"].landings(stage.frames), _free(contact, without, stage.linear)
+        contact = fit_contact(contact, free, support, radius, some, steps, report, go_on, stage.robust, stage.damping)
         if part is not None:
-            state = {"stages": index + 1, "numbers": torch.from_numpy(law.flat())}
+            state = {"stages": index + 1, "numbers": torch.from_numpy(contact.flat())}
             write_part(part, training, {**state, "seconds": time.process_time() - begin})
-    error = law_error_mm(law, support, radius, motions["val"])
-    report(f"contact law alone: pose RMSE {error:.2f} mm (val)")
-    share = min(sum(counts) / sum(stage.steps for stage in stages), 1.0)
-    readout = fit_readout(_rows(data, law, support, radius, motions["train"]), request.seed, share)
+    error = contact_error_mm(contact, support, radius, motions["val"])
+    report(f"contact parameters alone: pose RMSE {error:.2f} mm (val)")
+    fraction = min(sum(counts) / sum(stage.steps for stage in stages), 1.0)
+    readout = fit_readout(_rows(data, contact, support, radius, motions["train"]), request.seed, fraction)
     names = [data.schema.learned[i].name for i in materials]
     val = {"law_rmse_mm": error, "seconds": time.process_time() - begin}
     settings = {"material": names, "begin_s": _begin(data), "clearance_m": _clearance(data), "radius_m": radius}
     settings |= {"lowest_m": _lowest(data), "val": val, "qualities": {}}
-    return {**law.arrays(), **start_arrays(start), **readout.arrays()}, settings
+    return {**contact.arrays(), **start_arrays(start), **readout.arrays()}, settings
 
 
 def _steps(stages: Sequence[Stage], total: int | None) -> list[int]:
@@ -245,23 +245,23 @@ def _with_one(inputs: Floats) -> Float[np.ndarray, "motions rows"]:
     return np.concatenate([np.ones((len(inputs), 1)), inputs], axis=1)
 
 
-def _without(law: RollingContact, parts: Sequence[str]) -> RollingContact:
-    """The law from which a fit without some of its `parts` starts: without corners, they are hardly felt."""
-    terms, last = law.terms.copy(), law.last.copy()
+def _without(contact: RollingContact, parts: Sequence[str]) -> RollingContact:
+    """Makes the contact from which a fit without some of its `parts` starts: without corners, they are hardly felt."""
+    terms, last = contact.terms.copy(), contact.last.copy()
     if "corners" in parts:
         terms[CORNERS, 0] = UNFELT
         last[:, ADJUSTED.index("corners")] = 0.0
     if "network" in parts:
         last[:] = 0.0
-    return replace(law, terms=terms, last=last)
+    return replace(contact, terms=terms, last=last)
 
 
-def _free(law: RollingContact, without: Sequence[str], linear: bool) -> Ints:
+def _free(contact: RollingContact, without: Sequence[str], linear: bool) -> Ints:
     """Indices of the numbers that are fitted, of all but the parts that are left out. With `linear`, only of those that
     are constant or linear in the material, without the network and the place of rest."""
-    flags = {field.name: np.ones_like(getattr(law, field.name)) for field in fields(law)}
+    flags = {field.name: np.ones_like(getattr(contact, field.name)) for field in fields(contact)}
     if linear:
-        flags["terms"][:, law.settled.shape[-1] :] = 0.0
+        flags["terms"][:, contact.settled.shape[-1] :] = 0.0
     if "corners" in without:
         flags["terms"][CORNERS] = 0.0
         flags["last"][:, ADJUSTED.index("corners")] = 0.0
@@ -272,19 +272,20 @@ def _free(law: RollingContact, without: Sequence[str], linear: bool) -> Ints:
     return np.flatnonzero(RollingContact(**flags).flat())
 
 
-def _rows(data: TrainingData, law: RollingContact, support: Support, radius: float, motions: Motions) -> ReadoutRows:
-    """Rolls out motions under the contact parameters, so that what is read out of them knows what the law is wrong
-    about."""
-    states = roll_out(law, support, radius, motions)
+def _rows(
+    data: TrainingData, contact: RollingContact, support: Support, radius: float, motions: Motions
+) -> ReadoutRows:
+    """Rolls out motions under the fitted contact, so that what is read out of them knows what it is wrong about."""
+    states = roll_out(contact, support, radius, motions)
     count = len(states)
     flat = states.transpose(1, 2, 0).reshape(STATE, -1)
     material = np.repeat(motions.material, count, axis=0)
-    touch = np.repeat(1e-3 * law.coefficients(motions.material)["touch"], count)
+    heights = np.repeat(1e-3 * contact.coefficients(motions.material)["height"], count)
     patterns = data.reduced["train"][..., POSE:]
     sizes = np.linalg.norm(patterns, axis=2)
     large = sizes > LARGE * sizes.max(axis=1, keepdims=True)
     weights, seen = np.where(large[:, -count:], 1.0, SMALL).ravel(), motions.seen.T.ravel()
-    inputs, patterns = inputs_of(flat, touch, material), patterns[:, -count:].reshape(len(weights), -1)
+    inputs, patterns = inputs_of(flat, heights, material), patterns[:, -count:].reshape(len(weights), -1)
     return ReadoutRows(inputs[seen], patterns[seen], weights[seen])
 
 

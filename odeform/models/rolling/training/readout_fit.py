@@ -28,8 +28,8 @@ class ReadoutRows:
     weights: Float[np.ndarray, " rows"]
 
 
-def fit_readout(rows: ReadoutRows, seed: int, share: float = 1.0) -> Readout:
-    """The network after a training whose length follows from the number of rows: `share` of it."""
+def fit_readout(rows: ReadoutRows, seed: int, fraction: float = 1.0) -> Readout:
+    """The network after a training whose length follows from the number of rows: `fraction` of it."""
     mean, scale = rows.inputs.mean(axis=0), rows.inputs.std(axis=0)
     scale[scale < CONSTANT] = 1.0
     size = max(float(rows.patterns.std()), 1e-12)
@@ -41,7 +41,7 @@ def fit_readout(rows: ReadoutRows, seed: int, share: float = 1.0) -> Readout:
     layers = [nn.Linear(inputs.shape[1], SIZE), nn.Linear(SIZE, SIZE), nn.Linear(SIZE, patterns.shape[1])]
     network = nn.Sequential(layers[0], nn.SiLU(), layers[1], nn.SiLU(), layers[2])
     optimiser = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY)
-    steps = max(round(share * EPOCHS * len(inputs) / BATCH), FEWEST)
+    steps = max(round(fraction * EPOCHS * len(inputs) / BATCH), FEWEST)
     with small_batches():
         for step in range(steps):
             done = step / steps
