@@ -8,11 +8,11 @@ from odeform_viz.view import ColorScale
 
 __all__ = ["ScaleFitter", "colors_of", "gradient_css"]
 
-# even samples of viridis, without its darkest part, which would be black in the shade: perceptually uniform, also in
-# grayscale and for color-blind readers
+# even samples of viridis, perceptually uniform, also in grayscale and for color-blind readers; its yellow is as pale as
+# the tone mapping of the browser can show it
 STOPS = np.array(
-    [(72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121), (109, 205, 89),
-     (180, 222, 44), (253, 231, 37)]
+    [(68, 1, 84), (72, 40, 120), (62, 74, 137), (49, 104, 142), (38, 130, 142), (31, 158, 137), (53, 183, 121),
+     (109, 205, 89), (180, 221, 84), (251, 231, 136)]
 )  # fmt: skip
 TABLE = np.stack(
     [np.interp(np.linspace(0.0, len(STOPS) - 1.0, 256), np.arange(len(STOPS)), channel) for channel in STOPS.T], axis=1
@@ -20,21 +20,31 @@ TABLE = np.stack(
 UNITS = {"displacement": "mm", "strain": "%", "error": "mm"}
 SMALLEST = 0.01  # mm or %; a scale that ends lower would show nothing that can be seen
 STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-KEPT = 0.5  # of the scale that has to be in use; a larger part would change it too often
+KEPT = 0.5  # of the scale of a moment that has to be in use; a larger part would change it too often
 
 
 class ScaleFitter:
-    """Fits the scale to what is shown, in round steps; small changes of the values leave it as it is."""
+    """Fits the scale in round steps: to a whole motion, or to each moment."""
 
     def __init__(self) -> None:
         self._scale: ColorScale | None = None
 
-    def fit(self, quantity: str, largest: float) -> ColorScale:
-        """A scale of `quantity` from 0 to at least `largest`, in its unit."""
+    def fit(self, quantity: str, largest: float, momentary: bool = True) -> ColorScale:
+        """A scale of `quantity` from 0 to at least `largest`, in its unit.
+
+        That of a moment stays as it is when the values change a little.
+        """
         scale = self._scale
-        if scale is None or scale.quantity != quantity or not KEPT * scale.top <= largest <= scale.top:
-            scale = self._scale = ColorScale(quantity, UNITS[quantity], _round_up(max(largest, SMALLEST)))
+        same = scale is not None and scale.quantity == quantity and scale.momentary and momentary
+        if scale is None or not same or not KEPT * scale.top <= largest <= scale.top:
+            top = _round_up(max(largest, SMALLEST))
+            scale = self._scale = ColorScale(quantity, UNITS[quantity], top, momentary)
         return scale
+
+    def fixed(self, quantity: str) -> ColorScale | None:
+        """The scale that was fitted to a whole motion; None if none was, for this quantity."""
+        scale = self._scale
+        return scale if scale is not None and scale.quantity == quantity and not scale.momentary else None
 
 
 def colors_of(values: Perpoint, scale: ColorScale) -> UInt8[np.ndarray, "points 3"]:

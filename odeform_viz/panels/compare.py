@@ -58,7 +58,11 @@ def sweep(column: Column, parameters: Mapping[str, Any], schema: Schema, name: s
         swept = next(p for p in schema.learned if p.name == name)
         values = [swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0) for index in range(SWEEP)]
         rows = [(f"{name} {value:.3g} {swept.unit}", {**parameters, name: value}) for value in values]
-    return [replace(column, label=label, pinned=pinned, visible=True) for label, pinned in rows]
+    ranks = [None if name == OBJECT else index / (len(rows) - 1) for index in range(len(rows))]
+    return [
+        replace(column, label=label, pinned=pinned, visible=True, rank=rank)
+        for (label, pinned), rank in zip(rows, ranks, strict=True)
+    ]
 
 
 class ComparePanel(Panel):

@@ -54,7 +54,7 @@ def _cell(shown: ColumnFrame, quantity: Quantity, curves: Curves, time: float) -
     if quantity.name != "error":
         text = f"{at(getattr(curves, quantity.name))} {quantity.unit}"
     else:
-        texts = [] if shown.error is None else [f"{_number(shown.error.rmse_mm, quantity)} mm"]
+        texts = [] if shown.error is None else [f"{_number(shown.error.rms_mm, quantity)} mm"]
         if (band := shown.error_band(np.array([time]))) is not None:  # as the status says it
             texts.append(f"90 %: {_number(float(band[0, 1]), quantity)} mm")
         text = " · ".join(texts) or "–"

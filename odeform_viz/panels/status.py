@@ -31,7 +31,9 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
         lines.append(f"{stats.solver} · no ODE · {stats.wall_ms:.1f} ms")
     if shown.error is not None:
         e = shown.error
-        lines.append(f"error now: RMSE {e.rmse_mm:.2f}, MAE {e.mae_mm:.2f}, max {e.worst_mm:.2f} mm")
+        lines.append(
+            f"distance from the truth now: RMS {e.rms_mm:.2f}, mean {e.mean_mm:.2f}, largest {e.worst_mm:.2f} mm"
+        )
     lines += _model_error(shown, column.predictor, time)
     if isinstance(shown.motion, Motion):
         lines += _stops(shown.motion, time, settled)

@@ -8,7 +8,7 @@ import viser
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Points
-from odeform_viz.colors import ARROW
+from odeform_viz.colors import ACTING
 
 __all__ = ["GlyphView"]
 
@@ -53,7 +53,7 @@ class GlyphView:
         self._shafts = self._server.scene.add_arrows(
             f"{self._root}/arrows",
             np.array([[arrow.start, arrow.start + arrow.vector] for arrow in arrows], dtype=np.float32),
-            ARROW,
+            ACTING,
             shaft_radius=0.02 * self._extent,
             head_radius=0.055 * self._extent,
             head_length=min(0.12 * self._extent, 0.6 * shortest),

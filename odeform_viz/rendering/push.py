@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from odeform.types import Floats, Points, Pose, Vector
-from odeform_viz.colors import ARROW, CONTACT, HANDLE, SPHERE, Color, paler
+from odeform_viz.colors import CONTACT, HANDLE, SPHERE, Color, paler
 from odeform_viz.pushing import ShownPush
 
 __all__ = ["Pull", "PushView"]
@@ -79,7 +79,7 @@ class _Nodes:
         text = f"{push.push.strength:.3g} N"
         if self.label.text != text:
             self.label.text = text
-        self._show_arrow(push, tail, head, ARROW if acting else paler(ARROW))
+        self._show_arrow(push, tail, head, HANDLE if acting else paler(HANDLE))
 
     def _show_arrow(self, push: ShownPush, tail: Floats, head: Floats, color: Color) -> None:
         length = float(np.linalg.norm(head - tail))

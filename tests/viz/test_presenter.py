@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from stubs import StubPredictor, recorded
 
@@ -184,3 +185,28 @@ def test_the_scale_is_that_of_the_errors_and_none_without_colours() -> None:
         loop.options = options
         loop.serve()
         assert loop.presenter.scale is None
+
+
+def test_the_scale_of_colors_is_that_of_the_whole_motion_once_it_has_settled(
+    loop: Loop, models: tuple[StubPredictor, ...]
+) -> None:
+    loop.options = DisplayOptions(color_by="displacement")
+    loop.ask(time=0.02)
+    loop.serve()
+    assert loop.presenter.scale is not None
+    assert loop.presenter.scale.momentary
+    small = loop.presenter.scale.top
+    loop.serve()
+    scale = loop.presenter.scale
+    assert not scale.momentary
+    assert loop.kinds.count("publish") == 1  # the same frame, on the new scale
+    motion = models[0].solve(None, loop.request.parameters)
+    largest = 1e3 * max(np.linalg.norm(motion.local(t), axis=1).max() for t in np.linspace(0.0, 1.0, 50))
+    assert small < 0.5 * largest <= scale.top <= 1.5 * largest
+    for time in (0.1, 0.25, 0.9):
+        loop.ask(time=time)
+        loop.serve()
+        assert loop.presenter.scale is scale
+    loop.options = DisplayOptions(color_by="displacement", momentary=True)
+    loop.serve()
+    assert loop.presenter.scale.momentary

@@ -104,10 +104,11 @@ def test_the_error_is_that_against_the_truth_at_its_vertices(
     predicted = view_request.columns[0].source.solve(record.geometry, record.parameters).vertices(time)
     off = predicted.astype(float) - record.sequence.vertices[12]
     assert shown.error.rmse_mm == pytest.approx(1e3 * np.sqrt((off**2).mean()), rel=1e-5)
+    assert shown.error.rms_mm == pytest.approx(1e3 * np.sqrt((off**2).sum(axis=1).mean()), rel=1e-5)
     assert shown.error.worst_mm == pytest.approx(1e3 * np.linalg.norm(off, axis=1).max(), rel=1e-5)
     curve = session.curves(shown, at).error
     assert curve is not None
-    assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rmse_mm, rel=1e-4)
+    assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rms_mm, rel=1e-4)
 
 
 def test_without_its_parameters_the_truth_tells_no_error(
