@@ -286,7 +286,12 @@ class Session:
             difference = predicted.vertices(times) - truth.vertices(times)
             error = 1e3 * np.sqrt((difference.astype(float) ** 2).sum(axis=2).mean(axis=1))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
-        return Curves(times, height, rotation, 1e3 * motion.deformation_rms(times), error, band)
+        deformation = 1e3 * motion.deformation_rms(times)
+        if isinstance(motion, RecordedMotion):
+            over = [motion.extrapolates(float(t)) for t in times]
+            for values in (height, rotation, deformation):
+                values[over] = np.nan
+        return Curves(times, height, rotation, deformation, error, band)
 
 
 def _observed_frames(source: Predictor, record: RecordedMotion | None) -> MotionSequence | None:

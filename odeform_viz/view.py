@@ -234,7 +234,7 @@ class Curves:
 
     `height` of the centre in m, `rotation` from the shape at rest in degrees, which grows past whole turns, RMS
     `deformation` in mm, RMS distance from the truth in mm (`error`), and the `error_band` in mm that 90 % of motions
-    stay below. The last two are None where they are not known.
+    stay below. The last two are None where they are not known. A truth that is over has none of them: NaN.
     """
 
     times: Times
@@ -266,5 +266,7 @@ class Description:
     options: DisplayOptions
     scale: ColorScale | None
     """None where bodies have their own colours."""
+    histogram: Floats | None
+    """The shares of the values along the scale; None without one."""
     settled: bool
     """Whether the motions have not changed for a moment: time for numbers that are expensive to compute."""

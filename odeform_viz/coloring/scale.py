@@ -1,12 +1,14 @@
 """The scale that turns values on surfaces into colors."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from jaxtyping import UInt8
 
-from odeform.types import Perpoint
+from odeform.types import Floats, Perpoint
 from odeform_viz.view import ColorScale
 
-__all__ = ["ScaleFitter", "colors_of", "gradient_css"]
+__all__ = ["ScaleFitter", "colors_of", "gradient_html", "histogram_of"]
 
 # even samples of viridis, perceptually uniform, also in grayscale and for color-blind readers; its yellow is as pale as
 # the tone mapping of the browser can show it
@@ -18,6 +20,7 @@ TABLE = np.stack(
     [np.interp(np.linspace(0.0, len(STOPS) - 1.0, 256), np.arange(len(STOPS)), channel) for channel in STOPS.T], axis=1
 ).astype(np.uint8)
 UNITS = {"displacement": "mm", "strain": "%", "error": "mm"}
+BINS = 32  # of the histogram
 SMALLEST = 0.01  # mm or %; a scale that ends lower would show nothing that can be seen
 STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 KEPT = 0.5  # of the scale of a moment that has to be in use; a larger part would change it too often
@@ -52,10 +55,26 @@ def colors_of(values: Perpoint, scale: ColorScale) -> UInt8[np.ndarray, "points 
     return TABLE[np.clip(values * (255.0 / scale.top), 0.0, 255.0).astype(np.intp)]
 
 
-def gradient_css() -> str:
-    """The colors from 0 to the top, as a CSS gradient."""
+def histogram_of(values: Iterable[Perpoint], scale: ColorScale) -> Floats:
+    """(`BINS`,) the shares of values along the scale, 1 for the largest; those above it are in the last bin."""
+    every = np.clip(np.concatenate(list(values)), 0.0, scale.top)
+    counts = np.histogram(every, BINS, (0.0, scale.top))[0]
+    return counts / max(int(counts.max()), 1)
+
+
+def gradient_html(histogram: Floats | None) -> str:
+    """The colors from 0 to the top, below a histogram where one is given."""
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in STOPS.tolist())
-    return f"linear-gradient(to right,{stops})"
+    shares = [] if histogram is None else histogram.tolist()
+    bars = "".join(
+        f'<rect x="{i}" y="{1.0 - share:.2f}" width="0.9" height="{share:.2f}"/>'
+        for i, share in enumerate(shares)
+        if share
+    )
+    return (
+        f'<svg viewBox="0 0 {BINS} 1" preserveAspectRatio="none" fill="currentColor" opacity="0.5">{bars}</svg>'
+        f'<div style="height:9px;border-radius:3px;background:linear-gradient(to right,{stops})"></div>'
+    )
 
 
 def _round_up(value: float) -> float:

@@ -30,6 +30,7 @@ class Loop:
     up_to_date: Callable[[], bool] = lambda: True
     starts: bool = False
     events: list[tuple[str, Any]] = field(default_factory=list)
+    outdated: int = 0
 
     def __post_init__(self) -> None:
         self.presenter = Presenter(
@@ -52,6 +53,9 @@ class Loop:
 
     def describe(self, description: Description) -> None:
         self.events.append(("describe", description))
+
+    def outdate(self) -> None:
+        self.outdated += 1
 
     def show_error(self, message: str) -> None:
         self.events.append(("error", message))
@@ -210,3 +214,13 @@ def test_the_scale_of_colors_is_that_of_the_whole_motion_once_it_has_settled(
     loop.options = DisplayOptions(color_by="displacement", momentary=True)
     loop.serve()
     assert loop.presenter.scale.momentary
+
+
+def test_what_is_beside_the_view_is_outdated_by_other_motions_not_by_other_moments(loop: Loop) -> None:
+    loop.serve()
+    loop.ask(time=0.4)
+    loop.serve()
+    assert loop.outdated == 0
+    loop.ask(parameters={**loop.request.parameters, "mass": 0.5})
+    loop.serve()
+    assert loop.outdated == 1

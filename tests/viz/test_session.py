@@ -16,7 +16,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe_column
-from odeform_viz.panels.summary import summarize
+from odeform_viz.panels.summary import badge_of, summarize
 from odeform_viz.session import Session, visible_deformation
 from odeform_viz.view import INVISIBLE, ViewRequest
 
@@ -166,8 +166,9 @@ def test_impossible_times_are_refused(session: Session, view_request: ViewReques
 
 
 def test_the_summary(session: Session, view_request: ViewRequest) -> None:
-    assert "between frames" in summarize(session.frame(replace(view_request, time=0.02)))
-    assert "on a trained frame" in summarize(session.frame(replace(view_request, time=0.025)))
+    inside = badge_of(session.frame(replace(view_request, time=0.02)))
+    assert (inside.level, inside.text) == ("inside", "inside the trained range")
+    assert badge_of(session.frame(replace(view_request, time=1.3))).level == "outside"
     late = summarize(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
