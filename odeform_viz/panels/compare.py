@@ -99,7 +99,9 @@ class ComparePanel(Panel):
         pin.on_click(lambda _: self._guarded("Parameters not pinned", self._pin))
         self._swept = gui.add_dropdown("parameter", swept_names(self._schema))
         over = gui.add_button(
-            f"Sweep it in {SWEEP} columns", color="gray", hint="over its trained range; the others stay the same"
+            "Sweep it",
+            color="gray",
+            hint=f"{SWEEP} columns over its trained range, or one for each object; the others stay the same",
         )
         over.on_click(lambda _: self._guarded("Sweep not added", self._sweep))
 

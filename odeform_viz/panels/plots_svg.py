@@ -35,7 +35,7 @@ QUANTITIES = (
     Quantity("height", "height of the centre", "m", 3),
     Quantity("rotation", "rotation", "°", 1),
     Quantity("deformation", "deformation, RMS", "mm", 2),
-    Quantity("error", "distance from truth, RMS (dashed: 90 %)", "mm", 2),
+    Quantity("error", "error, RMS (dashed: 90 %)", "mm", 2),
 )
 
 STYLE = """<style>

@@ -27,20 +27,20 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Explore", "odeform_viz.panels.quality:QualityPanel"),
     Entry("side/Explore", "odeform_viz.panels.shape:ShapePanel"),
     Entry("side/Explore", "odeform_viz.panels.user_body:UserBodyPanel"),
-    Entry("side/Explore", "odeform_viz.panels.camera:CameraPanel"),
-    Entry("side/Explore", "odeform_viz.panels.about:AboutPanel"),
     Entry("side/Compare", "odeform_viz.panels.truth:TruthPanel"),
     Entry("side/Compare", "odeform_viz.panels.fit:FitPanel"),
     Entry("side/Compare", "odeform_viz.panels.compare:ComparePanel"),
+    Entry("side/View", "odeform_viz.panels.camera:CameraPanel"),
+    Entry("side/View", "odeform_viz.panels.status:StatusPanel"),
     Entry("side/Record", "odeform_viz.panels.record:RecordPanel"),
     Entry("side/Record", "odeform_viz.panels.page_state:StatePanel"),
     Entry("side/Record", "odeform_viz.panels.export:ExportPanel"),
     Entry("side/Record", "odeform_viz.panels.picture:PicturePanel"),
-    Entry("side", "odeform_viz.panels.status:StatusPanel"),
     Entry("bottom/Over time", "odeform_viz.panels.plots:PlotPanel"),
     Entry("bottom/Stability", "odeform_viz.panels.stability:StabilityPanel"),
     Entry("side", "odeform_viz.panels.theme:ThemePanel"),
-    Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # last: it lists the hot keys of all others
+    Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # after all others, whose hot keys it lists
+    Entry("side/Help", "odeform_viz.panels.about:AboutPanel"),
 )
 
 

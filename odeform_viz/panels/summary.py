@@ -66,6 +66,8 @@ def summarize(frame: Frame) -> str:
     lines = [badge_of(frame).html]
     if (push := first_push(frame)) is not None:
         lines.append(describe_push(*push))
+    if errors := [f"{escape(c.column.label)} RMS {c.error.rms_mm:.2f} mm" for c in frame.columns if c.error]:
+        lines.append(f"error now: {', '.join(errors)}")
     truth = frame.truth
     if truth is not None and truth.ended and truth.column.truth:
         lines.append(f"no truth after {truth.column.truth.end:.3g} s: its last moment is shown, pale")

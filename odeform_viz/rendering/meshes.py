@@ -70,7 +70,9 @@ class _Checkerboard:
         self._parts: list[tuple[viser.MeshHandle, Part]] = []
         for index, (part, shade) in enumerate(zip(checkerboard_parts(mesh), _shades(CLAY), strict=False)):
             name, vertices = f"{root}/part_{index}", part.vertices(points)
-            self._parts.append((server.scene.add_mesh_simple(name, vertices, part.faces, color=shade), part))
+            self._parts.append(
+                (server.scene.add_mesh_simple(name, vertices, part.faces, color=shade, receive_shadow=False), part)
+            )
         self._at_rest, self._color = True, CLAY
 
     def show(self, points: Points | None, rest: Points, look: Look) -> None:
@@ -120,7 +122,7 @@ class _Colored:
             self._writer = (layout, GlbWriter(*self._mesh, look.opacity, look.wireframe, self._unlit))
         data = self._writer[1].write(points, colors)
         if self._handle is None:
-            self._handle = self._server.scene.add_glb(self._node, data)
+            self._handle = self._server.scene.add_glb(self._node, data, receive_shadow=False)
         else:
             self._handle.glb_data = data
 

@@ -64,7 +64,9 @@ class _Nodes:
         self._scene, self._root = scene, f"{ground}/push"
         self.place = scene.add_frame(self._root, show_axes=False)
         self.marker = scene.add_icosphere(f"{body}/contact", 1.0, CONTACT, subdivisions=2, cast_shadow=False)
-        self.sphere = scene.add_icosphere(f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4)
+        self.sphere = scene.add_icosphere(
+            f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4, receive_shadow=False
+        )
         self.handle = scene.add_icosphere(f"{self._root}/handle", 1.0, HANDLE, subdivisions=2, cast_shadow=False)
         self.label = scene.add_label(f"{self._root}/label", "", anchor="bottom-center")
         self._arrow: viser.ArrowsHandle | None = None

@@ -187,15 +187,15 @@ def test_status_names_solver_error_as_such(session: Session, view_request: ViewR
     shown = session.frame(view_request).columns[0]
     text = describe_column(shown, view_request.time)
     assert "solver error" in text
-    assert "test error of the checkpoint" in text
+    assert "error on the test sequences" in text
     assert re.search(r"\d+ evaluations", text)
-    assert "model error here: unknown, with fewer than 8 validation sequences" in text
+    assert "error expected here: not known, with fewer than 8 validation sequences" in text
 
 
 def test_status_says_how_far_off_the_model_is() -> None:
     session, view_request = _alone(odeform.load("kick"))
     text = describe_column(session.frame(view_request).columns[0], view_request.time)
-    assert "model error here ≈" in text
+    assert "error expected here: half below" in text
     assert "extrapolated: rough" not in text
     later = replace(view_request, time=1.2 * session.schema.window.stop)
     assert "(extrapolated: rough)" in describe_column(session.frame(later).columns[0], later.time)
