@@ -32,6 +32,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Compare", "odeform_viz.panels.compare:ComparePanel"),
     Entry("side/View", "odeform_viz.panels.camera:CameraPanel"),
     Entry("side/View", "odeform_viz.panels.status:StatusPanel"),
+    Entry("side/View", "odeform_viz.panels.about:AboutPanel"),
     Entry("side/Record", "odeform_viz.panels.record:RecordPanel"),
     Entry("side/Record", "odeform_viz.panels.page_state:StatePanel"),
     Entry("side/Record", "odeform_viz.panels.export:ExportPanel"),
@@ -39,8 +40,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("bottom/Over time", "odeform_viz.panels.plots:PlotPanel"),
     Entry("bottom/Stability", "odeform_viz.panels.stability:StabilityPanel"),
     Entry("side", "odeform_viz.panels.theme:ThemePanel"),
-    Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # after all others, whose hot keys it lists
-    Entry("side/Help", "odeform_viz.panels.about:AboutPanel"),
+    Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # last: it lists the hot keys of all others
 )
 
 

@@ -163,7 +163,7 @@ class ColumnView:
             if self._push is not None:
                 self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
             elif isinstance(motion, Motion):
-                self._glyphs.show(motion.schema.scene, motion.parameters, time)
+                self._glyphs.show(motion.schema.scene, motion.parameters, time, self.points(frame, options), frame.pose)
 
     def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
         """(N, 3) m: the body as it is drawn, before its pose."""
