@@ -143,6 +143,11 @@ class App:
         for panel in self.page.panels:
             panel.describe(description)
 
+    def outdate(self) -> None:
+        """Mark what the panels show as that of other motions; see `Output`."""
+        for panel in self.page.panels:
+            panel.outdate()
+
     def show_error(self, message: str) -> None:
         """Say in the panels why a request cannot be met; see `Output`."""
         for panel in self.page.panels:

@@ -7,6 +7,7 @@ import viser
 __all__ = ["Layout"]
 
 BOTTOM_WIDTH = 664  # px
+ABOVE = 76  # px; the timeline is below
 
 
 class Layout:
@@ -47,5 +48,5 @@ class Layout:
             return self._bottom.add_tab(name)
         self._bottom = self._gui.add_panel()
         tab = self._bottom.add_tab(name)
-        self._bottom.float(x=12, y=-12, width=BOTTOM_WIDTH)
+        self._bottom.float(x=12, y=-ABOVE, width=BOTTOM_WIDTH)
         return tab

@@ -41,6 +41,9 @@ class Panel:
     def describe(self, description: Description) -> None:
         """Show what belongs to a frame; called several times a second while frames change."""
 
+    def outdate(self) -> None:
+        """Mark what belongs to other motions than those in view, until the next `describe`."""
+
     def show_error(self, message: str) -> None:
         """Say why the newest request cannot be met."""
 

@@ -1,22 +1,27 @@
 """The loop of the viewer: computes the newest request and shows it. Knows no GUI types."""
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol
 
 from odeform.cancellation import Cancelled, cancel_unless
 from odeform.errors import InputError
 from odeform_viz.coloring.colorist import Colorist
+from odeform_viz.coloring.scale import histogram_of
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import Session
 from odeform_viz.view import (
     COLOR_BY,
     Coloring,
     ColorScale,
+    Curves,
     Description,
     DisplayOptions,
     Frame,
     ViewRequest,
+    peak_of,
     same_motions,
 )
 
@@ -37,6 +42,10 @@ class Output(Protocol):
 
     def describe(self, description: Description) -> None:
         """Update everything beside the viewport."""
+        ...
+
+    def outdate(self) -> None:
+        """Mark what is beside the viewport: other motions are in view than those it describes."""
         ...
 
     def show_error(self, message: str) -> None:
@@ -81,14 +90,19 @@ class Presenter:
         self._output, self._recording, self._up_to_date = output, recording, up_to_date
         self.frame: Frame | None = None
         """The frame on screen; None before the first, and after a request that could not be met."""
-        self.scale: ColorScale | None = None
-        """The scale of the colours on screen; None for the bodies' own colours."""
+        self._coloring: Coloring | None = None
         self._colorist = Colorist()
         self._options = DisplayOptions()
         self._settled = False
+        self._fitted: object = None  # what the scale of colours was fitted to
         self._described: Frame | None = None
         self._described_at = 0.0
         self._pause = DESCRIBE
+
+    @property
+    def scale(self) -> ColorScale | None:
+        """The scale of the colours on screen; None for the bodies' own colours."""
+        return self._coloring.scale if self._coloring else None
 
     @property
     def settled(self) -> bool:
@@ -133,20 +147,47 @@ class Presenter:
             self._describe(frame)
 
     def _show(self, frame: Frame, options: DisplayOptions) -> None:
-        # columns in one place are told apart by their own colours
-        coloring = self._colorist.color(frame, COLOR_BY[0] if options.overlay else options.color_by)
-        self.scale = coloring.scale if coloring else None
         self._settled = self.frame is not None and same_motions(frame, self.frame)
-        self._output.publish(frame, options, coloring)
+        self._publish(frame, options)
         self.frame, self._options = frame, options
+        if self._described is not None and not same_motions(frame, self._described):
+            self._output.outdate()
         with cancel_unless(lambda: True):  # a frame that was shown is recorded, whatever came since
             self._recording.log(frame)
         if frame.pending or time.monotonic() - self._described_at > self._pause:
             self._describe(frame)
 
+    def _publish(self, frame: Frame, options: DisplayOptions) -> None:
+        self._coloring = self._colorist.color(frame, _quantity(options), options.momentary)
+        self._output.publish(frame, options, self._coloring)
+
+    def _fit_scale(self, frame: Frame, curves: Sequence[Curves]) -> None:
+        """Fit the scale of colours to the largest values of the motions, once these have settled."""
+        options = self._options
+        fitted = ([c.motion for c in frame.columns], _quantity(options), options.momentary)
+        if not self._settled or self.scale is None or fitted == self._fitted:
+            return
+        if options.momentary:
+            self._fitted = fitted
+            return
+        peaks = {peak_of(each, self._clock.stop, options.color_by == "error") for each in curves}
+        with contextlib.suppress(InputError):  # a moment that cannot be shown
+            frames = [self._session.frame(replace(frame.request, time=peak)) for peak in sorted(peaks)]
+            self._colorist.fit(frames, _quantity(options))
+        self._fitted = fitted
+        self._publish(frame, options)
+
     def _describe(self, frame: Frame) -> None:
         begin = time.monotonic()
         curves = tuple(self._session.curves(column, frame.request) for column in frame.columns)
-        self._output.describe(Description(frame, curves, self._options, self.scale, self._settled))
+        self._fit_scale(frame, curves)
+        coloring = self._coloring
+        histogram = histogram_of(coloring.values.values(), coloring.scale) if coloring else None
+        self._output.describe(Description(frame, curves, self._options, self.scale, histogram, self._settled))
         self._described, self._described_at = frame, time.monotonic()
         self._pause = max(DESCRIBE, RARELY * (self._described_at - begin))
+
+
+def _quantity(options: DisplayOptions) -> str:
+    """What colours show: columns in one place are told apart by their own."""
+    return COLOR_BY[0] if options.overlay else options.color_by

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -15,7 +16,7 @@ from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.contacts import push_from
-from odeform.simulation.scenes.registry import surroundings_of
+from odeform.simulation.scenes.registry import find_scene, surroundings_of
 from odeform.surroundings import Contacts
 from odeform.types import Floats, Geometry, Mesh, Points, Vector
 from odeform_viz.columns import Column
@@ -23,6 +24,7 @@ from odeform_viz.view import ColumnFrame, Frame
 
 __all__ = [
     "ShownPush",
+    "acting_times",
     "contacts_of",
     "describe_push",
     "first_push",
@@ -132,6 +134,17 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
     return ShownPush(push, contacts, surface, strongest, carriers, weights, offset)
 
 
+def acting_times(shown: ColumnFrame) -> list[tuple[float, float]]:
+    """From when to when, in s, something acts on a body: a sphere, or what the scene draws as arrows."""
+    if (contacts := contacts_of(shown.motion.schema)) is not None:
+        return [(0.0, contacts.pulse)]
+    scene = find_scene(shown.motion.schema.scene)
+    if scene is None:
+        return []
+    rest = np.asarray(shown.column.geometry.points, dtype=np.float32)
+    return [(arrow.begin, arrow.end) for arrow in scene.glyphs(shown.motion.parameters, rest)]
+
+
 def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats) -> tuple[Vector, float] | None:
     """The point of a shape at rest (3,) m that a ray meets while its points are at `shown` (N, 3) m.
 
@@ -158,15 +171,15 @@ def push_excess(push: Push, forces: tuple[float, float]) -> dict[str, str]:
 
 
 def describe_push(push: Push, name: str) -> str:
-    """One line: the force, and where it acts on the object called `name`."""
+    """One line of HTML: the force, and where it acts on the object called `name`."""
     upward, height = push.contact.normal[2], 1e3 * push.contact.point[2]
     where = "top" if upward > 0.5 else "underside" if upward < -0.5 else "side"
-    place = f"the {name}'s {where}, {height:.0f} mm above the floor"
+    place = f"the {escape(name)}'s {where}, {height:.0f} mm above the floor"
     if push.strength == 0.0:
-        return f"**no force** on {place}: nothing moves"
+        return f"<b>no force</b> on {place}: nothing moves"
     angle = math.degrees(push.angle)
     tilt = "straight in" if angle < 0.5 else f"{angle:.0f}° off the inward normal"
-    return f"**{push.strength:.3g} N** on {place}, {tilt}"
+    return f"<b>{push.strength:.3g} N</b> on {place}, {tilt}"
 
 
 def first_push(frame: Frame) -> tuple[Push, str] | None:

@@ -257,7 +257,8 @@ class Session:
         covariances = None
         if points is not None and isinstance(motion, Motion) and isinstance(column.geometry, GaussianSplats):
             covariances = motion.deformed_covariances(time)
-        return ColumnFrame(column, motion, points, covariances, pose, max(-lowest, 0.0), self._error(column, request))
+        depth, error = max(-lowest, 0.0), self._error(column, request)
+        return ColumnFrame(column, motion, points, covariances, pose, depth, error, time)
 
     def _error(self, column: Column, request: ViewRequest) -> Error | None:
         truth = self.truth_of(column, request)
@@ -283,9 +284,14 @@ class Session:
         if truth is not None and predictor is not None:
             predicted = self._predicted_truth(shown.column, predictor, truth, request)
             difference = predicted.vertices(times) - truth.vertices(times)
-            error = 1e3 * np.sqrt((difference.astype(float) ** 2).mean(axis=(1, 2)))
+            error = 1e3 * np.sqrt((difference.astype(float) ** 2).sum(axis=2).mean(axis=1))
             error[[truth.extrapolates(float(t)) for t in times]] = np.nan
-        return Curves(times, height, rotation, 1e3 * motion.deformation_rms(times), error, band)
+        deformation = 1e3 * motion.deformation_rms(times)
+        if isinstance(motion, RecordedMotion):
+            over = [motion.extrapolates(float(t)) for t in times]
+            for values in (height, rotation, deformation):
+                values[over] = np.nan
+        return Curves(times, height, rotation, deformation, error, band)
 
 
 def _observed_frames(source: Predictor, record: RecordedMotion | None) -> MotionSequence | None:

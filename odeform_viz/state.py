@@ -27,8 +27,8 @@ SHAPE_KEYS = ("origin", "region", "place")
 class PageState:
     """Plain values of one page: slider values, display options, and the columns by their origin.
 
-    A column is `{"origin", "label", "pinned", "shown", "truth"}`, of a checkpoint or of a sequence DATASET/NAME;
-    `shape` is `{"origin", "region", "place"}` of a loaded shape.
+    A column is `{"origin", "label", "pinned", "shown", "truth"}`, of a checkpoint or of a sequence DATASET/NAME; in a
+    sweep it has a `"rank"` too. `shape` is `{"origin", "region", "place"}` of a loaded shape.
     """
 
     scene: str
@@ -58,6 +58,7 @@ def capture(scene: str, request: ViewRequest, display: DisplayOptions) -> PageSt
             "pinned": c.pinned and dict(c.pinned),
             "shown": c.visible,
             "truth": c.truth is not None,
+            **({} if c.rank is None else {"rank": c.rank}),
         }
         for c in request.columns
         if c.predictor or c.origin
@@ -79,7 +80,7 @@ def _column(raw: Mapping[str, Any], models: Mapping[str, Predictor], schema: Sch
         return replace(truth_column(raw["origin"]), visible=visible)
     model = models[raw["origin"]]
     pinned = None if raw["pinned"] is None else schema.complete(raw["pinned"])
-    return Column(str(raw["label"]), model, model.rest, pinned=pinned, origin=raw["origin"], visible=visible)
+    return Column(str(raw["label"]), model, model.rest, pinned, raw["origin"], visible=visible, rank=raw.get("rank"))
 
 
 def state_to_json(state: PageState) -> bytes:
@@ -143,10 +144,13 @@ def _check(state: PageState, scene: str) -> None:
     if state.scene != scene:
         raise InputError(f"state: expected scene {scene}, got {state.scene}")
     for column in state.columns:
-        if set(column) != set(COLUMN_KEYS):
+        if set(column) - {"rank"} != set(COLUMN_KEYS):
             raise InputError(f"state: a column has {', '.join(column)}; expected {', '.join(COLUMN_KEYS)}")
         if not isinstance(column["pinned"], dict | None) or not isinstance(column["origin"], str):
             raise InputError(f"state: column {column['label']}: expected an origin and parameters by name")
+        rank = column.get("rank", 0.0)
+        if not isinstance(rank, int | float) or not 0.0 <= rank <= 1.0:
+            raise InputError(f"state: column {column['label']}: expected a rank from 0 to 1, got {rank}")
     if state.shape is not None and set(state.shape) != set(SHAPE_KEYS):
         raise InputError(f"state: shape: expected {', '.join(SHAPE_KEYS)}")
     if not isinstance(state.quality, str):

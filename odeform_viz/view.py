@@ -1,8 +1,11 @@
 """Defines requests of the user and what is displayed: plain values between session, presenter and panels."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+
+import numpy as np
 
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.motion.base import Motion, SolveStats
@@ -15,6 +18,7 @@ from odeform_viz.columns import Column
 
 __all__ = [
     "COLOR_BY",
+    "DISTANCE",
     "INVISIBLE",
     "REACH",
     "ColorScale",
@@ -26,11 +30,13 @@ __all__ = [
     "Error",
     "Frame",
     "ViewRequest",
+    "peak_of",
     "played_until",
     "same_motions",
     "shown_until",
 ]
 
+DISTANCE = math.sqrt(3.0)  # RMS of distances, in RMS of their three coordinates
 INVISIBLE = 1e-4  # m; a third of a pixel for a body of 0.1 m that is 720 pixels high
 REACH = 2.0  # length of the time slider in trained windows, at least
 WHOLE = 1.0  # s; what goes on after a shorter window is shown, and played, up to here
@@ -76,6 +82,8 @@ class DisplayOptions:
     ghost: bool = False
     """The shape at rest, moved by the same pose."""
     wireframe: bool = False
+    momentary: bool = False
+    """Whether the scale of colors fits each moment, instead of the whole motion."""
     viewport: tuple[int, int] = (1440, 900)
     """Width and height of the browser's canvas, in px."""
 
@@ -87,6 +95,8 @@ class ColorScale:
     quantity: str
     unit: str
     top: float
+    momentary: bool = False
+    """Whether it fits one moment, instead of the whole motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,11 +113,21 @@ class Error:
 
     distances: Perpoint
     rmse_mm: float
-    """Over all coordinates, as is `mae_mm`."""
+    """Over all coordinates, as is `mae_mm`: what recordings keep. The page shows distances."""
     mae_mm: float
     worst_vertex: int
     worst_position: Vector
     """(3,) metres: where the truth has the worst vertex."""
+
+    @property
+    def rms_mm(self) -> float:
+        """RMS of the distances, in millimetres: `DISTANCE` times the error over coordinates."""
+        return DISTANCE * self.rmse_mm
+
+    @property
+    def mean_mm(self) -> float:
+        """Mean of the distances, in millimetres."""
+        return 1e3 * float(self.distances.mean())
 
     @property
     def worst_mm(self) -> float:
@@ -131,6 +151,7 @@ class ColumnFrame:
     pose: Floats
     depth: float
     error: Error | None
+    time: float
 
     @property
     def stats(self) -> SolveStats:
@@ -146,20 +167,32 @@ class ColumnFrame:
         return self.motion.similarity or (predictor.validity.similarity(self.column.geometry) if predictor else None)
 
     @property
+    def changed(self) -> bool:
+        """Whether the body has a mass or a stiffness that no data have."""
+        predictor, given = self.column.predictor, self.motion.parameters
+        return predictor is not None and bool(given) and predictor.model_of(given).is_changed(given)
+
+    @property
     def untrained(self) -> bool:
         """Whether the model was not trained on this shape: figures of its errors on trained shapes do not hold."""
         return self.similarity is not None and not self.similarity.same
 
     def error_band(self, times: Times) -> Floats | None:
-        """(T, 2) mm at (T,) seconds: the model error that half, and 90 %, of motions stay below; None if not known."""
+        """(T, 2) mm at (T,) seconds: the RMS distance that half, and 90 %, of motions stay below; None if not known."""
         predictor = self.column.predictor
         if predictor is None or (self.untrained and not predictor.knows_untrained_errors):
             return None
-        return predictor.error_band(self.motion.parameters, times)
+        band = predictor.error_band(self.motion.parameters, times)
+        return None if band is None else DISTANCE * band
 
     def stop_at(self, time: float) -> Stop | None:
         """Says what is shown in place of `time` in seconds, and why, where the motion is not physically possible."""
         return self.motion.stop_at(time) if isinstance(self.motion, Motion) else None
+
+    @property
+    def ended(self) -> bool:
+        """Whether this is a recorded motion at a time after its last frame."""
+        return self.column.truth is not None and self.motion.extrapolates(self.time)
 
     @property
     def below_floor(self) -> bool:
@@ -206,8 +239,8 @@ class Curves:
     """A motion over `times` (T,) in seconds.
 
     `height` of the centre in m, `rotation` from the shape at rest in degrees, which grows past whole turns, RMS
-    `deformation` in mm, RMS `error` in mm, and the `error_band` in mm that 90 % of motions stay below. The last two are
-    None where they are not known.
+    `deformation` in mm, RMS distance from the truth in mm (`error`), and the `error_band` in mm that 90 % of motions
+    stay below. The last two are None where they are not known. A truth that is over has none of them: NaN.
     """
 
     times: Times
@@ -216,6 +249,13 @@ class Curves:
     deformation: Times
     error: Times | None
     error_band: Times | None
+
+
+def peak_of(curves: Curves, until: float, of_error: bool) -> float:
+    """Seconds, up to `until`, at which the deformation or, where it is known, the error is largest."""
+    values = curves.error if of_error and curves.error is not None else curves.deformation
+    within = values[curves.times <= until]
+    return float(curves.times[np.nanargmax(within)]) if np.isfinite(within).any() else float(curves.times[0])
 
 
 def same_motions(one: Frame, other: Frame) -> bool:
@@ -232,5 +272,7 @@ class Description:
     options: DisplayOptions
     scale: ColorScale | None
     """None where bodies have their own colours."""
+    histogram: Floats | None
+    """The shares of the values along the scale; None without one."""
     settled: bool
     """Whether the motions have not changed for a moment: time for numbers that are expensive to compute."""

@@ -188,7 +188,7 @@ def _deformation(view: View) -> None:
 
 def _sweeps(view: View) -> None:
     view.tab("Compare")
-    view.client.click("Sweep it in 5 columns")
+    view.client.click("Sweep it")
     view.wait(lambda: (frame := view.app.presenter.frame) is not None and len(frame.columns) == 5)
     view.show(0.3)
 

@@ -1,5 +1,6 @@
 """Describes what a viewer draws for the parameters of a scene."""
 
+import math
 from dataclasses import dataclass
 
 from odeform.types import Vector
@@ -19,3 +20,11 @@ class Arrow:
     label: str
     begin: float
     end: float
+    rises: bool = False
+    """Whether its strength is sin^2 of its time, from none to that of the label and back; otherwise it is constant."""
+
+    def strength(self, time: float) -> float:
+        """The part of the label's strength that acts at `time` in seconds."""
+        if not self.begin <= time <= self.end:
+            return 0.0
+        return math.sin(math.pi * (time - self.begin) / (self.end - self.begin)) ** 2 if self.rises else 1.0

@@ -1,5 +1,6 @@
 """Stability plot: deformation over two parameters and time, inside the trained box and beyond."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ __all__ = ["StabilityMap", "largest_deformation", "map_image", "stability_map"]
 
 MOTIONS = 32  # of the trained box, that tell how large deformations are
 MOMENTS = (0.5, 1.0, 1.5, 3.0, 10.0)
-CELL, GAP = 8, 24  # pixels
+SIDE, GAP = 200, 24  # pixels, about, of one panel and between two
 SCALE = np.array([[247, 247, 242], [253, 212, 120], [240, 120, 60], [170, 20, 60]], dtype=float)
 FAILED = (60, 60, 60)
 
@@ -52,10 +53,11 @@ def stability_map(
     scale: float = 3.0,
     count: int = 25,
     moments: tuple[float, ...] = MOMENTS,
+    report: Callable[[float], None] = lambda _: None,
 ) -> StabilityMap:
     """Solve `count` x `count` values of two parameters (default: the first two), up to `scale` times the trained box.
 
-    `moments` are the times, in trained windows.
+    `moments` are the times, in trained windows; `report` is told the fraction that is done.
     """
     schema = predictor.schema
     known = {p.name: p for p in schema.learned}
@@ -68,6 +70,7 @@ def stability_map(
         motion = predictor.solve(None, given, until=times[-1])
         values[:, i, j] = motion.deformation_rms(times)
         solved = schema.window.soft_clamped(times) <= motion.last_good
+        report((i * count + j + 1) / (count * count))
         sound[:, i, j] = solved & [motion.stop_at(time) is None for time in times.tolist()]
     return StabilityMap(
         (first.name, second.name),
@@ -86,8 +89,7 @@ def _range(parameter: Parameter) -> str:
 
 def map_image(plot: StabilityMap) -> Image.Image:
     """One panel per time, grey where an earlier state is shown."""
-
-    side = CELL * len(plot.units)
+    side = SIDE // len(plot.units) * len(plot.units)
     image = Image.new("RGB", (GAP + len(plot.times) * (side + GAP), side + 3 * GAP), (255, 255, 255))
     case = ImageDraw.Draw(image)
     axes = f"x: {plot.names[0]} ({plot.boxes[0]}), y: {plot.names[1]} ({plot.boxes[1]})"

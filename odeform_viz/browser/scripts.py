@@ -8,7 +8,7 @@ from viser._messages import RunJavascriptMessage
 
 __all__ = ["SCRIPTS", "THEME_KEYS", "THEME_MODIFIER", "run_script", "run_scripts"]
 
-SCRIPTS = ("keys", "numbers", "theme", "uploads", "plots", "phone")
+SCRIPTS = ("keys", "numbers", "theme", "uploads", "plots", "phone", "view")
 THEME_KEYS: dict[str, Literal["D", "L"]] = {"dark": "D", "light": "L"}
 """Hot keys of the commands that set the theme; `theme.js` presses them."""
 THEME_MODIFIER = "alt+shift"

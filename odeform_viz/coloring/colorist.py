@@ -1,5 +1,7 @@
 """Computes what the colors of a frame show: displacement, strain, or the distance from the truth."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from odeform.motion.recorded import RecordedMotion
@@ -25,20 +27,33 @@ class Colorist:
         self._strains: dict[int, tuple[Geometry, SurfaceStrain]] = {}
         self._carried: dict[int, tuple[RecordedMotion, Geometry, NearestInterpolation]] = {}
 
-    def color(self, frame: Frame, quantity: str) -> Coloring | None:
-        """The values of each column; None where no visible column has any, as for errors without a truth."""
+    def color(self, frame: Frame, quantity: str, momentary: bool = True) -> Coloring | None:
+        """The values of each column; None where no visible column has any, as for errors without a truth.
+
+        Unless `momentary`, they are on the scale that `fit` has found, once it has.
+        """
         self._forget(frame)
-        values = {c.column.key: found for c in frame.columns if (found := self._values(c, frame, quantity)) is not None}
+        values = self._all_values(frame, quantity)
         if not values:
             return None
-        largest = max(float(np.quantile(found, USED)) for found in values.values())
-        return Coloring(self._fitter.fit(quantity, largest), values)
+        fixed = None if momentary else self._fitter.fixed(quantity)
+        return Coloring(fixed or self._fitter.fit(quantity, _largest(values)), values)
+
+    def fit(self, frames: Sequence[Frame], quantity: str) -> None:
+        """Fit the scale to a motion, given by the moments of its largest values."""
+        found = [values for frame in frames if (values := self._all_values(frame, quantity))]
+        if found:
+            self._fitter.fit(quantity, max(map(_largest, found)), momentary=False)
 
     def _forget(self, frame: Frame) -> None:
         """Forget what belongs to columns or a truth that a frame does not have: whole sequences would be kept."""
         keys, truth = {column.key for column in frame.request.columns}, frame.truth.motion if frame.truth else None
         self._strains = {key: known for key, known in self._strains.items() if key in keys}
         self._carried = {key: known for key, known in self._carried.items() if key in keys and known[0] is truth}
+
+    def _all_values(self, frame: Frame, quantity: str) -> dict[int, Perpoint]:
+        found = ((c.column.key, self._values(c, frame, quantity)) for c in frame.columns)
+        return {key: values for key, values in found if values is not None}
 
     def _values(self, shown: ColumnFrame, frame: Frame, quantity: str) -> Perpoint | None:
         rest = shown.column.geometry
@@ -69,3 +84,7 @@ class Colorist:
             carried = NearestInterpolation(record.geometry.points, rest.points)
             known = self._carried[shown.column.key] = (record, rest, carried)
         return known[2](values)
+
+
+def _largest(values: Mapping[int, Perpoint]) -> float:
+    return max(float(np.quantile(found, USED)) for found in values.values())

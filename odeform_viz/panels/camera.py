@@ -29,11 +29,15 @@ class CameraPanel(Panel):
                 initial_value=1.0,
                 hint="factor of the deformation; the rigid motion stays as it is",
             )
+            self._momentary = gui.add_checkbox(
+                "scale of this moment", False, hint="colours fit each moment, instead of the whole motion"
+            )
             self._ghost = gui.add_checkbox("ghost", False, hint="the shape at rest, in the same pose")
             self._wireframe = gui.add_checkbox("wireframe", False, hint="of meshes")
             self._follow = gui.add_checkbox("follow the body", True, hint="bodies stay in view, the floor moves")
             fit = gui.add_button("Fit the view", color="gray", hint="aim the camera as it was at first")
-        for control in (self._colors, self._exaggeration, self._ghost, self._wireframe, self._follow):
+        controls = (self._colors, self._momentary, self._exaggeration, self._ghost, self._wireframe, self._follow)
+        for control in controls:
             control.on_update(lambda _: page.wake())
         fit.on_click(lambda _: page.controls.fit_view())
         page.controls.drawing = self._options
@@ -54,6 +58,7 @@ class CameraPanel(Panel):
             ghost=bool(self._ghost.value),
             wireframe=bool(self._wireframe.value),
             follow=bool(self._follow.value),
+            momentary=bool(self._momentary.value),
         )
 
     def _next_colors(self) -> None:

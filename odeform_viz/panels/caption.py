@@ -4,12 +4,15 @@ from html import escape
 from pathlib import Path
 
 from odeform.schema import OBJECT
-from odeform_viz.coloring.scale import gradient_css
+from odeform.types import Floats
+from odeform_viz.coloring.scale import gradient_html
 from odeform_viz.colors import color_of
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.in_view import in_view
 from odeform_viz.view import ColorScale, Description, DisplayOptions, Frame
 
-__all__ = ["CaptionPanel", "caption_html"]
+__all__ = ["CaptionPanel", "caption_html", "scale_html"]
 
 OF = {
     "displacement": "displacement from the rest shape",
@@ -18,28 +21,40 @@ OF = {
 }
 
 
-def caption_html(frame: Frame, options: DisplayOptions, scale: ColorScale | None) -> str:
+def caption_html(frame: Frame, options: DisplayOptions) -> str:
     """The lines that the frame needs, and no others."""
-    lines = [f"<div>{escape(_subject(frame))}</div>"]
+    lines = [f"<div>{_subject(frame)}</div>"]
     if options.exaggeration != 1.0:
         lines.append(f"<div><b>deformation exaggerated {options.exaggeration:g} times</b></div>")
     if options.overlay and len(frame.columns) > 1:
         lines.append(_legend(frame))
-    if scale is not None:
-        lines.append(_bar(scale))
-    return f'<div style="padding:0.6em 1em 0;font-size:0.85em;line-height:1.5">{"".join(lines)}</div>'
+    return "".join(lines)
+
+
+def scale_html(scale: ColorScale | None, histogram: Floats | None) -> str:
+    """The colours of values with their quantity and unit, and how many points have them; empty without a scale."""
+    if scale is None:
+        return ""
+    of = "this moment" if scale.momentary else "the whole motion"
+    ticks = "".join(f"<span>{part * scale.top:g}</span>" for part in (0.0, 0.25, 0.5, 0.75))
+    return (
+        f'<div class="odeform-bar"><div>{OF[scale.quantity]}, {scale.unit} (scale of {of})</div>'
+        f"{gradient_html(histogram)}"
+        f'<div style="display:flex;justify-content:space-between">{ticks}<span>≥ {scale.top:g}</span></div></div>'
+    )
 
 
 def _subject(frame: Frame) -> str:
     """Scene, models and shape."""
     if not frame.columns:
-        return "no column is visible"
+        return "no column is in view"
     models = list(dict.fromkeys(c.column.predictor.model for c in frame.columns if c.column.predictor))
     truth = ["truth"] if frame.truth else []
     fit = next((c.column.fit for c in frame.columns if c.column.fit), None)
-    trained = frame.columns[0].motion.parameters.get(OBJECT, "trained body")
-    shape = trained if fit is None else Path(fit.origin).name or "uploaded shape"
-    return f"{frame.columns[0].motion.schema.scene} · {', '.join([*models, *truth])} · {shape}"
+    own = frame.columns[0].motion.parameters.get(OBJECT, "the body of the training data")
+    shape = str(own) if fit is None else Path(fit.origin).name or "uploaded shape"
+    names = ", ".join([*([f"model {', '.join(models)}"] if models else []), *truth])
+    return f"<b>{escape(frame.columns[0].motion.schema.scene)}</b> · {escape(names)} · {escape(shape)}"
 
 
 def _legend(frame: Frame) -> str:
@@ -52,22 +67,13 @@ def _legend(frame: Frame) -> str:
     return f"<div>{' '.join(names)}</div>"
 
 
-def _bar(scale: ColorScale) -> str:
-    ticks = "".join(f"<span>{part * scale.top:g}</span>" for part in (0.0, 0.5))
-    return (
-        f"<div>{OF[scale.quantity]}, {scale.unit} (scale fitted to this moment)</div>"
-        f'<div style="height:10px;border-radius:3px;background:{gradient_css()}"></div>'
-        f'<div style="display:flex;justify-content:space-between">{ticks}<span>≥ {scale.top:g}</span></div>'
-    )
-
-
 class CaptionPanel(Panel):
-    """Text at the top of the side panel; sent only when it changes."""
+    """Text and a scale of colours over the scene; sent only when they change."""
 
     def __init__(self, page: Page) -> None:
-        self._html = page.server.gui.add_html("")
+        gui = page.server.gui
+        self._caption, self._scale = gui.add_html(in_view("caption", "")), gui.add_html(in_view("scale", ""))
 
     def describe(self, description: Description) -> None:
-        content = caption_html(description.frame, description.options, description.scale)
-        if self._html.content != content:
-            self._html.content = content
+        set_content(self._caption, in_view("caption", caption_html(description.frame, description.options)))
+        set_content(self._scale, in_view("scale", scale_html(description.scale, description.histogram)))

@@ -58,7 +58,11 @@ def sweep(column: Column, parameters: Mapping[str, Any], schema: Schema, name: s
         swept = next(p for p in schema.learned if p.name == name)
         values = [swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0) for index in range(SWEEP)]
         rows = [(f"{name} {value:.3g} {swept.unit}", {**parameters, name: value}) for value in values]
-    return [replace(column, label=label, pinned=pinned, visible=True) for label, pinned in rows]
+    ranks = [None if name == OBJECT else index / (len(rows) - 1) for index in range(len(rows))]
+    return [
+        replace(column, label=label, pinned=pinned, visible=True, rank=rank)
+        for (label, pinned), rank in zip(rows, ranks, strict=True)
+    ]
 
 
 class ComparePanel(Panel):
@@ -95,7 +99,9 @@ class ComparePanel(Panel):
         pin.on_click(lambda _: self._guarded("Parameters not pinned", self._pin))
         self._swept = gui.add_dropdown("parameter", swept_names(self._schema))
         over = gui.add_button(
-            f"Sweep it in {SWEEP} columns", color="gray", hint="over its trained range; the others stay the same"
+            "Sweep it",
+            color="gray",
+            hint=f"{SWEEP} columns over its trained range, or one for each object; the others stay the same",
         )
         over.on_click(lambda _: self._guarded("Sweep not added", self._sweep))
 

@@ -9,9 +9,23 @@ from odeform_viz.page import Page, Panel
 
 __all__ = ["HelpPanel", "help_text"]
 
+WHAT = """**ODeform** predicts how a soft body moves and deforms, for any parameters and at any moment, in milliseconds,
+with models learned from simulations. It is an independent implementation of *ODeform: Learning Continuous 4D
+Motion for Shape Deformation with Neural ODEs* by Velikova, Saleh, Kuang and Busam
+([arXiv:2607.20670](https://arxiv.org/abs/2607.20670)), with models of its own.
+
+**The badge** says whether this moment and these parameters are *inside* of what the model was trained on
+(green), outside of it, *extrapolated* (amber), or *not modelled* (red). The error beside it is measured on
+sequences that were not used for training: nine of ten had a smaller one.
+
+**Every error is a distance**: how far each point of the body is from where a simulation, the *truth*, has it.
+*RMS* is the root of the mean of its square over all points; colours show it point by point. The *solver error*
+is the part of it that comes from the steps of the ODE solver.
+"""
 TABS = {
     "Explore": "change the parameters; marks at each slider show where the model was trained",
     "Compare": "show models, pinned copies and the truth side by side; with a truth, errors are coloured and plotted",
+    "View": "what colours show, exaggeration, and how each column was computed",
     "Record": "save a recording, the state of the page, or the motion as a file",
 }
 KEY_NAMES = {"space": "Space", "arrowleft": "←", "arrowright": "→"}
@@ -22,7 +36,7 @@ def help_text(hotkeys: Mapping[str, str]) -> str:
     """Markdown; `hotkeys` are keys and what they do."""
     tabs = "  \n".join(f"**{name}**: {what}." for name, what in TABS.items())
     keys = " · ".join(f"{_named(key)} {what}" for key, what in hotkeys.items())
-    return f"{tabs}\n\n{MOUSE}\n\nKeys: {keys}"
+    return f"{WHAT}\n\n{tabs}\n\n{MOUSE}\n\nKeys: {keys}"
 
 
 def _named(keys: str) -> str:

@@ -1,4 +1,4 @@
-"""Time: a slider past the trained window, play and pause, speed, steps."""
+"""Time: the timeline under the scene, past the trained window; play and pause, speed, steps."""
 
 import asyncio
 
@@ -6,6 +6,10 @@ import viser
 
 from odeform.errors import InputError
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.in_view import in_view
+from odeform_viz.panels.timeline import Marks, moment_css, timeline_html
+from odeform_viz.pushing import acting_times
 from odeform_viz.state import PageState
 from odeform_viz.view import Description, shown_until
 
@@ -47,14 +51,20 @@ class PlaybackPanel(Panel):
             self._speed.on_update(lambda _: self._changed())
             self._loop = gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())
+        self._timeline, self._moment = gui.add_html(""), gui.add_html("")
+        self._marks: Marks | None = None
         page.add_hotkey("space K", "play or pause", self.toggle)
         page.add_hotkey("arrowleft J", "previous frame", lambda: self.step(PREVIOUS))
         page.add_hotkey("arrowright L", "next frame", lambda: self.step(NEXT))
         page.add_hotkey("0", "go to the start", lambda: self.step("start"))
         page.add_hotkey("P", "go to the peak of the deformation", lambda: self.step("peak"))
+        page.add_hotkey("S", "another speed", self._next_speed)
+        page.add_hotkey("R", "repeat or play once", lambda: setattr(self._loop, "value", not self._loop.value))
         self._changed()
 
     def describe(self, description: Description) -> None:
+        self._marks = _marks_of(description)
+        set_content(self._moment, moment_css(self._window, description.frame.request.time))
         self._page.on_event_loop(self._follow_clock)
 
     def restore(self, state: PageState) -> None:
@@ -113,7 +123,20 @@ class PlaybackPanel(Panel):
             expected = f"expected one of {', '.join(SPEEDS)}"
             self._page.notices.show("Speed not set", f"speed: {expected}, got {self._speed.value!r}")
         self._clock.loop = bool(self._loop.value)
+        self._page.on_event_loop(self._draw)
         self._page.wake()
+
+    def _next_speed(self) -> None:
+        names = list(SPEEDS)
+        now = names.index(self._speed.value) if self._speed.value in names else -1
+        self._speed.value = names[(now + 1) % len(names)]
+
+    def _draw(self) -> None:
+        slider, playing = self._page.controls.time_slider, self._clock.playing
+        content = timeline_html(
+            self._window, slider, self._marks, playing, str(self._speed.value), bool(self._loop.value)
+        )
+        set_content(self._timeline, in_view("timeline", content))
 
     def _to_frame(self, target: str) -> None:
         frame = 1.0 / self._window.rate
@@ -135,11 +158,22 @@ class PlaybackPanel(Panel):
         playing = self._clock.playing
         self._play.label = "Pause" if playing else "Play"
         self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+        self._draw()
 
     def _follow_clock(self) -> None:
         self._time.value = min(max(round(self._clock.time(), 4), self._time.min), self._time.max)
         if (self._play.label == "Pause") != self._clock.playing:
             self._refresh_button()
+        self._draw()
+
+
+def _marks_of(description: Description) -> Marks | None:
+    """The motion of the first column in view, and what acts on it."""
+    if not description.frame.columns:
+        return None
+    shown, truth = description.frame.columns[0], description.frame.truth
+    end = truth.column.truth.end if truth and truth.column.truth else None
+    return Marks(description.curves[0], acting_times(shown), end)
 
 
 def _usual_speed(window: float) -> str:

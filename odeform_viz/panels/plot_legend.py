@@ -5,7 +5,6 @@ from html import escape
 
 import numpy as np
 
-from odeform.types import Floats
 from odeform_viz.colors import Color
 from odeform_viz.panels.plots_svg import Line, Quantity
 from odeform_viz.view import ColumnFrame, Curves
@@ -48,13 +47,11 @@ def _swatch(color: Color) -> str:
 
 
 def _cell(shown: ColumnFrame, quantity: Quantity, curves: Curves, time: float) -> str:
-    def at(values: Floats) -> str:
-        return _number(float(np.interp(time, curves.times, values)), quantity)
-
     if quantity.name != "error":
-        text = f"{at(getattr(curves, quantity.name))} {quantity.unit}"
+        value = float(np.interp(time, curves.times, getattr(curves, quantity.name)))
+        text = f"{_number(value, quantity)} {quantity.unit}" if np.isfinite(value) else "–"
     else:
-        texts = [] if shown.error is None else [f"{_number(shown.error.rmse_mm, quantity)} mm"]
+        texts = [] if shown.error is None else [f"{_number(shown.error.rms_mm, quantity)} mm"]
         if (band := shown.error_band(np.array([time]))) is not None:  # as the status says it
             texts.append(f"90 %: {_number(float(band[0, 1]), quantity)} mm")
         text = " · ".join(texts) or "–"

@@ -2,6 +2,8 @@
 
 import threading
 
+import numpy as np
+
 from odeform_viz.colors import color_of
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
@@ -12,6 +14,7 @@ from odeform_viz.view import Description
 __all__ = ["PlotPanel"]
 
 ROTATES = 1.0  # degrees; bodies that turn less have no plot of it
+OUTDATED = "<style>.odeform-plots{opacity:0.3}</style>"
 MARGIN, LARGE = 40, 860  # px; around the plots, and the width of two large ones
 
 
@@ -22,13 +25,18 @@ class PlotPanel(Panel):
         self._window, self._layout, self._slider = page.schema.window, page.layout, page.controls.time_slider
         gui = page.server.gui
         self._curves, self._cursor, self._legend = gui.add_html(""), gui.add_html(""), gui.add_html("")
+        self._state = gui.add_html("")
         self._lines: list[Line] = []
         self._described: Description | None = None
         self._rotates = self._large = False
         self._drawing = threading.Lock()  # a key may be pressed while other columns are described
         page.add_hotkey(ENLARGE, "larger or smaller plots", self._resize)
 
+    def outdate(self) -> None:
+        set_content(self._state, OUTDATED)
+
     def describe(self, description: Description) -> None:
+        set_content(self._state, "")
         with self._drawing:
             self._describe(description)
 
@@ -40,7 +48,7 @@ class PlotPanel(Panel):
         ]
         if [(label, color, id(c)) for label, color, c in lines] != [(n, color, id(c)) for n, color, c in self._lines]:
             self._lines = lines
-            self._rotates = any(float(c.rotation.max()) > ROTATES for _, _, c in lines)
+            self._rotates = any(float(np.nanmax(c.rotation)) > ROTATES for _, _, c in lines)
             self._draw()
         self._described = description
         self._follow(description)

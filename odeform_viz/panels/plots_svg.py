@@ -15,6 +15,8 @@ __all__ = ["WIDTH", "Line", "Quantity", "cursor_css", "plots_html", "quantities_
 WIDTH, HEIGHT, LEFT, TOP, FOOT = 208, 100, 34, 18, 16  # units of the drawing, of one plot and its margins
 WIDE, HIGH = WIDTH - LEFT - 6, HEIGHT - TOP - FOOT  # the area that is drawn on
 
+FAR = 100.0  # heights of a plot; curves are drawn no farther away, where nobody sees them
+
 Line = tuple[str, Color, Curves]
 """Label, color and curves of one column."""
 
@@ -32,8 +34,8 @@ class Quantity:
 QUANTITIES = (
     Quantity("height", "height of the centre", "m", 3),
     Quantity("rotation", "rotation", "°", 1),
-    Quantity("deformation", "deformation RMS", "mm", 2),
-    Quantity("error", "error RMS (dashed: 90 %)", "mm", 2),
+    Quantity("deformation", "deformation, RMS", "mm", 2),
+    Quantity("error", "error, RMS (dashed: 90 %)", "mm", 2),
 )
 
 STYLE = """<style>
@@ -42,6 +44,7 @@ STYLE = """<style>
 .odeform-plots.large text{font-size:7px}
 .odeform-plots svg{cursor:crosshair;touch-action:none;user-select:none}
 .odeform-plots text{font-family:sans-serif;font-size:10px;fill:var(--mantine-color-text);stroke:none}
+.odeform-plots svg svg{overflow:hidden}
 .odeform-plots .quiet{opacity:0.65}
 .odeform-plots .area{fill:var(--mantine-color-body)}
 .odeform-plots .beyond{fill:#d08a40;opacity:0.22}
@@ -86,20 +89,25 @@ def _plot(quantity: Quantity, lines: Sequence[Line], window: Window) -> str:
     low, high = _axis([v[: _trained(c.times, window)] for c, _, v, _ in curves])
     trained = WIDE * (window.stop - window.start) / (end - window.start)
     largest = max((float(np.nanmax(v, initial=high)) for _, _, v, _ in curves), default=high)
-    cut = f'<text x="{WIDE}" y="-6" text-anchor="end" class="quiet">to {largest:.3g} ↑</text>' if largest > high else ""
+    cut = (
+        f'<text x="{WIDE - 2}" y="9" text-anchor="end" class="quiet">to {_short(largest)} ↑</text>'
+        if largest > high
+        else ""
+    )
     return (
         f'<g transform="translate({LEFT},{TOP})">'
         f'<rect class="area" width="{WIDE}" height="{HIGH}"/>'
         f'<rect class="beyond" x="{trained:.1f}" width="{WIDE - trained:.1f}" height="{HIGH}"/>'
         f'<path class="axis" d="M0 0V{HIGH}H{WIDE}"/>'
-        f'<text x="-28" y="-6">{quantity.title}, {quantity.unit}</text>{cut}'
+        f'<text x="-28" y="-6">{quantity.title}, {quantity.unit}</text>'
         f'<text class="quiet" x="-4" y="8" text-anchor="end">{high:.3g}</text>'
         f'<text class="quiet" x="-4" y="{HIGH}" text-anchor="end">{low:.3g}</text>'
         f'<text class="quiet" x="0" y="{HIGH + 12}">{window.start:g}</text>'
         f'<text class="quiet" x="{trained:.1f}" y="{HIGH + 12}" text-anchor="middle">{window.stop:g} s</text>'
         f'<text class="quiet" x="{WIDE}" y="{HIGH + 12}" text-anchor="end">{end:.3g}</text>'
-        f"{''.join(_curve(c, color, v, dashes, low, high) for c, color, v, dashes in curves)}"
-        f'<path class="cursor" d="M0 0v{HIGH}"/></g>'
+        f'<svg width="{WIDE}" height="{HIGH}">'
+        f"{''.join(_curve(c, color, v, dashes, low, high) for c, color, v, dashes in curves)}</svg>"
+        f'{cut if largest > high else ""}<path class="cursor" d="M0 0v{HIGH}"/></g>'
     )
 
 
@@ -131,11 +139,16 @@ def _round_up(largest: float) -> float:
     return float(next(s * power for s in (1.0, 1.5, 2.0, 3.0, 5.0, 7.5, 10.0) if s * power >= largest * (1 - 1e-9)))
 
 
+def _short(value: float) -> str:
+    """Three digits, without an exponent."""
+    return f"{value:.3g}" if value < 1000.0 else f"{value:,.0f}"
+
+
 def _curve(curves: Curves, color: Color, values: Floats, dashes: str, low: float, high: float) -> str:
-    """A path that is cut off at the ends of the axis, with gaps where values are not known."""
+    """A path that leaves the plot beyond the ends of the axis, with gaps where values are not known."""
     span = curves.times[-1] - curves.times[0]
     x = (curves.times - curves.times[0]) / span * WIDE
-    y = HIGH * (1.0 - np.clip((values - low) / (high - low), -0.02, 1.02))
+    y = HIGH * (1.0 - np.clip((values - low) / (high - low), -FAR, FAR))
     parts, pen = [], "M"
     for a, b in zip(x.tolist(), y.tolist(), strict=True):
         if b != b:

@@ -54,7 +54,7 @@ class PushPanel(Panel):
                 p.name: gui.add_slider(f"{LABELS.get(p.name, p.name)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)
                 for p in self._of_body()
             }
-            buttons = gui.add_button_group("set", ("straight in", "default"), hint="the direction, or the whole push")
+            buttons = gui.add_button_group("set", ("no tilt", "first push"), hint="the direction, or the whole push")
             buttons.on_click(self._clicked)
         for control in (self._object, self._strength, self._up, self._side, *self._body.values()):
             control.on_update(lambda _: page.wake())
@@ -104,7 +104,12 @@ class PushPanel(Panel):
         self._page.wake()
 
     def pick(self, column: Column | None, point: Vector) -> None:
-        """Move the contact to a point (3,) m of the shape at rest, with the same force in its frame."""
+        """Move the contact to a point (3,) m of the shape at rest, with the same force in its frame.
+
+        Without a column nothing happens: a click on the floor is meant for nothing.
+        """
+        if column is None:
+            return
         try:
             with self._lock:
                 parameters = self.parameters()
@@ -177,10 +182,8 @@ class PushPanel(Panel):
             if not slider.min <= value <= slider.max:
                 raise InputError(f"{slider.label}: expected {slider.min:g} to {slider.max:g}, got {value:g}")
 
-    def _check_pick(self, column: Column | None, parameters: Mapping[str, Any]) -> None:
+    def _check_pick(self, column: Column, parameters: Mapping[str, Any]) -> None:
         name = parameters[OBJECT]
-        if column is None:
-            raise InputError(f"That click is beside the {name}: click its surface to choose where the sphere pushes.")
         if column.pinned is not None:
             raise InputError(f"{column.label} is pinned: click a column that follows the sliders.")
         if column.truth is not None and column.truth.parameters.get(OBJECT) != name:
@@ -243,7 +246,7 @@ class PushPanel(Panel):
     async def _clicked(self, event: viser.GuiEvent) -> None:
         # a coroutine runs soon where the message arrives, before a drag that follows it
         with self._lock:
-            if event.target.value == "default":
+            if event.target.value == "first push":
                 self._parameters = self._defaults(str(self._parameters[OBJECT]))
             else:
                 push = push_from(self.parameters(), self._surface)

@@ -5,12 +5,13 @@ from collections.abc import Iterable
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.in_view import in_view
 from odeform_viz.user_bodies import UserBodyPredictor
 from odeform_viz.view import Description
 
 __all__ = ["ShapeWarningPanel", "shape_warning"]
 
-STYLE = "margin:0.4em 0.8em;padding:0.5em 0.8em;border-radius:0.4em;background:#b54708;color:#fff;font-size:0.85em"
+STYLE = "margin:-5px -10px;padding:5px 10px;border-radius:6px;background:#b54708;color:#fff;max-width:34em"
 
 
 def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBodyPredictor | None = None) -> str:
@@ -39,11 +40,11 @@ def _motion(model: UserBodyPredictor | None) -> str:
 
 
 class ShapeWarningPanel(Panel):
-    """A coloured box. It is there before the first frame of a shape is drawn."""
+    """A coloured box over the scene. It is there before the first frame of a shape is drawn."""
 
     def __init__(self, page: Page) -> None:
         self._page = page
-        self._box = page.server.gui.add_html("", visible=False)
+        self._box = page.server.gui.add_html(in_view("shape", ""))
         page.on_columns_changed(self._refresh)
         self._refresh()
 
@@ -62,6 +63,4 @@ class ShapeWarningPanel(Panel):
         return predictor if isinstance(predictor, UserBodyPredictor) else None
 
     def _show(self, text: str) -> None:
-        set_content(self._box, text)
-        if self._box.visible != bool(text):
-            self._box.visible = bool(text)
+        set_content(self._box, in_view("shape", text))

@@ -10,7 +10,7 @@ from odeform.motion.base import Motion, SolveStats
 from odeform.motion.rest import rests_from
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import ColumnFrame, Description, played_until
+from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until
 
 __all__ = ["StatusPanel", "describe_column"]
 
@@ -26,13 +26,14 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     if column.predictor is None:
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
-        lines.append(f"{stats.solver} · {stats.evaluations} evaluations · {stats.wall_ms:.1f} ms")
+        lines.append(f"solver {stats.solver} · {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms")
         lines.append(_solver_error(stats) if settled else "solver error: …")
     else:
-        lines.append(f"{stats.solver} · no ODE · {stats.wall_ms:.1f} ms")
+        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.1f} ms")
     if shown.error is not None:
         e = shown.error
-        lines.append(f"error now: RMSE {e.rmse_mm:.2f}, MAE {e.mae_mm:.2f}, max {e.worst_mm:.2f} mm")
+        values = f"RMS {e.rms_mm:.2f}, mean {e.mean_mm:.2f}, largest {e.worst_mm:.2f} mm"
+        lines.append(f"error now: {values} (distance from the truth)")
     lines += _model_error(shown, column.predictor, time)
     if isinstance(shown.motion, Motion):
         lines += _stops(shown.motion, time, settled)
@@ -51,19 +52,19 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
     if only is not None and abs(time - only) > 1e-6:
         return [f"⚠ **only t = {only:.3g} s is predicted**: that state is shown, not this moment's"]
     if shown.untrained and not predictor.knows_untrained_errors:
-        return ["model error: unknown, this shape was not trained"]
+        return ["error expected: not known, this shape was not trained"]
     band = shown.error_band(np.array([time]))
-    if band is None and predictor.model_of(shown.motion.parameters).is_changed(shown.motion.parameters):
-        lines = ["model error here: unknown, no data have this mass or stiffness"]
+    if band is None and shown.changed:
+        lines = ["error expected here: not known, no data have this mass or stiffness"]
     elif band is None:
-        lines = [f"model error here: unknown, with fewer than {FEWEST} validation sequences"]
+        lines = [f"error expected here: not known, with fewer than {FEWEST} validation sequences"]
     else:
         rough = " (extrapolated: rough)" if shown.motion.extrapolates(time) or shown.motion.outside else ""
-        lines = [f"model error here ≈ RMSE {band[0, 0]:.2f} mm, 90 % below {band[0, 1]:.2f} mm{rough}"]
+        lines = [f"error expected here: half below {band[0, 0]:.2f} mm, 90 % below {band[0, 1]:.2f} mm{rough}"]
     if shown.untrained:
         return [*lines, "as measured on other shapes that were not trained"]
     score = predictor.checkpoint.scores.get("rmse_pooled_mm")
-    return lines if score is None else [*lines, f"test error of the checkpoint: RMSE {score:.2f} mm"]
+    return lines if score is None else [*lines, f"error on the test sequences: RMS {DISTANCE * score:.2f} mm"]
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:

@@ -1,70 +1,99 @@
-"""Always visible: how far the current frame can be trusted, and why a request cannot be met."""
+"""How far the current frame can be trusted, what acts, and why a request cannot be met; always in view."""
 
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from odeform.motion.base import Motion
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.in_view import in_view
 from odeform_viz.pushing import describe_push, first_push, outside_of_push
-from odeform_viz.view import Description, Frame
+from odeform_viz.view import ColumnFrame, Description, Frame
 
-__all__ = ["SummaryPanel", "summarize"]
+__all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
 UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
-ON_FRAME = 0.02  # frames; closer times count as on the frame
+
+
+@dataclass(frozen=True)
+class Badge:
+    """How far a frame can be trusted: "inside" what was trained, "outside" of it, or "unknown"; and why, in words."""
+
+    level: str
+    text: str
+    expected: str = ""
+    """The error that is expected; empty where no model is in view."""
+
+    @property
+    def html(self) -> str:
+        """The text in the colour of its level, with the expected error."""
+        return f'<span class="odeform-badge {self.level}">{escape(self.text)}</span> {escape(self.expected)}'
+
+
+def badge_of(frame: Frame) -> Badge:
+    """The least that holds for all models in view."""
+    models = [c for c in frame.columns if c.column.predictor]
+    if not models:
+        return Badge("unknown", "only the truth is in view" if frame.columns else "no column is in view")
+    expected = _expected(models[0])
+    for shown in models:
+        if stop := shown.stop_at(frame.request.time):
+            return Badge("unknown", f"not modelled: {stop}")
+        only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
+        if only is not None and abs(frame.request.time - only) > 1e-6:
+            return Badge("unknown", f"not modelled: only t = {only:.3g} s is predicted, and shown")
+    outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
+    if models[0].motion.extrapolates(frame.request.time):
+        outside.insert(0, "time")
+    where = f"extrapolated: {', '.join(outside)} outside the trained range" if outside else ""
+    if untrained := [c for c in models if c.untrained]:
+        known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
+        text = "; ".join(filter(None, ("shape not trained", where)))
+        return Badge("outside" if known else "unknown", text, expected)
+    if any(c.changed for c in models):
+        where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
+        return Badge("unknown", where, expected)
+    return Badge("outside", where, expected) if outside else Badge("inside", "inside the trained range", expected)
+
+
+def _expected(shown: ColumnFrame) -> str:
+    band = shown.error_band(np.array([shown.time]))
+    return "error not known" if band is None else f"error in 9 of 10 cases below {band[0, 1]:.2g} mm"
 
 
 def summarize(frame: Frame) -> str:
-    """Markdown: inside the trained range or extrapolated, stopped, below the floor, to be computed, or refused."""
-    lines = [*_push(frame), _validity(frame)]
-    for column in frame.columns:
-        if stop := column.stop_at(frame.request.time):
-            lines.append(f"⚠ **{column.column.label}** {stop}")
+    """HTML: the badge, and in lines below what acts, what is wrong, and what is still computed."""
+    lines = [badge_of(frame).html]
+    if (push := first_push(frame)) is not None:
+        lines.append(describe_push(*push))
+    if errors := [f"{escape(c.column.label)} RMS {c.error.rms_mm:.2f} mm" for c in frame.columns if c.error]:
+        lines.append(f"error now: {', '.join(errors)}")
+    truth = frame.truth
+    if truth is not None and truth.ended and truth.column.truth:
+        lines.append(f"no truth after {truth.column.truth.end:.3g} s: its last moment is shown, pale")
     if low := [c.column.label for c in frame.columns if c.below_floor]:
         deepest = max(c.depth for c in frame.columns)
-        lines.append(f"⚠ **{', '.join(low)}**: {1e3 * deepest:.0f} mm below the floor")
-    lines += [f"… **{label}** is being computed" for label in frame.pending]
-    return "  \n".join([*lines, *(f"⚠ **{reason}**" for reason in frame.refused)])
-
-
-def _push(frame: Frame) -> list[str]:
-    """Says what pushes which body, where a sphere does."""
-    found = first_push(frame)
-    return [] if found is None else [describe_push(*found)]
-
-
-def _validity(frame: Frame) -> str:
-    models = [c for c in frame.columns if c.column.predictor]
-    if not models:
-        return "only the truth is visible" if frame.columns else "no column is visible"
-    motion, time = models[0].motion, frame.request.time
-    outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
-    if motion.extrapolates(time):
-        outside.insert(0, "time")
-    untrained = "⚠ **shape not trained**; " if any(c.untrained for c in models) else ""
-    if outside:
-        return f"{untrained or '⚠ '}**extrapolated**: {', '.join(outside)} outside the trained range"
-    if untrained:
-        return f"{untrained}parameters and time inside the trained range"
-    window = motion.schema.window
-    phase = (time - window.start) * window.rate
-    on_frame = abs(phase - round(phase)) < ON_FRAME
-    return f"inside the trained range ({'on a trained frame' if on_frame else 'between frames'})"
+        lines.append(f"⚠ {escape(', '.join(low))}: {1e3 * deepest:.0f} mm below the floor")
+    lines += [f"… {escape(label)} is being computed" for label in frame.pending]
+    lines += [f"⚠ {escape(reason)}" for reason in frame.refused]
+    if frame.off_truth:
+        lines.append(OFF_TRUTH)
+    elif truth is not None and truth.column.truth and truth.column.truth.unknown:
+        lines.append(UNKNOWN.format(escape(", ".join(truth.column.truth.unknown))))
+    return "<br>".join(lines)
 
 
 class SummaryPanel(Panel):
-    """A few lines of text; sent only when they change."""
+    """A badge and a few lines of text over the scene; sent only when they change."""
 
     def __init__(self, page: Page) -> None:
-        self._text = page.server.gui.add_markdown("")
+        self._text = page.server.gui.add_html(in_view("trust", ""))
 
     def describe(self, description: Description) -> None:
-        frame = description.frame
-        truth = frame.truth.column.truth if frame.truth else None
-        lines = [summarize(frame)]
-        if frame.off_truth:
-            lines.append(OFF_TRUTH)
-        elif truth is not None and truth.unknown:
-            lines.append(UNKNOWN.format(", ".join(truth.unknown)))
-        set_content(self._text, "  \n".join(lines))
+        set_content(self._text, in_view("trust", summarize(description.frame)))
 
     def show_error(self, message: str) -> None:
-        set_content(self._text, f"⚠ **{message}**")
+        set_content(self._text, in_view("trust", f"⚠ <b>{escape(message)}</b>"))

@@ -7,7 +7,7 @@ import rerun as rr
 
 from odeform.simulation.glyphs import Arrow
 from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint
-from odeform_viz.colors import ARROW
+from odeform_viz.colors import ACTING
 from odeform_viz.recording.entities import FLOOR, STILL
 
 __all__ = ["log_arrows", "log_surroundings", "spheres"]
@@ -54,7 +54,7 @@ def log_arrows(stream: rr.RecordingStream, entity: str, arrows: Sequence[Arrow],
         origins=[arrow.start for arrow in arrows],
         vectors=[arrow.vector for arrow in arrows],
         labels=[arrow.label for arrow in arrows],
-        colors=[ARROW] * len(arrows),
+        colors=[ACTING] * len(arrows),
         radii=0.02 * size,
     )
     stream.log(entity, drawn)

@@ -1,4 +1,4 @@
-"""A checkerboard on a mesh, which makes its rotation visible: alternating octants, cut exactly along their planes."""
+"""A checkerboard on a mesh, which makes its rotation visible: alternating cubes, cut exactly along their planes."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,13 @@ from odeform.types import Faces, Floats, Ints, Mesh, Points
 
 __all__ = ["Part", "checkerboard_parts"]
 
+CELLS = 4  # along the longest side of a mesh
 TOLERANCE = 1e-6  # of the mesh's size; vertices this close to a plane count as lying in it
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Some octants of a mesh: `faces` (F, 3) index the part's own M vertices.
+    """Some cubes of a mesh: `faces` (F, 3) index the part's own M vertices.
 
     The vertices are a linear combination of the N of the mesh: `weights` (M, N), each row summing to 1.
     """
@@ -28,15 +29,18 @@ class Part:
 
 
 def checkerboard_parts(mesh: Mesh) -> list[Part]:
-    """Split a mesh into two parts of alternating octants around its centre; empty parts are left out."""
+    """Split a mesh into two parts of alternating cubes around its centre; empty parts are left out."""
     points = np.asarray(mesh.points, dtype=float)
-    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    tolerance = TOLERANCE * float(np.ptp(points, axis=0).max())
-    weights, faces = _identity(len(points)), mesh.faces
+    low, high = points.min(axis=0), points.max(axis=0)
+    centre, size = 0.5 * (low + high), float((high - low).max())
+    cell, weights, faces = size / CELLS, _identity(len(points)), mesh.faces
     for axis in range(3):
-        height = weights @ (points[:, axis] - centre[axis])
-        weights, faces = _cut(weights, faces, np.where(np.abs(height) < tolerance, 0.0, height))
-    odd = np.prod((weights @ points)[faces].mean(axis=1) - centre, axis=1) > 0.0
+        last = int(0.5 * (high - low)[axis] / cell)
+        for plane in centre[axis] + cell * np.arange(-last, last + 1):
+            height = weights @ (points[:, axis] - plane)
+            weights, faces = _cut(weights, faces, np.where(np.abs(height) < TOLERANCE * size, 0.0, height))
+    cubes = np.floor(((weights @ points)[faces].mean(axis=1) - centre) / cell).astype(int)
+    odd = cubes.sum(axis=1) % 2 == 1
     parts = []
     for chosen in (faces[odd], faces[~odd]):
         used, local = np.unique(chosen, return_inverse=True)

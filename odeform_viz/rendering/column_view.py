@@ -6,16 +6,17 @@ import viser.transforms as vtf
 
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import Floats, Points, Pose
+from odeform.types import Floats, Mesh, Points, Pose
 from odeform_viz.colors import Color
 from odeform_viz.columns import Column
 from odeform_viz.pushing import ShownPush, push_shown
 from odeform_viz.rendering.disc import FloorDisc
 from odeform_viz.rendering.ghost import show_ghost
 from odeform_viz.rendering.glyphs import GlyphView
-from odeform_viz.rendering.look import Colors, Look
+from odeform_viz.rendering.look import Look
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.push import Pull, PushView
+from odeform_viz.rendering.refined import refined
 from odeform_viz.rendering.shapes import show_shape
 from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions
 
@@ -29,8 +30,18 @@ class ColumnView:
     carried the whole motion, a body that the camera follows would jitter.
     """
 
-    def __init__(self, server: viser.ViserServer, column: Column, color: Color, pull: Pull | None = None) -> None:
-        """`pull` is called while the arrow of a force is dragged; None: it cannot be."""
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        column: Column,
+        color: Color,
+        pull: Pull | None = None,
+        fine: Mesh | None = None,
+    ) -> None:
+        """`pull` is called while the arrow of a force is dragged; None: it cannot be.
+
+        A truth is drawn as finely as `fine`, if that is a mesh of the same body.
+        """
         self._server, self._geometry, self._color = server, column.geometry, color
         self.root = f"/world/column_{column.key}"
         points = np.asarray(column.geometry.points, dtype=float)
@@ -41,7 +52,10 @@ class ColumnView:
         self._ground = server.scene.add_frame(f"{self.root}/ground", show_axes=False)
         self._body = server.scene.add_frame(f"{self.root}/body", show_axes=False)
         on_floor = column.fit is None or column.fit.static is None  # a captured scene has shadows of its own
-        self._shape = show_shape(server, f"{self.root}/body", column.geometry, color, shadow=on_floor)
+        coarse = column.geometry if column.truth and isinstance(column.geometry, Mesh) else None
+        self._refined = refined(coarse, fine) if coarse and fine else None
+        drawn = self._refined.mesh if self._refined else column.geometry
+        self._shape = show_shape(server, f"{self.root}/body", drawn, color, shadow=on_floor)
         self._glyphs = GlyphView(server, f"{self.root}/ground", self._rest)
         self._push_view = PushView(server, f"{self.root}/ground", f"{self.root}/body", pull)
         self._push: ShownPush | None = None
@@ -86,7 +100,7 @@ class ColumnView:
             self._disc.remove()
             self._disc = None
         if self._disc is None and stage is not None:
-            self._disc = FloorDisc(self._server, self.root, stage)
+            self._disc = FloorDisc(self._server, self.root, stage, self._color)
         self._shift = np.zeros(3)
         if self._disc is not None and follow:
             # in invisible steps, so that a body that falls straight down moves nothing
@@ -98,14 +112,16 @@ class ColumnView:
         if self._path is not None:
             self._path.visible = self._path_visible
 
-    def show(self, frame: ColumnFrame, options: DisplayOptions, opacity: float | None, colors: Colors | None) -> None:
-        """Show one moment, in `colors` (N, 3) or the body's own (None)."""
+    def show(self, frame: ColumnFrame, options: DisplayOptions, look: Look) -> None:
+        """Show one moment."""
         # invisible rotations are dropped, so that a body that falls without rotating sends a position only
         step = 0.5 * INVISIBLE / self._extent
         self._body.wxyz = np.round(vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz / step) * step
         self._body.position = frame.pose[:3, 3] + self._shift
-        look = Look(colors, opacity, options.wireframe)
-        self._shape.show(self._deformed(frame, options.exaggeration), frame.covariances, look)
+        points = self._deformed(frame, options.exaggeration)
+        if self._refined is not None and points is not None:
+            points = self._refined.points(points)
+        self._shape.show(points, frame.covariances, look)
         self._show_ghost(options.ghost)
 
     def _deformed(self, frame: ColumnFrame, exaggeration: float) -> Points | None:
@@ -147,7 +163,7 @@ class ColumnView:
             if self._push is not None:
                 self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
             elif isinstance(motion, Motion):
-                self._glyphs.show(motion.schema.scene, motion.parameters, time)
+                self._glyphs.show(motion.schema.scene, motion.parameters, time, self.points(frame, options), frame.pose)
 
     def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
         """(N, 3) m: the body as it is drawn, before its pose."""

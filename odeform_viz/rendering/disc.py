@@ -4,21 +4,22 @@ import numpy as np
 import viser
 
 from odeform.types import Floats
+from odeform_viz.colors import Color
 
 __all__ = ["FloorDisc", "chords"]
 
 CELL = 0.1  # m between lines
 THICKNESS = 0.03  # in radii
 SHADOW = 0.35  # opacity
-COLOR, OPACITY = (120, 125, 135), 0.16  # of the background through it: light where that is light, dark where it is dark
+OPACITY = 0.16  # light where the background is light, dark where it is dark
 LINES = (150, 155, 165)
 
 
 class FloorDisc:
     """A disc at z = 0 around the origin of the node `root`."""
 
-    def __init__(self, server: viser.ViserServer, root: str, radius: float) -> None:
-        """`radius` is in metres."""
+    def __init__(self, server: viser.ViserServer, root: str, radius: float, color: Color) -> None:
+        """`radius` is in metres; `color` is that of the column's curves."""
         self.radius = radius
         thickness = THICKNESS * radius
         self._node = server.scene.add_frame(f"{root}/disc", show_axes=False)
@@ -26,7 +27,7 @@ class FloorDisc:
             f"{root}/disc/floor",
             radius,
             thickness,
-            COLOR,
+            color,
             opacity=OPACITY,
             radial_segments=64,
             position=(0.0, 0.0, -0.5 * thickness),

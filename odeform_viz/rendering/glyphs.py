@@ -1,16 +1,21 @@
 """Arrows that show the parameters of a scene, as the scene itself describes them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import viser
+from jaxtyping import Int
 
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Points
-from odeform_viz.colors import ARROW
+from odeform.types import Points, Pose, Vector
+from odeform_viz.colors import ACTING
 
 __all__ = ["GlyphView"]
+
+CARRIERS = 6  # points of a body that hold the head of an arrow
+SHORTEST = 0.3  # of the length at full strength; it shows where a force acts that has just begun
 
 
 class GlyphView:
@@ -21,51 +26,78 @@ class GlyphView:
         self._server, self._root, self._rest = server, root, rest
         self._extent = float(np.ptp(rest, axis=0).max())
         self._of: tuple[str, Mapping[str, float]] | None = None
-        self._arrows: tuple[Arrow, ...] = ()
-        self._shown: tuple[Arrow, ...] | None = None
+        self._arrows: tuple[_Attached, ...] = ()
         self._shafts: viser.ArrowsHandle | None = None
         self._labels: list[viser.LabelHandle] = []
 
-    def show(self, scene: str, parameters: Mapping[str, float], time: float) -> None:
-        """Show the arrows of a scene that act at `time` s; parameters are in the units of its schema."""
+    def show(self, scene: str, parameters: Mapping[str, float], time: float, points: Points, pose: Pose) -> None:
+        """Show the arrows of a scene that act at `time` s, as strong as they are then.
+
+        Parameters are in the units of its schema. Arrows touch the body, whose points (N, 3) m `pose` (4, 4) moves.
+        """
         if self._of != (scene, parameters):
             known = find_scene(scene)
-            self._of, self._shown = (scene, parameters), None
-            self._arrows = known.glyphs(parameters, self._rest) if known is not None else ()
-        arrows = tuple(arrow for arrow in self._arrows if arrow.begin <= time <= arrow.end)
-        if arrows == self._shown:
-            return
-        self._shown = arrows
-        self._show_shafts(arrows)
-        while len(self._labels) > len(arrows):
+            self._of = (scene, parameters)
+            arrows = known.glyphs(parameters, self._rest) if known is not None else ()
+            self._arrows = tuple(_Attached.to(self._rest, arrow) for arrow in arrows)
+        acting = [each for each in self._arrows if each.arrow.begin <= time <= each.arrow.end]
+        self._show_shafts([each.placed(time, points, pose) for each in acting])
+        while len(self._labels) > len(acting):
             self._labels.pop().remove()
-        for index, arrow in enumerate(arrows):
-            self._show_label(index, arrow)
+        for index, each in enumerate(acting):
+            self._show_label(index, each.placed(time, points, pose)[0], each.label(time))
 
-    def _show_shafts(self, arrows: tuple[Arrow, ...]) -> None:
+    def _show_shafts(self, arrows: Sequence[tuple[Vector, Vector]]) -> None:
         if not arrows:
             if self._shafts is not None:
                 self._shafts.remove()
                 self._shafts = None
             return
+        ends = np.array(arrows, dtype=np.float32)
+        if self._shafts is not None and np.array_equal(self._shafts.points, ends):
+            return
         # a short arrow has a short head
-        shortest = min(float(np.linalg.norm(arrow.vector)) for arrow in arrows)
+        shortest = min(float(np.linalg.norm(head - tail)) for tail, head in arrows)
         self._shafts = self._server.scene.add_arrows(
             f"{self._root}/arrows",
-            np.array([[arrow.start, arrow.start + arrow.vector] for arrow in arrows], dtype=np.float32),
-            ARROW,
+            ends,
+            ACTING,
             shaft_radius=0.02 * self._extent,
             head_radius=0.055 * self._extent,
             head_length=min(0.12 * self._extent, 0.6 * shortest),
         )
 
-    def _show_label(self, index: int, arrow: Arrow) -> None:
-        tail = np.asarray(arrow.start, dtype=float)
+    def _show_label(self, index: int, tail: Vector, text: str) -> None:
         if index == len(self._labels):
             name = f"{self._root}/arrow_label_{index}"
-            label = self._server.scene.add_label(name, arrow.label, position=tail, anchor="top-right")
-            self._labels.append(label)
+            self._labels.append(self._server.scene.add_label(name, text, position=tail, anchor="top-right"))
         else:
             self._labels[index].position = tail
-            if self._labels[index].text != arrow.label:
-                self._labels[index].text = arrow.label
+            if self._labels[index].text != text:
+                self._labels[index].text = text
+
+
+@dataclass(frozen=True, eq=False)
+class _Attached:
+    """An arrow whose head is held by the points of a body that are nearest to it."""
+
+    arrow: Arrow
+    carriers: Int[np.ndarray, " carriers"]
+    offset: Vector
+    """(3,) m from their mean to the head, at rest."""
+
+    @classmethod
+    def to(cls, rest: Points, arrow: Arrow) -> "_Attached":
+        head = np.asarray(arrow.start + arrow.vector, dtype=float)
+        carriers = np.argpartition(np.linalg.norm(rest - head, axis=1), min(CARRIERS, len(rest)) - 1)[:CARRIERS]
+        return cls(arrow, carriers, head - rest[carriers].mean(axis=0))
+
+    def placed(self, time: float, points: Points, pose: Pose) -> tuple[Vector, Vector]:
+        """Tail and head (3,) m at `time` s."""
+        head = pose[:3, :3] @ (points[self.carriers].mean(axis=0) + self.offset) + pose[:3, 3]
+        return head - max(self.arrow.strength(time), SHORTEST) * self.arrow.vector, head
+
+    def label(self, time: float) -> str:
+        """The strength now, of the largest."""
+        share = self.arrow.strength(time)
+        return self.arrow.label if share > 0.995 else f"{100.0 * share:.0f} % of {self.arrow.label}"

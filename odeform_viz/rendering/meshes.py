@@ -5,7 +5,7 @@ import viser
 from jaxtyping import UInt8
 
 from odeform.types import Faces, Floats, Mesh, Points
-from odeform_viz.colors import Color, paler
+from odeform_viz.colors import CLAY, Color, darker
 from odeform_viz.rendering.checkerboard import Part, checkerboard_parts
 from odeform_viz.rendering.glb import GlbWriter
 from odeform_viz.rendering.look import Colors, Look
@@ -16,13 +16,14 @@ __all__ = ["MeshView"]
 class MeshView:
     """A mesh whose vertices move. Only one of its kinds of nodes is visible, and only that is updated."""
 
-    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
+    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh) -> None:
         self._rest = np.asarray(mesh.points, dtype=np.float32)
         given = None if mesh.colors is None else _VertexColors(mesh, mesh.colors)
         radius = _radius(mesh)
-        self._given = given and (given, _Colored(server, f"{root}/own", len(given.vertices), given.faces, radius))
-        self._checkerboard = _Checkerboard(server, root, mesh, color) if given is None else None
-        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, radius)
+        own = given and _Colored(server, f"{root}/own", len(given.vertices), given.faces, radius, unlit=False)
+        self._given = (given, own) if given and own else None
+        self._checkerboard = _Checkerboard(server, root, mesh) if given is None else None
+        self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, radius, unlit=True)
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         """See `ShapeView`: (N, 3) m. A mesh has no covariances."""
@@ -64,15 +65,18 @@ def _radius(mesh: Mesh) -> float:
 class _Checkerboard:
     """Vertices are sent alone: faces and colors stay as they are."""
 
-    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh, color: Color) -> None:
+    def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh) -> None:
         points = np.asarray(mesh.points, dtype=np.float32)
         self._parts: list[tuple[viser.MeshHandle, Part]] = []
-        for index, (part, shade) in enumerate(zip(checkerboard_parts(mesh), (color, paler(color)), strict=False)):
+        for index, (part, shade) in enumerate(zip(checkerboard_parts(mesh), _shades(CLAY), strict=False)):
             name, vertices = f"{root}/part_{index}", part.vertices(points)
-            self._parts.append((server.scene.add_mesh_simple(name, vertices, part.faces, color=shade), part))
-        self._at_rest = True
+            self._parts.append(
+                (server.scene.add_mesh_simple(name, vertices, part.faces, color=shade, receive_shadow=False), part)
+            )
+        self._at_rest, self._color = True, CLAY
 
     def show(self, points: Points | None, rest: Points, look: Look) -> None:
+        self._paint(look.tint or CLAY)
         moved = points is not None or not self._at_rest
         for handle, part in self._parts:
             if moved:
@@ -80,16 +84,28 @@ class _Checkerboard:
             handle.visible, handle.opacity, handle.wireframe = True, look.opacity, look.wireframe
         self._at_rest = points is None
 
+    def _paint(self, color: Color) -> None:
+        if color != self._color:
+            self._color = color
+            for (handle, _), shade in zip(self._parts, _shades(color), strict=False):
+                handle.color = shade
+
     def hide(self) -> None:
         for handle, _ in self._parts:
             handle.visible = False
 
 
+def _shades(color: Color) -> tuple[Color, Color]:
+    return color, darker(color)
+
+
 class _Colored:
     """Everything is sent with each change: viser colors vertices in glTF files only."""
 
-    def __init__(self, server: viser.ViserServer, node: str, count: int, faces: Faces, radius: float) -> None:
-        self._server, self._node, self._mesh = server, node, (count, faces, radius)
+    def __init__(
+        self, server: viser.ViserServer, node: str, count: int, faces: Faces, radius: float, unlit: bool
+    ) -> None:
+        self._server, self._node, self._mesh, self._unlit = server, node, (count, faces, radius), unlit
         self._writer: tuple[object, GlbWriter] | None = None
         self._handle: viser.GlbHandle | None = None
         self._sent: tuple[Points, Colors, object] | None = None
@@ -103,10 +119,10 @@ class _Colored:
             return
         self._sent = (points, colors, layout)
         if self._writer is None or self._writer[0] != layout:
-            self._writer = (layout, GlbWriter(*self._mesh, look.opacity, look.wireframe))
+            self._writer = (layout, GlbWriter(*self._mesh, look.opacity, look.wireframe, self._unlit))
         data = self._writer[1].write(points, colors)
         if self._handle is None:
-            self._handle = self._server.scene.add_glb(self._node, data)
+            self._handle = self._server.scene.add_glb(self._node, data, receive_shadow=False)
         else:
             self._handle.glb_data = data
 

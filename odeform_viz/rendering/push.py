@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from odeform.types import Floats, Points, Pose, Vector
-from odeform_viz.colors import ARROW, CONTACT, HANDLE, SPHERE, Color, paler
+from odeform_viz.colors import CONTACT, HANDLE, SPHERE, Color, paler
 from odeform_viz.pushing import ShownPush
 
 __all__ = ["Pull", "PushView"]
@@ -64,7 +64,9 @@ class _Nodes:
         self._scene, self._root = scene, f"{ground}/push"
         self.place = scene.add_frame(self._root, show_axes=False)
         self.marker = scene.add_icosphere(f"{body}/contact", 1.0, CONTACT, subdivisions=2, cast_shadow=False)
-        self.sphere = scene.add_icosphere(f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4)
+        self.sphere = scene.add_icosphere(
+            f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4, receive_shadow=False
+        )
         self.handle = scene.add_icosphere(f"{self._root}/handle", 1.0, HANDLE, subdivisions=2, cast_shadow=False)
         self.label = scene.add_label(f"{self._root}/label", "", anchor="bottom-center")
         self._arrow: viser.ArrowsHandle | None = None
@@ -79,7 +81,7 @@ class _Nodes:
         text = f"{push.push.strength:.3g} N"
         if self.label.text != text:
             self.label.text = text
-        self._show_arrow(push, tail, head, ARROW if acting else paler(ARROW))
+        self._show_arrow(push, tail, head, HANDLE if acting else paler(HANDLE))
 
     def _show_arrow(self, push: ShownPush, tail: Floats, head: Floats, color: Color) -> None:
         length = float(np.linalg.norm(head - tail))

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from odeform.types import Floats, Points, Pose, Vector
+from odeform.types import Floats, Mesh, Points, Pose, Vector
 from odeform_viz.coloring.scale import colors_of
-from odeform_viz.colors import color_of
+from odeform_viz.colors import TRUTH, color_of
 from odeform_viz.columns import Column
 from odeform_viz.pushing import picked
 from odeform_viz.rendering.cameras import Cameras
 from odeform_viz.rendering.column_view import ColumnView
-from odeform_viz.rendering.framing import Framing, Viewport, frame_columns
+from odeform_viz.rendering.framing import Axes, Box, Framing, Viewport, frame_columns
+from odeform_viz.rendering.lights import Lights
+from odeform_viz.rendering.look import Colors, Look
+from odeform_viz.rendering.outline import direction_of, outline_of
 from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
 from odeform_viz.rendering.titles import title_of
@@ -22,7 +25,7 @@ from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, F
 __all__ = ["SceneView"]
 
 OVERLAID = 0.45  # opacity of all but the first of columns that overlap
-MOMENTS = 60  # of a motion that are looked at to find how high it rises
+ENDED = 0.25  # opacity of a truth that is over
 
 
 class SceneView:
@@ -50,7 +53,9 @@ class SceneView:
         if pick is not None:
             server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
         self._framed: object = None  # what the framing was made for
-        self._framing = frame_columns(1, extent, extent, self.viewport, together=True, level=False)
+        start = Box(-extent, extent, 0.0, extent)
+        self._framing = frame_columns(1, Axes.beside(None), start, extent, self.viewport, together=True, level=False)
+        self._lights = Lights(server)
 
     @property
     def viewport(self) -> Viewport:
@@ -78,7 +83,7 @@ class SceneView:
                 view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
                 values = coloring.values.get(shown.column.key) if coloring else None
                 colors = colors_of(values, coloring.scale) if coloring and values is not None else None
-                view.show(shown, options, OVERLAID if options.overlay and index else None, colors)
+                view.show(shown, options, self._look(shown, options, index, colors))
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
                 view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
@@ -88,6 +93,14 @@ class SceneView:
             self._views[shown.column.key][1].annotate(shown, frame.request.time, options)
         if self._pick is not None:
             self._pickable = tuple(self._drawn_body(shown, options) for shown in frame.columns)
+
+    def _look(self, shown: ColumnFrame, options: DisplayOptions, index: int, colors: Colors | None) -> Look:
+        """Bodies are of clay; those that overlap, or belong to a sweep, have the colors of their curves."""
+        if shown.ended:
+            return Look(None, ENDED, options.wireframe, TRUTH)
+        own = options.overlay or shown.column.rank is not None
+        opacity = OVERLAID if options.overlay and index else None
+        return Look(colors, opacity, options.wireframe, color_of(shown.column) if own else None)
 
     def _drawn_body(self, shown: ColumnFrame, options: DisplayOptions) -> "_DrawnBody":
         view = self._views[shown.column.key][1]
@@ -108,10 +121,12 @@ class SceneView:
         shapes = [id(shown.column.geometry) for shown in frame.columns]
         reasons = (row, shapes, together, options.viewport, frame.still is None)
         if frame.columns and self._framed != reasons:
-            height, extent = max(_height(c) for c in frame.columns), max(self._size(c) for c in frame.columns)
+            axes = Axes.beside(direction_of(frame.columns[0]))
+            box, extent = _around([outline_of(c, axes) for c in frame.columns]), max(map(self._size, frame.columns))
             level = frame.still is not None
-            self._framing = frame_columns(len(row), extent, height, options.viewport, together, level)
+            self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level)
             self._cameras.aim(self._framing)
+            self._lights.aim(self._framing, everywhere=level)
             self._framed = reasons  # last: a request cancelled on the way is framed anew
         return self._framing
 
@@ -134,7 +149,8 @@ class SceneView:
         for shown in frame.columns:
             if shown.column.key not in self._views:
                 free = shown.column.predictor is not None and shown.column.pinned is None
-                view = ColumnView(self._server, shown.column, color_of(shown.column), self._pull if free else None)
+                pull = self._pull if free else None
+                view = ColumnView(self._server, shown.column, color_of(shown.column), pull, _finest(frame))
                 self._views[shown.column.key] = (shown.column, view)
 
     def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> tuple[float, float]:
@@ -164,10 +180,17 @@ class _DrawnBody:
         return None if found is None else (found[1], self.column, found[0])
 
 
-def _height(shown: ColumnFrame) -> float:
-    """Metres above the floor that a body reaches within the trained window."""
-    window = shown.motion.schema.window
-    poses = shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
-    points = np.asarray(shown.column.geometry.points, dtype=float)
-    centre, half = points.mean(axis=0), 0.5 * float(np.ptp(points, axis=0).max())
-    return half + float((poses[:, 2, :3] @ centre + poses[:, 2, 3]).max())
+def _finest(frame: Frame) -> Mesh | None:
+    """The finest mesh of a trained body among the predictions."""
+    meshes = (c.column.geometry for c in frame.columns if c.column.predictor and not c.column.loaded)
+    return max((m for m in meshes if isinstance(m, Mesh)), key=lambda mesh: len(mesh.points), default=None)
+
+
+def _around(boxes: list[Box]) -> Box:
+    """The box around several."""
+    return Box(
+        min(box.left for box in boxes),
+        max(box.right for box in boxes),
+        min(box.low for box in boxes),
+        max(box.high for box in boxes),
+    )

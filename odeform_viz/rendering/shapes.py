@@ -32,7 +32,7 @@ def show_shape(
 ) -> ShapeView:
     """Add a shape under the scene node `root`; `shadow` gives splats one, which meshes have by themselves."""
     if isinstance(geometry, Mesh):
-        return MeshView(server, root, geometry, color)
+        return MeshView(server, root, geometry)
     if isinstance(geometry, GaussianSplats):
         if shadow:
             cast_shadow(server, f"{root}/shadow", geometry.points)

@@ -10,7 +10,7 @@ LETTER = 6.6  # px; mean width of a letter in viser's labels
 def title_of(shown: ColumnFrame, pixels: float) -> str:
     """Two lines that fit into `pixels`: the name of the column; its error and a warning, if any."""
     most = max(int(pixels / LETTER), 4)
-    below = [f"{shown.error.rmse_mm:.2f} mm"] if shown.error else []
+    below = [f"RMS {shown.error.rms_mm:.2f} mm"] if shown.error else []
     below += ["shape not trained"] if shown.untrained else []
     below += ["below the floor"] if shown.below_floor else []
     return "\n".join(_shortened(line, most) for line in (shown.column.label, " · ".join(below)) if line)

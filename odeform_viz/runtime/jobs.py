@@ -31,6 +31,7 @@ __all__ = [
 ]
 
 JOB = "odeform-job"  # the name of the processes
+MAPPED = 13  # values of each parameter in a map; with more it takes minutes
 Report = Callable[[Any], None]
 """Called with the progress of the work: the fraction that is done, 0 to 1, or what else the work says it is."""
 
@@ -178,4 +179,5 @@ def stability_image(report: Report, checkpoint: str) -> np.ndarray:
     from odeform.models.registry import load_continuous
     from odeform.stress.stability import map_image, stability_map
 
-    return np.asarray(map_image(stability_map(load_continuous(checkpoint), moments=(0.5, 1.0, 3.0))))
+    plot = stability_map(load_continuous(checkpoint), count=MAPPED, moments=(0.5, 1.0, 3.0), report=report)
+    return np.asarray(map_image(plot))

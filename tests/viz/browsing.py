@@ -37,6 +37,10 @@ class Tab:
     def button(self, name: str) -> Locator:
         return self.page.get_by_role("button", name=name, exact=True)
 
+    def key(self, hotkey: str) -> Locator:
+        """The button of the timeline that presses a hot key."""
+        return self.page.locator(f"#odeform-view [data-hotkey='{hotkey}']")
+
     def turn_to(self, tab: str) -> None:
         self.page.get_by_role("tab", name=tab, exact=True).click()
 

@@ -57,11 +57,11 @@ def test_presets_reset_play_and_peak_work_by_click(kicked: Tab) -> None:
     assert until(lambda: app.panel(ParameterPanel).parameters()["mass"] == 1.5)
     kicked.button("all").click()
     assert until(lambda: app.panel(ParameterPanel).parameters()["mass"] == 0.7)
-    kicked.button("peak").click()
+    kicked.key("P").click()
     assert until(lambda: 0.005 < app.clock.time() < 0.03)
-    kicked.button("Play").click()
+    kicked.key("K").click()
     assert until(lambda: app.clock.playing)
-    kicked.button("Pause").click()
+    kicked.key("K").click()
     assert until(lambda: not app.clock.playing)
     assert kicked.errors == []
 

@@ -117,7 +117,7 @@ def test_keys_belong_to_a_focused_field_and_are_hot_keys_elsewhere(dark: Tab) ->
 def test_space_plays_and_arrows_step_also_after_a_click(dark: Tab) -> None:
     page, clock = dark.page, dark.app.clock
     dark.app.page.pause_at(0.3)
-    dark.button("start").click()
+    dark.key("0").click()
     assert until(lambda: clock.time() == 0.0)
     page.keyboard.press("ArrowRight")
     assert until(lambda: clock.time() == pytest.approx(1 / 120))
@@ -133,7 +133,7 @@ def test_space_plays_and_arrows_step_also_after_a_click(dark: Tab) -> None:
 def test_a_button_that_the_mouse_holds_does_not_take_space(dark: Tab) -> None:
     page, clock = dark.page, dark.app.clock
     clock.pause()
-    dark.button("next").hover()
+    dark.key("L").hover()
     page.mouse.down()
     page.keyboard.press("ArrowRight")  # from now on the button has the keyboard's focus for the browser
     page.keyboard.press("Space")
@@ -170,7 +170,7 @@ def test_on_a_phone_the_panel_is_folded_until_tapped(dark: Tab) -> None:
     page = browser.new_page(**PHONE)
     try:
         page.goto(dark.app.url)
-        start = page.get_by_role("button", name="start", exact=True)
+        start = page.get_by_role("tab", name="Explore", exact=True)
         bar = page.get_by_text("ODeform · kick").first
         bar.wait_for(timeout=1e3 * PATIENCE)
         assert until(lambda: not start.is_visible())

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import pytest
 from stubs import StubPredictor, recorded
 
@@ -29,6 +30,7 @@ class Loop:
     up_to_date: Callable[[], bool] = lambda: True
     starts: bool = False
     events: list[tuple[str, Any]] = field(default_factory=list)
+    outdated: int = 0
 
     def __post_init__(self) -> None:
         self.presenter = Presenter(
@@ -51,6 +53,9 @@ class Loop:
 
     def describe(self, description: Description) -> None:
         self.events.append(("describe", description))
+
+    def outdate(self) -> None:
+        self.outdated += 1
 
     def show_error(self, message: str) -> None:
         self.events.append(("error", message))
@@ -184,3 +189,38 @@ def test_the_scale_is_that_of_the_errors_and_none_without_colours() -> None:
         loop.options = options
         loop.serve()
         assert loop.presenter.scale is None
+
+
+def test_the_scale_of_colors_is_that_of_the_whole_motion_once_it_has_settled(
+    loop: Loop, models: tuple[StubPredictor, ...]
+) -> None:
+    loop.options = DisplayOptions(color_by="displacement")
+    loop.ask(time=0.02)
+    loop.serve()
+    assert loop.presenter.scale is not None
+    assert loop.presenter.scale.momentary
+    small = loop.presenter.scale.top
+    loop.serve()
+    scale = loop.presenter.scale
+    assert not scale.momentary
+    assert loop.kinds.count("publish") == 1  # the same frame, on the new scale
+    motion = models[0].solve(None, loop.request.parameters)
+    largest = 1e3 * max(np.linalg.norm(motion.local(t), axis=1).max() for t in np.linspace(0.0, 1.0, 50))
+    assert small < 0.5 * largest <= scale.top <= 1.5 * largest
+    for time in (0.1, 0.25, 0.9):
+        loop.ask(time=time)
+        loop.serve()
+        assert loop.presenter.scale is scale
+    loop.options = DisplayOptions(color_by="displacement", momentary=True)
+    loop.serve()
+    assert loop.presenter.scale.momentary
+
+
+def test_what_is_beside_the_view_is_outdated_by_other_motions_not_by_other_moments(loop: Loop) -> None:
+    loop.serve()
+    loop.ask(time=0.4)
+    loop.serve()
+    assert loop.outdated == 0
+    loop.ask(parameters={**loop.request.parameters, "mass": 0.5})
+    loop.serve()
+    assert loop.outdated == 1

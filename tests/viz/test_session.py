@@ -16,7 +16,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.status import describe_column
-from odeform_viz.panels.summary import summarize
+from odeform_viz.panels.summary import badge_of, summarize
 from odeform_viz.session import Session, visible_deformation
 from odeform_viz.view import INVISIBLE, ViewRequest
 
@@ -104,10 +104,11 @@ def test_the_error_is_that_against_the_truth_at_its_vertices(
     predicted = view_request.columns[0].source.solve(record.geometry, record.parameters).vertices(time)
     off = predicted.astype(float) - record.sequence.vertices[12]
     assert shown.error.rmse_mm == pytest.approx(1e3 * np.sqrt((off**2).mean()), rel=1e-5)
+    assert shown.error.rms_mm == pytest.approx(1e3 * np.sqrt((off**2).sum(axis=1).mean()), rel=1e-5)
     assert shown.error.worst_mm == pytest.approx(1e3 * np.linalg.norm(off, axis=1).max(), rel=1e-5)
     curve = session.curves(shown, at).error
     assert curve is not None
-    assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rmse_mm, rel=1e-4)
+    assert curve[round(time * session.schema.window.rate)] == pytest.approx(shown.error.rms_mm, rel=1e-4)
 
 
 def test_without_its_parameters_the_truth_tells_no_error(
@@ -165,8 +166,9 @@ def test_impossible_times_are_refused(session: Session, view_request: ViewReques
 
 
 def test_the_summary(session: Session, view_request: ViewRequest) -> None:
-    assert "between frames" in summarize(session.frame(replace(view_request, time=0.02)))
-    assert "on a trained frame" in summarize(session.frame(replace(view_request, time=0.025)))
+    inside = badge_of(session.frame(replace(view_request, time=0.02)))
+    assert (inside.level, inside.text) == ("inside", "inside the trained range")
+    assert badge_of(session.frame(replace(view_request, time=1.3))).level == "outside"
     late = summarize(session.frame(replace(view_request, time=1.3)))
     assert "extrapolated" in late
     assert "time" in late
@@ -185,15 +187,15 @@ def test_status_names_solver_error_as_such(session: Session, view_request: ViewR
     shown = session.frame(view_request).columns[0]
     text = describe_column(shown, view_request.time)
     assert "solver error" in text
-    assert "test error of the checkpoint" in text
+    assert "error on the test sequences" in text
     assert re.search(r"\d+ evaluations", text)
-    assert "model error here: unknown, with fewer than 8 validation sequences" in text
+    assert "error expected here: not known, with fewer than 8 validation sequences" in text
 
 
 def test_status_says_how_far_off_the_model_is() -> None:
     session, view_request = _alone(odeform.load("kick"))
     text = describe_column(session.frame(view_request).columns[0], view_request.time)
-    assert "model error here ≈" in text
+    assert "error expected here: half below" in text
     assert "extrapolated: rough" not in text
     later = replace(view_request, time=1.2 * session.schema.window.stop)
     assert "(extrapolated: rough)" in describe_column(session.frame(later).columns[0], later.time)
@@ -208,11 +210,11 @@ def test_status_says_when_a_pushed_body_rests_and_that_no_error_is_known_at_anot
     view_request = replace(bottle, parameters=cat, columns=columns)
     shown = session.frame(view_request).columns[0]
     assert re.search(r"at rest from t = 0\.\d\d s on", describe_column(shown, 0.1))
-    assert "model error here ≈" in describe_column(shown, 0.1)
+    assert "error expected here: half below" in describe_column(shown, 0.1)
     assert "at rest" not in describe_column(shown, 0.1, settled=False)
     heavy = {**view_request.parameters, "mass": 1.5 * view_request.parameters["mass"]}
     text = describe_column(session.frame(replace(view_request, parameters=heavy)).columns[0], 0.1)
-    assert "model error here: unknown, no data have this mass or stiffness" in text
+    assert "error expected here: not known, no data have this mass or stiffness" in text
 
 
 def test_largest_deformation_is_at_the_kick(kick: Predictor) -> None:

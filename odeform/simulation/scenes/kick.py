@@ -102,7 +102,7 @@ def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
     vector = min(ARROW, ABOVE * floor) * size * max(force, 0.0) / high * direction
     # a flat shape is struck further up than a ball, for the same reason
     struck[2] += max(float(rest_points[:, 2].min()) - (struck - vector)[2], 0.0)
-    return (Arrow(struck - vector, vector, f"{force:.0f} N", 0.0, PULSE),)
+    return (Arrow(struck - vector, vector, f"{force:.0f} N", 0.0, PULSE, rises=True),)
 
 
 SCENE = Scene(

@@ -24,6 +24,17 @@ def test_small_changes_leave_the_scale_as_it_is() -> None:
     assert fitter.fit("displacement", 0.0).top > 0.0
 
 
+def test_the_scale_of_a_motion_stays_whatever_the_moment() -> None:
+    fitter = ScaleFitter()
+    assert fitter.fixed("error") is None
+    scale = fitter.fit("error", 13.0, momentary=False)
+    assert scale.top == 15.0
+    assert fitter.fixed("error") is scale
+    assert fitter.fixed("strain") is None
+    assert fitter.fit("error", 14.0) is not scale  # of a moment
+    assert fitter.fixed("error") is None
+
+
 def test_colors_run_from_one_end_to_the_other() -> None:
     colors = colors_of(np.array([0.0, 5.0, 10.0, 100.0]), ColorScale("error", "mm", 10.0))
     np.testing.assert_array_equal(colors, TABLE[[0, 127, 255, 255]])

@@ -11,7 +11,7 @@ Stubbed = tuple[App, LoopbackClient]
 
 
 def test_scene_model_and_shape_are_named(stubbed: Stubbed) -> None:
-    assert "stub · stub · trained body" in stubbed[1].text()
+    assert "<b>stub</b> · model stub · the body of the training data" in stubbed[1].text()
 
 
 def test_exaggeration_and_the_scale_are_stated(stubbed: Stubbed) -> None:
@@ -21,10 +21,13 @@ def test_exaggeration_and_the_scale_are_stated(stubbed: Stubbed) -> None:
     client.set("exaggerate", 3.0)
     assert client.until(lambda: "deformation exaggerated 3 times" in client.text())
     client.set("colour by", "displacement")
-    assert client.until(lambda: "displacement from the rest shape, mm (scale fitted to this moment)" in client.text())
+    assert client.until(lambda: "displacement from the rest shape, mm (scale of the whole motion)" in client.text())
     scale = app.presenter.scale
     assert scale is not None
     assert f"≥ {scale.top:g}" in client.text()
+    assert "<rect" in client.text().split('data-odeform-view="scale"')[1].split("</svg>")[0]  # the histogram
+    client.set("scale of this moment", True)
+    assert client.until(lambda: "displacement from the rest shape, mm (scale of this moment)" in client.text())
 
 
 def test_overlaid_columns_have_a_legend_and_their_own_colors(stubbed: Stubbed) -> None:

@@ -11,7 +11,7 @@ def test_help_names_tabs_and_keys(kicked: tuple[App, LoopbackClient]) -> None:
     _, client = kicked
     text = client.text()
     assert all(f"**{tab}**" in text for tab in TABS)
-    assert all(f"**{key}**" in text for key in ("Space", "←", "→", *"KJL0POCBGH"))
+    assert all(f"**{key}**" in text for key in ("Space", "←", "→", *"KJL0POCBGHSR"))
 
 
 def test_no_key_does_two_things(stubbed: tuple[App, LoopbackClient]) -> None:

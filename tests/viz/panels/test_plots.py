@@ -17,6 +17,7 @@ from odeform_viz.panels.plot_legend import legend_html, values_html
 from odeform_viz.panels.plots import PlotPanel
 from odeform_viz.panels.plots_svg import WIDE, Line, cursor_css, plots_html, quantities_of
 from odeform_viz.panels.status import describe_column
+from odeform_viz.panels.summary import summarize
 from odeform_viz.rendering.titles import title_of
 from odeform_viz.session import Session
 from odeform_viz.view import REACH, ViewRequest
@@ -32,9 +33,9 @@ def line(drop: Predictor) -> Line:
 def test_there_is_a_plot_per_quantity_and_a_curve_per_column(line: Line, drop: Predictor) -> None:
     line = (*line[:2], replace(line[2], error_band=None))
     html = plots_html([line, line], drop.schema.window, rotates=False)
-    assert re.findall(r"height of the centre|rotation, °|deformation RMS|error RMS", html) == [
+    assert re.findall(r"height of the centre|rotation, °|deformation, RMS|error, RMS", html) == [
         "height of the centre",
-        "deformation RMS",
+        "deformation, RMS",
     ]
     assert html.count('stroke="rgb(206, 78, 26)"') == 4
     assert "rotation, °" in plots_html([line], drop.schema.window, rotates=True)
@@ -44,7 +45,7 @@ def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, dro
     error = np.linspace(0.0, 2.0, len(line[2].times))
     error[50:] = np.nan
     html = plots_html([(*line[:2], replace(line[2], error=error))], drop.schema.window, rotates=False)
-    assert "error RMS" in html
+    assert "error, RMS" in html
     assert "nan" not in html
 
 
@@ -61,8 +62,29 @@ def test_the_trained_window_sets_the_axis_and_the_rest_is_cut_off(line: Line, dr
     assert ">0.5</text>" in html
     assert "to 130 ↑" in html
     assert html.count("↑") == 1
-    y = [float(v) for v in re.findall(r"[ML][\d.]+ (-?[\d.]+)", html)]
-    assert min(y) >= -2.0
+    # it leaves its frame, which hides the rest: no plateau at the edge
+    drawn = html.split("height of the centre")[1].split("</svg>")[0]
+    assert drawn.index("<svg width=") < drawn.index('class="curve"')
+    assert min(float(v) for v in re.findall(r"[ML][\d.]+ (-?[\d.]+)", drawn)) < -100.0
+
+
+def test_a_truth_that_is_over_has_no_curves(drop: Predictor) -> None:
+    truth = truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}")
+    assert truth.truth is not None
+    session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest), truth]).all
+    request = ViewRequest(drop.schema.complete(truth.truth.parameters), 0.3, "balanced", columns)
+    frame = session.frame(request)
+    curves = session.curves(frame.columns[1], request)
+    over = curves.times > truth.truth.end
+    assert over.any()
+    for values in (curves.height, curves.rotation, curves.deformation):
+        assert np.isnan(values[over]).all()
+        assert np.isfinite(values[~over]).all()
+    line = ("truth", (0, 0, 0), curves)
+    assert "nan" not in plots_html([line], drop.schema.window, rotates=True)
+    late = float(curves.times[-1])
+    assert "nan" not in values_html(frame.columns[1:], [line], quantities_of([line], True), late)
+    assert "no truth after" in summarize(session.frame(replace(request, time=late)))
 
 
 def test_an_axis_reaches_below_zero_where_a_curve_does(line: Line, drop: Predictor) -> None:
@@ -106,10 +128,10 @@ def test_title_status_and_legend_say_the_same_at_any_moment(drop: Predictor, tim
     legend = values_html(frame.columns, lines, quantities_of(lines, False), time)
     status = describe_column(shown, time, settled=False)
     assert shown.error is not None
-    rmse = f"{shown.error.rmse_mm:.2f}"
-    assert f"{rmse} mm" in title_of(shown, 1e3)
-    assert f"RMSE {rmse}," in status
-    assert f">{rmse} mm" in legend
+    rms = f"{shown.error.rms_mm:.2f}"
+    assert f"RMS {rms} mm" in title_of(shown, 1e3)
+    assert f"RMS {rms}," in status
+    assert f">{rms} mm" in legend
     band = shown.error_band(np.array([time]))
     assert band is not None
     assert f"90 % below {band[0, 1]:.2f} mm" in status
@@ -133,7 +155,7 @@ def test_curves_are_sent_once_a_motion_and_the_moment_always(dropped: tuple[App,
     client.set("mass (kg)", 0.9)
     assert client.until(lambda: app.panel(PlotPanel)._curves.content != curves)
     client.set("odeform", False)
-    assert client.until(lambda: "no column is visible" in client.text())
+    assert client.until(lambda: "no column is in view" in client.text())
 
 
 def test_larger_plots_are_drawn_in_two_columns(dropped: tuple[App, LoopbackClient]) -> None:

@@ -18,7 +18,7 @@ from odeform_viz.columns import Column, Columns
 from odeform_viz.panels.shape import ShapePanel
 from odeform_viz.panels.shape_warning import ShapeWarningPanel, shape_warning
 from odeform_viz.panels.status import describe_column
-from odeform_viz.panels.summary import summarize
+from odeform_viz.panels.summary import badge_of, summarize
 from odeform_viz.rendering.titles import title_of
 from odeform_viz.session import Session
 from odeform_viz.view import Frame, ViewRequest
@@ -58,7 +58,8 @@ def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predicto
     assert "test error" not in said
     assert "90 %" not in said
     assert "shape not trained" in summarize(frame)
-    assert "on a trained frame" not in summarize(frame)
+    assert badge_of(frame).level == "unknown"
+    assert "error not known" in badge_of(frame).expected
     assert "shape not trained" in title_of(column, 1e3)
 
 
@@ -86,15 +87,14 @@ def test_the_warning_gives_the_distance_and_is_empty_without_a_reason() -> None:
 def test_it_is_there_before_a_frame_of_the_shape_and_goes_with_it(stubbed: tuple[App, LoopbackClient]) -> None:
     app, client = stubbed
     panel = app.panel(ShapeWarningPanel)
-    assert not panel._box.visible
+    assert "Shape not trained" not in panel._box.content
     app.panel(ShapePanel).set(replace(fitted("torus", app.page.body), origin="torus.obj"))
-    assert panel._box.visible  # at once: the worker has not even been told of the shape
+    assert "Shape not trained" in panel._box.content  # at once: the worker has not even been told of the shape
     assert client.until(lambda: app.presenter.frame is not None and app.presenter.frame.columns[0].untrained)
     assert client.until(lambda: app.presenter.settled)
-    assert panel._box.visible
     assert "Shape not trained" in panel._box.content
     app.panel(ShapePanel).set(None)
-    assert not panel._box.visible
+    assert "Shape not trained" not in panel._box.content
 
 
 def test_a_page_that_starts_with_such_a_shape_warns_from_the_start(serve: Serve) -> None:

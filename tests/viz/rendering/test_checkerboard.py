@@ -3,9 +3,8 @@
 import numpy as np
 import trimesh
 
-from odeform.models.base import Predictor
 from odeform.types import Mesh
-from odeform_viz.rendering.checkerboard import checkerboard_parts
+from odeform_viz.rendering.checkerboard import CELLS, checkerboard_parts
 
 
 def _area(points: np.ndarray, faces: np.ndarray) -> float:
@@ -20,21 +19,26 @@ def test_parts_are_cut_along_the_planes_and_cover_the_surface() -> None:
     centre = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
     parts = checkerboard_parts(mesh)
     assert sum(_area(p.vertices(mesh.points), p.faces) for p in parts) - _area(mesh.points, mesh.faces) < 1e-5
-    for part, sign in zip(parts, (1.0, -1.0), strict=True):
+    cell = float(np.ptp(mesh.points, axis=0).max()) / CELLS
+    for part, odd in zip(parts, (1, 0), strict=True):
         corners = (part.vertices(mesh.points) - centre)[part.faces]
+        cubes = np.floor(corners.mean(axis=1) / cell)
+        assert (cubes.sum(axis=1) % 2 == odd).all()
         for axis in range(3):  # no face on both sides of a plane
-            assert (np.minimum(corners[..., axis].max(axis=1), -corners[..., axis].min(axis=1)) < 1e-5).all()
-        assert (sign * np.prod(corners.mean(axis=1), axis=1) > 0.0).all()
+            assert (corners[..., axis].min(axis=1) > cell * cubes[:, axis] - 1e-5).all()
+            assert (corners[..., axis].max(axis=1) < cell * (cubes[:, axis] + 1.0) + 1e-5).all()
         # faces keep their orientation
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         assert ((normals * (corners.mean(axis=1) + centre)).sum(axis=1) > -1e-9).all()
 
 
-def test_a_mesh_along_the_planes_is_not_cut(kick: Predictor) -> None:
-    parts = checkerboard_parts(kick.rest)
-    assert sum(len(part.faces) for part in parts) == len(kick.rest.faces)
-    together = np.concatenate([part.vertices(kick.rest.points) for part in parts])
-    assert set(map(tuple, together)) == set(map(tuple, np.asarray(kick.rest.points, dtype=np.float32)))
+def test_a_mesh_along_the_planes_is_not_cut() -> None:
+    box = trimesh.creation.box((4.0, 4.0, 4.0)).subdivide().subdivide()
+    mesh = Mesh(np.asarray(box.vertices, np.float32), np.asarray(box.faces, np.int32))
+    parts = checkerboard_parts(mesh)
+    assert sum(len(part.faces) for part in parts) == len(mesh.faces)
+    together = np.concatenate([part.vertices(mesh.points) for part in parts])
+    assert set(map(tuple, together)) == set(map(tuple, mesh.points))
 
 
 def test_new_vertices_deform_with_the_mesh() -> None:

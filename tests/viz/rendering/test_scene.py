@@ -4,12 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 import viser
+from stubs import SCHEMA, StubPredictor, recorded
 
 from odeform.cancellation import Cancelled
 from odeform.models.base import Predictor
+from odeform.motion.recorded import RecordedMotion
 from odeform.types import GaussianSplats
+from odeform_viz.colors import CLAY, color_of
 from odeform_viz.columns import Column, Columns
+from odeform_viz.rendering.framing import Box
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
 from odeform_viz.view import DisplayOptions, ViewRequest
@@ -48,11 +53,48 @@ def test_a_row_whose_framing_was_cancelled_is_framed_by_the_next_frame(
     view.publish(session.frame(request), DisplayOptions(), None)
     both = session.frame(replace(request, columns=columns))
     with monkeypatch.context() as patch:
-        patch.setattr("odeform_viz.rendering.scene._height", lambda _: cancelled())
+        patch.setattr("odeform_viz.rendering.scene.outline_of", lambda *_: cancelled())
         with pytest.raises(Cancelled):
             view.publish(both, DisplayOptions(), None)
     view.publish(both, DisplayOptions(), None)
 
 
-def cancelled() -> float:
+def test_a_body_alone_is_of_clay_and_one_of_a_sweep_has_the_color_of_its_rank(
+    server: viser.ViserServer, kick: Predictor
+) -> None:
+    session, view = Session(kick.schema), SceneView(server, 0.2, lambda: None)
+    column = Column("alone", kick, kick.rest)
+    swept = [replace(column, label=f"{rank}", pinned=session.schema.complete({}), rank=rank) for rank in (0.0, 1.0)]
+    columns = Columns.of([column, *swept]).all
+    request = ViewRequest(session.schema.complete({}), 0.02, "balanced", columns)
+    view.publish(session.frame(request), DisplayOptions(), None)
+    colors = [server.scene.get_handle_by_name(f"/world/column_{c.key}/body/part_0") for c in columns]
+    assert [c.color for c in colors if isinstance(c, viser.MeshHandle)] == [CLAY, *map(color_of, columns[1:])]
+    view.publish(session.frame(request), DisplayOptions(overlay=True), None)
+    assert isinstance(colors[0], viser.MeshHandle)
+    assert colors[0].color == color_of(columns[0])  # told apart in one place
+
+
+def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(server: viser.ViserServer) -> None:
+    session, view = Session(SCHEMA), SceneView(server, 0.2, lambda: None)
+    stub, coarse = StubPredictor(), trimesh.creation.icosphere(1, 0.1)
+    sequence = recorded(stub, {"mass": 0.5})
+    points = coarse.vertices + np.array([0.0, 0.0, 0.1])
+    frames = np.stack([points] * len(sequence.times)).astype(np.float32)
+    weights = np.full(len(points), 1.0 / len(points), np.float32)
+    faces = np.asarray(coarse.faces, np.int32)
+    record = RecordedMotion(SCHEMA, replace(sequence, vertices=frames, faces=faces, weights=weights))
+    columns = Columns.of([Column("stub", stub, stub.rest), Column("truth", record, record.geometry)]).all
+    request = ViewRequest(SCHEMA.complete({"mass": 0.5}), 0.0, "balanced", columns)
+    view.publish(session.frame(request), DisplayOptions(), None)
+    fine, truth = (server.scene.get_handle_by_name(f"/world/column_{c.key}/body/part_0") for c in columns)
+    assert isinstance(fine, viser.MeshHandle)
+    assert isinstance(truth, viser.MeshHandle)
+    assert len(truth.vertices) == len(fine.vertices) > len(points)
+    assert truth.opacity is None
+    view.publish(session.frame(replace(request, time=record.end + 0.1)), DisplayOptions(), None)
+    assert truth.opacity is not None
+
+
+def cancelled() -> Box:
     raise Cancelled

@@ -23,7 +23,7 @@ def compare(visitors: Visitors) -> None:
         visitors.collect(0.3)
     client.set("parameter", client.controls["parameter"].props["options"][0])
     visitors.collect(0.3)
-    client.click("Sweep it in 5 columns")
+    client.click("Sweep it")
     visitors.expect("the columns of a sweep", lambda: len(app.columns.all) > before + 2)
     client.set("overlay", True)
     visitors.drag(client, 10)

@@ -1,0 +1,85 @@
+// What is always in view lies over the scene: parts of the panel that are marked for it are shown there instead.
+//
+// viser's page has panels only, and React owns them; so the marked parts stay there unseen, and a layer mirrors them.
+const SIDE = 338; // px of the panel on the right
+const style = document.createElement("style");
+style.textContent = `
+  :not(#odeform-view) > [data-odeform-view] { display: none; }
+  .odeform-unseen { position: absolute !important; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
+  #odeform-view {
+    position: fixed; inset: 0; z-index: 1; pointer-events: none; font: 13px/1.45 Inter, sans-serif;
+    color: var(--mantine-color-text); display: flex; flex-direction: column; align-items: flex-start; gap: 6px;
+    padding: 12px ${SIDE}px 84px 12px;
+  }
+  #odeform-view > * {
+    pointer-events: auto; border-radius: 6px; padding: 5px 10px; max-width: 46em;
+    background: color-mix(in srgb, var(--mantine-color-body) 86%, transparent);
+  }
+  #odeform-view > :empty { display: none; }
+  .odeform-badge { display: inline-block; padding: 1px 9px; border-radius: 1em; color: #fff; font-weight: 600; }
+  .odeform-badge.inside { background: #1b7f4b; }
+  .odeform-badge.outside { background: #b06a00; }
+  .odeform-badge.unknown { background: #b3260c; }
+  .odeform-bar { width: 27em; max-width: 100%; }
+  .odeform-bar svg { display: block; width: 100%; height: 14px; }
+  #odeform-view > [data-odeform-view=timeline] {
+    position: absolute; left: 12px; right: ${SIDE}px; bottom: 12px; max-width: none; height: 56px; padding: 4px 12px;
+    display: flex; align-items: center; gap: 12px; background: var(--mantine-color-body);
+    box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
+  }
+  .odeform-buttons { display: flex; align-items: center; gap: 2px; }
+  [data-odeform-view] [data-hotkey] {
+    cursor: pointer; padding: 3px 7px; border-radius: 4px; white-space: nowrap; color: #b4490f; user-select: none;
+  }
+  [data-mantine-color-scheme=dark] [data-odeform-view] [data-hotkey] { color: #f0955f; }
+  [data-odeform-view] [data-hotkey]:hover { background: color-mix(in srgb, currentColor 14%, transparent); }
+  [data-odeform-view] [data-hotkey] svg { display: block; width: 18px; height: 18px; fill: currentColor; }
+  .odeform-moment { width: 5em; text-align: right; font-variant-numeric: tabular-nums; font-weight: 600; }
+  .odeform-track { position: relative; flex: 1; height: 46px; cursor: ew-resize; touch-action: none; min-width: 0; }
+  .odeform-track > svg { position: absolute; left: 0; top: 0; width: 100%; height: 32px; overflow: visible; }
+  .odeform-track .ground { fill: color-mix(in srgb, var(--mantine-color-text) 12%, transparent); }
+  .odeform-track .beyond { fill: #d08a40; opacity: 0.3; }
+  .odeform-track .shape { fill: color-mix(in srgb, var(--mantine-color-text) 45%, transparent); }
+  .odeform-track .acting { fill: #d66030; }
+  .odeform-track .mark { stroke: var(--mantine-color-text); opacity: 0.55; vector-effect: non-scaling-stroke; }
+  .odeform-track span {
+    position: absolute; top: 32px; font-size: 10.5px; opacity: 0.8; white-space: nowrap; transform: translateX(-50%);
+  }
+  .odeform-track span:first-of-type { transform: none; }
+  .odeform-track span.last { transform: translateX(-100%); }
+  .odeform-track i {
+    position: absolute; top: -2px; width: 3px; height: 36px; margin-left: -1.5px; border-radius: 2px; background: #d66030;
+  }
+  @media (max-width: 48em) {
+    #odeform-view { padding: 8px 8px 140px; font-size: 12px; }
+    #odeform-view > [data-odeform-view=timeline] { left: 8px; right: 8px; bottom: 62px; gap: 6px; padding: 4px 8px; }
+    .odeform-wide { display: none !important; }
+  }`;
+document.head.append(style);
+
+const layer = document.createElement("div");
+layer.id = "odeform-view";
+document.body.append(layer);
+const ORDER = ["caption", "trust", "shape", "scale", "timeline"];
+const shown = new Map(ORDER.map((name) => {
+  const place = document.createElement("div");
+  place.dataset.odeformView = name;
+  layer.append(place);
+  return [name, place];
+}));
+
+function mirror() {
+  const sources = new Map([...document.querySelectorAll("[data-odeform-view]")]
+    .filter((part) => part.parentElement !== layer)
+    .map((part) => [part.dataset.odeformView, part]));
+  for (const [name, place] of shown) {
+    const text = sources.get(name)?.innerHTML ?? "";
+    if (place.source !== text) place.innerHTML = place.source = text;
+  }
+  const slider = shown.get("timeline").querySelector("[data-time-slider]")?.dataset.timeSlider;
+  document.getElementById(slider)?.closest(".mantine-Paper-root")?.classList.add("odeform-unseen");
+}
+new MutationObserver((changes) => {
+  if (changes.some((change) => !layer.contains(change.target))) mirror();
+}).observe(document.body, { childList: true, subtree: true });
+mirror();

@@ -1,0 +1,50 @@
+"""What a body covers in the plane of the view while it moves, and what acts on it."""
+
+import numpy as np
+
+from odeform.motion.base import Motion
+from odeform.simulation.scenes.registry import find_scene
+from odeform.types import Floats, Vector
+from odeform_viz.pushing import push_shown
+from odeform_viz.rendering.framing import Axes, Box
+from odeform_viz.view import ColumnFrame
+
+__all__ = ["direction_of", "outline_of"]
+
+MOMENTS = 60  # of a motion that are looked at
+POINTS = 200  # of a body
+
+
+def _acting_on(shown: ColumnFrame) -> Floats | None:
+    """(2, 3) m: tail and head of the arrow of what acts first on a body; None if nothing does."""
+    push = push_shown(shown.column, shown.motion)
+    if push is not None:
+        return np.stack(push.arrow)
+    scene = find_scene(shown.motion.schema.scene)
+    if scene is None or not isinstance(shown.motion, Motion):
+        return None
+    arrows = scene.glyphs(shown.motion.parameters, np.asarray(shown.column.geometry.points, dtype=np.float32))
+    return np.stack([arrows[0].start, arrows[0].start + arrows[0].vector]) if arrows else None
+
+
+def outline_of(shown: ColumnFrame, axes: Axes) -> Box:
+    """The box of the body within the trained window, whatever it travels along the floor, and of what acts on it."""
+    window = shown.motion.schema.window
+    poses = shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
+    points = np.asarray(shown.column.geometry.points, dtype=float)
+    points = points[:: max(len(points) // POINTS, 1)]
+    centre = points.mean(axis=0)
+    turned = np.einsum("tij,nj->tni", poses[:, :3, :3], points - centre)
+    heights = poses[:, 2, :3] @ centre + poses[:, 2, 3]
+    turned += centre * [1.0, 1.0, 0.0]
+    turned[:, :, 2] += heights[:, None]
+    acting = _acting_on(shown)
+    corners = turned.reshape(-1, 3) if acting is None else np.concatenate([turned.reshape(-1, 3), acting])
+    across, upwards = corners @ axes.right, corners @ axes.above
+    return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
+
+
+def direction_of(shown: ColumnFrame) -> Vector | None:
+    """(3,) the direction in which a body is pushed; None if nothing acts."""
+    acting = _acting_on(shown)
+    return None if acting is None else acting[1] - acting[0]

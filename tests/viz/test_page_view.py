@@ -1,0 +1,94 @@
+"""The real page: what lies over the scene, and the colours of values."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from browsing import PHONE, Tab, needs_chromium, open_tab, until
+from rendering.test_framing import project
+
+from odeform.models.base import Predictor
+from odeform_viz.coloring.scale import TABLE
+from odeform_viz.columns import Column
+
+pytestmark = [pytest.mark.slow, needs_chromium]
+
+IN_VIEW = {"caption": "kick", "trust": "inside the trained range", "timeline": "trained until 1 s"}
+MOMENT = "getComputedStyle(document.querySelector('#odeform-view .odeform-moment'), '::after').content"
+
+
+@pytest.fixture(scope="module")
+def tab(kick: Predictor) -> Iterator[Tab]:
+    yield from open_tab(Column("odeform", kick, kick.rest, origin="kick"))
+
+
+def test_caption_badge_and_timeline_are_in_view_whatever_the_tab(tab: Tab) -> None:
+    for name in ("Compare", "Explore"):
+        tab.turn_to(name)
+        for place, text in (
+            ("caption", "kick"),
+            ("trust", "inside the trained range"),
+            ("timeline", "trained until 1 s"),
+        ):
+            shown = tab.page.locator(f"#odeform-view > [data-odeform-view={place}]")
+            assert until(lambda shown=shown, text=text: text in shown.inner_text())
+            box = shown.bounding_box()
+            assert box is not None
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= 800
+            assert box["y"] >= 0
+            assert box["y"] + box["height"] <= 480
+    assert tab.errors == []
+
+
+def test_a_drag_along_the_timeline_scrubs_also_beside_it(tab: Tab) -> None:
+    track = tab.page.locator("#odeform-view .odeform-track")
+    box = track.bounding_box()
+    assert box is not None
+    tab.page.mouse.move(box["x"] + 0.1 * box["width"], box["y"] + 10)
+    tab.page.mouse.down()
+    assert until(lambda: tab.app.clock.time() == pytest.approx(0.2, abs=0.02) and not tab.app.clock.playing)
+    tab.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] - 100, steps=5)
+    tab.page.mouse.up()
+    assert until(lambda: tab.app.clock.time() == pytest.approx(1.0, abs=0.02))
+    assert until(lambda: "1.0" in tab.page.evaluate(MOMENT))
+
+
+def test_buttons_of_the_timeline_play_and_change_the_speed(tab: Tab) -> None:
+    tab.app.page.pause_at(0.1)
+    tab.key("K").click()
+    assert until(lambda: tab.app.clock.playing)
+    tab.key("K").click()
+    assert until(lambda: not tab.app.clock.playing)
+    before = tab.key("S").inner_text()
+    tab.key("S").click()
+    assert until(lambda: tab.key("S").inner_text() != before)
+    tab.key("R").click()
+    assert until(lambda: not tab.app.clock.loop and tab.key("R").inner_text() == "once")
+
+
+def test_a_value_has_exactly_the_colour_of_the_scale(tab: Tab) -> None:
+    tab.app.page.pause_at(0.0)  # nothing is displaced: the lowest colour everywhere
+    tab.turn_to("View")
+    tab.choose("colour by", "displacement")
+    assert until(lambda: tab.app.presenter.scale is not None and tab.app.presenter.settled)
+    (client,) = tab.app.server.get_clients().values()
+    size = (client.camera.image_width, client.camera.image_height)
+    centre = np.asarray(tab.app.columns.all[0].geometry.points, dtype=float).mean(axis=0)
+    x, y = project(centre[None], tab.app.scene._framing.camera(size), size)[0].round().astype(int)
+    assert until(lambda: np.abs(tab.picture()[y, x] - TABLE[0]).max() <= 3)
+
+
+def test_on_a_phone_the_body_fills_the_width(tab: Tab) -> None:
+    browser = tab.page.context.browser
+    assert browser is not None
+    page = browser.new_page(**PHONE)
+    try:
+        page.goto(tab.app.url)
+        page.wait_for_selector("canvas")
+        assert until(lambda: page.locator("#odeform-view .odeform-track").count() == 1)
+        points = np.asarray(tab.app.columns.all[0].geometry.points, dtype=float)
+        pixels = project(points, tab.app.scene._framing.camera((390, 844)), (390, 844))
+        assert np.ptp(pixels[:, 0]) > 0.6 * 390
+    finally:
+        page.close()
