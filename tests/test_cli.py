@@ -227,7 +227,7 @@ def test_train(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_simulate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ("simulate", "kick", "--out", tmp_path / "new", "--count", 1, "--seed", 2, "--workers", 1, "--rate", 30)
     assert run(*arguments) == 0
-    assert "1 sequences" in capsys.readouterr().out
+    assert "1 sequence" in capsys.readouterr().out
     made = open_dataset(tmp_path / "new")
     sequence = made.read(made.entries[0])
     assert sequence.vertices.shape == (31, 66, 3)

@@ -60,7 +60,8 @@ def run(args: argparse.Namespace) -> None:
     for entry in failed:
         print(f"{entry.name} failed: {entry.status}")
     if unexpected := sum(entry.status.startswith(UNEXPECTED) for entry in failed):
-        raise FailedCheck(f"{unexpected} sequences ended with an unexpected error; the same command tries them again")
+        ended = counted(unexpected, "sequence")
+        raise FailedCheck(f"{ended} ended with an unexpected error; the same command tries them again")
 
 
 def _range(name: str, text: str) -> tuple[float, float]:

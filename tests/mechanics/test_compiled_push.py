@@ -45,7 +45,8 @@ def test_they_agree_for_bodies_that_fall_and_spin_fast(block: Block, spin: list[
     reference, compiled = bodies(block)
     rows, steps, states = np.arange(3), np.full(3, 4e-3), reference.start
     moving = parts_of(states)[-1].start
-    states[:, 2], states[:, moving : moving + 6] = [4e-3, 8e-3, 2e-2], [0.1, 0.0, -3.0, *spin]
+    states[:, 2], states[:, moving : moving + 6] = [4e-3, 5e-3, 2e-2], [0.1, 0.0, 0.0, *spin]
+    states[:, moving + 2] = [-3.0, 0.0, -3.0]
     for index in range(10):
         times = begin + index * steps
         known, found = (each.advance(rows, times, states, steps) for each in (reference, compiled))

@@ -34,6 +34,15 @@ def test_the_turns_of_a_surface_that_turns_as_a_whole_are_that_turn() -> None:
     assert not found[..., 1].any()
 
 
+def test_an_edge_without_length_tells_no_turn() -> None:
+    ball = trimesh.creation.icosphere(2)
+    points, turn = np.asarray(ball.vertices), np.array([0.1, -0.4, 0.2])
+    doubled = np.concatenate([points, points[:1]])
+    faces = np.concatenate([ball.faces, [[0, len(points), ball.faces[ball.faces[:, 0] == 0][0, 1]]]]).astype(np.int32)
+    found = surface_turns(doubled, faces, np.cross(turn, doubled)[..., None])
+    np.testing.assert_allclose(found[: len(points), :, 0], np.broadcast_to(turn, points.shape), rtol=1e-4)
+
+
 def test_turns_fit_the_edges_around_a_point_with_equal_weight_for_each_direction() -> None:
     """Least squares over the edges, each by its own length."""
     rng = np.random.default_rng(0)

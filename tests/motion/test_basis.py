@@ -31,6 +31,12 @@ def test_exact_at_the_training_vertices() -> None:
     assert np.abs(fitted().values(ball(2)) - bend(ball(2))).max() < 1e-6
 
 
+def test_its_first_modes_are_as_they_were() -> None:
+    one = fitted().first(1)
+    assert one.modes == 1
+    np.testing.assert_allclose(one.values(ball(1)), fitted().values(ball(1))[..., :1], atol=1e-9)
+
+
 def test_smooth_between_them() -> None:
     assert np.abs(fitted(3).values(ball(4)) - bend(ball(4))).max() < 5e-3
 

@@ -116,7 +116,7 @@ def test_an_unexpected_error_ends_one_sequence_and_is_tried_again(
     assert main(command) == 1
     output = capsys.readouterr()
     assert "kick_00000 failed: unexpected ZeroDivisionError: no time at all (test_runner.py:" in output.out
-    assert "1 sequences ended with an unexpected error" in output.err
+    assert "1 sequence ended with an unexpected error" in output.err
     assert len(open_dataset(tmp_path).select("all")) == 2
     broken = False
     assert main(command) == 0

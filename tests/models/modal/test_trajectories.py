@@ -1,4 +1,4 @@
-"""What is done to motions of the mechanics: a share of them, a regression of the rest, and a lift out of the floor."""
+"""What is done to motions of the mechanics: weights, a regression of the rest, and a projection out of the floor."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,12 +43,12 @@ def corrected() -> Adjusted:
     return Adjusted(own, residual.adjustment(own, None))
 
 
-def projected(lowest: Callable[[Floats], Floats], limit: float, grid: Floats) -> Adjusted:
+def projected(lowest: Callable[[Floats], Floats], limit: float, grid: Floats | None) -> Adjusted:
     own = Steady()
     return Adjusted(own, FloorProjection(own, lowest, limit, grid))
 
 
-def test_a_part_has_its_share_of_the_mechanics_and_each_coefficient_its_gain() -> None:
+def test_a_part_has_its_weight_of_the_mechanics_and_each_coefficient_its_scale() -> None:
     np.testing.assert_array_equal(KEPT, [0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 0.8, 2.0])
     times = np.array([0.05, 0.15])
     np.testing.assert_allclose(corrected().reduced(times), KEPT * times[:, None] * SPEED + 1.0)
@@ -79,6 +79,18 @@ def test_a_body_is_lifted_by_what_is_too_deep(grid: float) -> None:
     np.testing.assert_array_equal(y[0], own[0])
     np.testing.assert_allclose(y[1] - own[1], [0.0, 0.0, -deep, 0.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
     assert lifted.last_good == 1.0
+
+
+def test_between_its_times_a_change_is_linear_whatever_is_asked_with_it() -> None:
+    def lowest(y: Floats) -> Floats:
+        return -0.04 * y[:, 2] ** 2
+
+    limit, asked = -0.006, np.array([0.15])
+    with_knots, without = projected(lowest, limit, np.array([0.0, 0.1, STOP])), projected(lowest, limit, None)
+    own, lifted = Steady().reduced(asked)[0, 2], with_knots.reduced(asked)
+    assert lifted[0, 2] - own == pytest.approx(0.5 * (0.36 * STOP**2 + limit))
+    np.testing.assert_array_equal(with_knots.reduced(np.array([0.15, 0.3]))[:1], lifted)
+    assert without.reduced(asked)[0, 2] - own == pytest.approx(0.36 * 0.15**2 + limit)
 
 
 def test_what_is_lost_is_not_lifted() -> None:
