@@ -44,6 +44,19 @@ def test_caption_badge_and_timeline_are_in_view_whatever_the_tab(tab: Tab) -> No
     assert tab.errors == []
 
 
+def test_no_panel_covers_another_also_in_a_small_page(tab: Tab) -> None:
+    panels = tab.page.locator("[data-floating-window]")
+    assert until(lambda: panels.count() == 2)
+
+    def apart() -> bool:
+        one, other = (panels.nth(index).bounding_box() for index in range(2))
+        assert one is not None
+        assert other is not None
+        return one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+
+    assert until(apart)
+
+
 def test_a_drag_along_the_timeline_scrubs_also_beside_it(tab: Tab) -> None:
     track = tab.page.locator("#odeform-view .odeform-track")
     box = track.bounding_box()
