@@ -20,7 +20,7 @@ from odeform_viz.columns import Column
 __all__ = ["PHONE", "Tab", "needs_chromium", "open_tab", "until"]
 
 VIEW = {"width": 800, "height": 480}
-PATIENCE = 40.0  # s, for a busy machine
+PATIENCE = 180.0  # s, for a busy machine
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium on the PATH (Debian: chromium)")
