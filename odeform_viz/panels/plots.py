@@ -9,7 +9,8 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.plot_legend import ENLARGE, legend_html, values_html
 from odeform_viz.panels.plots_svg import WIDTH, Line, cursor_css, plots_html, quantities_of
-from odeform_viz.view import Description
+from odeform_viz.rendering.framing import free_area
+from odeform_viz.view import Description, DisplayOptions
 
 __all__ = ["PlotPanel"]
 
@@ -28,6 +29,7 @@ class PlotPanel(Panel):
         self._state = gui.add_html("")
         self._lines: list[Line] = []
         self._described: Description | None = None
+        self._viewport = DisplayOptions().viewport
         self._rotates = self._large = False
         self._drawing = threading.Lock()  # a key may be pressed while other columns are described
         page.add_hotkey(ENLARGE, "larger or smaller plots", self._resize)
@@ -41,13 +43,14 @@ class PlotPanel(Panel):
             self._describe(description)
 
     def _describe(self, description: Description) -> None:
-        frame = description.frame
+        frame, viewport = description.frame, description.options.viewport
         lines = [
             (shown.column.label, color_of(shown.column), curves)
             for shown, curves in zip(frame.columns, description.curves, strict=True)
         ]
-        if [(label, color, id(c)) for label, color, c in lines] != [(n, color, id(c)) for n, color, c in self._lines]:
-            self._lines = lines
+        drawn = [(name, color, id(c)) for name, color, c in self._lines]
+        if [(label, color, id(c)) for label, color, c in lines] != drawn or viewport != self._viewport:
+            self._lines, self._viewport = lines, viewport
             self._rotates = any(float(np.nanmax(c.rotation)) > ROTATES for _, _, c in lines)
             self._draw()
         self._described = description
@@ -62,8 +65,10 @@ class PlotPanel(Panel):
 
     def _draw(self) -> None:
         plots = max(len(quantities_of(self._lines, self._rotates)), 3)
+        width = LARGE if self._large else WIDTH * plots + MARGIN
+        left, _, right, _ = free_area(self._viewport)
         self._curves.content = plots_html(self._lines, self._window, self._rotates, self._slider, self._large)
-        self._layout.set_bottom_width(LARGE if self._large else WIDTH * plots + MARGIN)
+        self._layout.set_bottom_width(min(width, round(right - left)))
 
     def _follow(self, description: Description) -> None:
         frame, lines = description.frame, self._lines

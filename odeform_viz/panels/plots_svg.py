@@ -39,7 +39,7 @@ QUANTITIES = (
 )
 
 STYLE = """<style>
-.odeform-plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));padding:0 0.4em}
+.odeform-plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(96px,1fr));padding:0 0.4em}
 .odeform-plots.large{grid-template-columns:1fr 1fr}
 .odeform-plots.large text{font-size:7px}
 .odeform-plots svg{cursor:crosshair;touch-action:none;user-select:none}

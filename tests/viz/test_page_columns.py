@@ -125,8 +125,8 @@ def _panels(tab: Tab, size: tuple[int, int]) -> list[Floats]:
 
 
 def _drawn(tab: Tab, middles: list[Floats], path: Path) -> bool:
-    """Whether a screenshot shows each body at its place: its checkerboard is not the background."""
+    """Whether a screenshot shows each body at its place: its clay is warm, and the background is not."""
     tab.page.screenshot(path=path)
     picture = np.asarray(Image.open(path).convert("RGB")).astype(int)
     around = [picture[y - 3 : y + 4, x - 3 : x + 4] for x, y in np.round(middles).astype(int)]
-    return all(np.ptp(pixels, axis=2).max() > 20 for pixels in around)
+    return all((pixels[..., 0] - pixels[..., 2]).max() > 3 for pixels in around)

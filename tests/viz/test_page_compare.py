@@ -32,7 +32,7 @@ def test_columns_are_compared_with_the_truth(compared: Tab) -> None:
     compared.key("P").click()
     compared.turn_to("Compare")
     assert compared.says("from the truth")
-    assert compared.says(r"error RMS \(dashed: 90 %\), mm")
+    assert compared.says(r"error, RMS \(dashed: 90 %\), mm")
     before = compared.settled()
     compared.page.keyboard.press("c")
     assert compared.changes(before)

@@ -1,10 +1,13 @@
 """The real page: what lies over the scene, and the colours of values."""
 
+import io
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+import viser
 from browsing import PHONE, Tab, needs_chromium, open_tab, until
+from PIL import Image
 from rendering.test_framing import project
 
 from odeform.models.base import Predictor
@@ -41,6 +44,19 @@ def test_caption_badge_and_timeline_are_in_view_whatever_the_tab(tab: Tab) -> No
     assert tab.errors == []
 
 
+def test_no_panel_covers_another_also_in_a_small_page(tab: Tab) -> None:
+    panels = tab.page.locator("[data-floating-window]")
+    assert until(lambda: panels.count() == 2)
+
+    def apart() -> bool:
+        one, other = (panels.nth(index).bounding_box() for index in range(2))
+        assert one is not None
+        assert other is not None
+        return one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+
+    assert until(apart)
+
+
 def test_a_drag_along_the_timeline_scrubs_also_beside_it(tab: Tab) -> None:
     track = tab.page.locator("#odeform-view .odeform-track")
     box = track.bounding_box()
@@ -72,11 +88,21 @@ def test_a_value_has_exactly_the_colour_of_the_scale(tab: Tab) -> None:
     tab.turn_to("View")
     tab.choose("colour by", "displacement")
     assert until(lambda: tab.app.presenter.scale is not None and tab.app.presenter.settled)
-    (client,) = tab.app.server.get_clients().values()
-    size = (client.camera.image_width, client.camera.image_height)
+    size = (1200, 800)  # at which nothing lies over the body
+    tab.page.set_viewport_size({"width": size[0], "height": size[1]})
+    assert until(lambda: max(c.camera.image_width / c.camera.image_height for c in _clients(tab)) == pytest.approx(1.5))
     centre = np.asarray(tab.app.columns.all[0].geometry.points, dtype=float).mean(axis=0)
     x, y = project(centre[None], tab.app.scene._framing.camera(size), size)[0].round().astype(int)
-    assert until(lambda: np.abs(tab.picture()[y, x] - TABLE[0]).max() <= 3)
+
+    def pixel() -> np.ndarray:
+        shot = tab.page.screenshot(clip={"x": int(x), "y": int(y), "width": 4, "height": 4})
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB")).astype(int)[0, 0]
+
+    assert until(lambda: np.abs(pixel() - TABLE[0]).max() <= 3), pixel()
+
+
+def _clients(tab: Tab) -> list[viser.ClientHandle]:
+    return list(tab.app.server.get_clients().values())
 
 
 def test_on_a_phone_the_body_fills_the_width(tab: Tab) -> None:
