@@ -1,4 +1,4 @@
-"""Collapses edges of tetrahedra, one after the other, as machine code.
+"""Collapses edges of tetrahedra and moves their nodes, one after the other, as machine code.
 
 All of it is in one file: Numba's cache of a function does not notice that one in another file has changed.
 """
@@ -8,7 +8,7 @@ from typing import no_type_check
 import numba
 import numpy as np
 
-__all__ = ["collapse_edges"]
+__all__ = ["MOST", "collapse_edges", "improve_nodes"]
 
 MOST = 96  # tetrahedra around a node
 TURN = 0.3  # least cosine between a triangle of the surface and that in its place
@@ -231,3 +231,43 @@ def collapse_edges(points, tetrahedra, alive, around, counts, outer, edges, fiel
         if gone >= spare:
             break
     return gone
+
+
+@compiled
+@no_type_check
+def _worst(points, tetrahedra, around, count):
+    worst = np.inf
+    for at in range(count):
+        t = tetrahedra[around[at]]
+        worst = min(worst, _quality(points[t[0]], points[t[1]], points[t[2]], points[t[3]]))
+    return worst
+
+
+@compiled
+@no_type_check
+def improve_nodes(points, tetrahedra, around, counts, outer, field, good, steps):
+    """Moves nodes whose worst tetrahedron is less than `good` where that one is best, by `steps` (S, 3), relative to the
+    edges; those of the surface only along it. `points` (N, 3) are changed in place."""
+    values, origin, cell = field
+    for node in range(len(points)):
+        if counts[node] == 0:
+            continue
+        best = _worst(points, tetrahedra, around[node], counts[node])
+        if best >= good:
+            continue
+        here, size = points[node].copy(), np.inf
+        for at in range(counts[node]):
+            for other in tetrahedra[around[node, at]]:
+                if other != node:
+                    away = points[other] - here
+                    size = min(size, np.sqrt(np.dot(away, away)))
+        off = abs(_value(values, origin, cell, here)) if outer[node] else np.inf
+        found = here.copy()
+        for step in steps:
+            points[node] = here + size * step
+            if outer[node] and abs(_value(values, origin, cell, points[node])) > off + 0.02 * size:
+                continue
+            worst = _worst(points, tetrahedra, around[node], counts[node])
+            if worst > best:
+                best, found = worst, points[node].copy()
+        points[node] = found

@@ -9,7 +9,7 @@ from odeform.types import Floats, Ints, Perpoint, Points
 __all__ = ["projected"]
 
 STEPS = 8
-QUALITY = 0.18  # of tetrahedra, 1 if regular: they get no worse than that
+QUALITY = 0.25  # of tetrahedra, 1 if regular: they get no worse than that
 RETREATS = 6  # times that steps are taken back where they spoil a tetrahedron
 STEEP = 0.4  # slope of the distance below which a node is in the middle of a wall, and stays
 
@@ -30,11 +30,12 @@ def projected(points: Points, elements: Ints, outer: Ints, distance: Sampled) ->
 
 
 def _means(points: Points, edges: Ints) -> Floats:
-    """(N, 3) the mean of each node's neighbours."""
+    """(N, 3) the mean of each node's neighbours, itself without any."""
     total = np.zeros_like(points)
+    count = np.bincount(edges.ravel(), minlength=len(points))[:, None]
     for one, other in (edges.T, edges.T[::-1]):
         np.add.at(total, one, points[other])
-    return total / np.bincount(edges.ravel(), minlength=len(points))[:, None]
+    return np.where(count > 0, total / np.maximum(count, 1), points)
 
 
 def _guarded(points: Points, elements: Ints, moves: Floats) -> Points:

@@ -7,11 +7,10 @@ from scipy import ndimage
 from scipy.spatial import KDTree
 
 from odeform.errors import InputError
-from odeform.geometry.solids.coarsening import coarsened
+from odeform.geometry.solids.coarsening import Coarsening
 from odeform.geometry.solids.lattice import cubic_lattice
 from odeform.geometry.solids.of_mesh import enclosed_by_mesh
 from odeform.geometry.solids.of_points import enclosed_by_points
-from odeform.geometry.solids.projection import projected
 from odeform.geometry.solids.sampled import Enclosed, Sampled
 from odeform.geometry.solids.stuffing import stuff
 from odeform.geometry.solids.tetrahedra import edges_of, largest_part, outer_first, pulled_apart, volumes
@@ -23,6 +22,7 @@ NODES = 1700  # of a solid, about: what a simulation can bear
 FINE = 8000  # nodes at first
 ROUNDS, CLOSE = 3, 0.2  # searches for the spacing of so many nodes; relative difference that is close enough
 DENSITY = 5.5  # nodes within a spacing's cube, at first
+FITS = 2  # times that the surface is moved onto that of the shape, and tetrahedra are made better
 OUTWARD = 0.5  # spacings by which the surface is out meanwhile: a lattice loses walls that are thinner than a spacing
 MOVED = 0.01  # of the longest extent, from which on a point of the surface counts as moved
 PART = 0.1  # fraction of the volume of a second body that is not dropped any more
@@ -79,8 +79,13 @@ def solid_inside(geometry: Geometry) -> SolidMesh:
     distance = found.distance
     spacing, points, elements = _fine(distance)
     out = distance.with_values(distance.values - OUTWARD * spacing)
-    points, elements, faces = outer_first(*coarsened(points, elements, out, NODES))
-    points = projected(points, elements, np.arange(faces.max() + 1), distance)
+    solid = Coarsening(points, elements, out)
+    solid.collapse(NODES)
+    solid.improve()
+    for _ in range(FITS):
+        solid.project(distance)
+        solid.improve()
+    points, elements, faces = outer_first(solid.points, solid.elements)
     return SolidMesh(points, elements, faces, _changes(points, elements, faces, found))
 
 

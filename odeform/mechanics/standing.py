@@ -1,0 +1,85 @@
+"""How an elastic body rests on the floor under its weight: an equilibrium, found without following a motion."""
+
+import numpy as np
+from scipy.sparse import diags
+from scipy.sparse.linalg import splu
+from scipy.spatial import ConvexHull
+
+from odeform.mechanics.elasticity import elastic_forces, tangent_stiffness
+from odeform.types import Floats, Ints, Perpoint, Points, Rotations, Vector
+
+__all__ = ["lying", "standing"]
+
+GRAVITY = 9.81  # m/s^2
+SINKS = 5e-5  # m, of the whole weight on one node into the floor
+STEPS, FIRST, LONGEST = 40, 0.02, 1.0  # of pseudo time; s, the first and the longest of them
+STILL = 1e-3  # acceleration that is left, relative to gravity
+ROLLS = 30  # over edges of its hull, at most
+
+
+def lying(points: Points, masses: Perpoint) -> Rotations:
+    """The rotation (3, 3) with which a rigid body comes to rest on the floor: it rolls over edges of its hull until
+    its mass centre is above the side that it lies on."""
+    hull, centre = ConvexHull(points), masses @ points / masses.sum()
+    normals = hull.equations[:, :3]
+    height = -(normals @ centre + hull.equations[:, 3])
+    floor = np.array([0.0, 0.0, -1.0])
+    down: Vector = floor
+    for _ in range(ROLLS):
+        towards = normals @ down
+        facet = int(np.where(towards > 1e-9, height / np.maximum(towards, 1e-9), np.inf).argmin())
+        if normals[facet] @ down > 1.0 - 1e-9:
+            break
+        down = normals[facet]
+    return _turning(down, floor)
+
+
+def _turning(one: Vector, other: Vector) -> Rotations:
+    """The least rotation (3, 3) of one unit vector to another."""
+    axis, cosine = np.cross(one, other), float(one @ other)
+    if cosine < -1.0 + 1e-9:
+        return np.diag([1.0, -1.0, -1.0])
+    across = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + across + across @ across / (1.0 + cosine)
+
+
+def standing(
+    points: Points, elements: Ints, masses: Perpoint, young: float, poisson: float
+) -> tuple[Points, bool]:
+    """Where nodes (N, 3) m of tetrahedra (M, 4) are when they stand on the floor z = 0, and whether they came to rest.
+
+    `points` are without stress, `young` is in Pa. Newton's method in steps of a pseudo time, which the inertia of the
+    nodes, `masses` (N,) kg, holds back; steps that turn a tetrahedron inside out are taken again, shorter.
+    """
+    positions = points - [0.0, 0.0, points[:, 2].min()]
+    weights, stiff = np.repeat(masses, 3), float(masses.sum()) * GRAVITY / SINKS
+    step, left = FIRST, _forces(points, elements, positions, masses, young, poisson, stiff)
+    for _ in range(STEPS):
+        below = np.zeros_like(positions)
+        below[:, 2] = stiff * (positions[:, 2] < 0.0)
+        matrix = tangent_stiffness(points, elements, positions, young, poisson)
+        held = (matrix + diags(weights / step**2 + below.ravel())).tocsc()
+        found = splu(held, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(left.ravel())
+        moved = positions + found.reshape(-1, 3)
+        if not np.isfinite(moved).all() or _inside_out(moved, elements):
+            step *= 0.25
+            continue
+        positions, left = moved, _forces(points, elements, moved, masses, young, poisson, stiff)
+        if np.sqrt((left**2 / masses[:, None]).sum() / masses.sum()) < STILL * GRAVITY:
+            return positions, True
+        step = min(2.0 * step, LONGEST)
+    return positions, False
+
+
+def _forces(
+    points: Points, elements: Ints, positions: Points, masses: Perpoint, young: float, poisson: float, stiff: float
+) -> Floats:
+    """(N, 3) N of elasticity, weight and floor."""
+    found = elastic_forces(points, elements, positions, young, poisson)
+    found[:, 2] += stiff * np.maximum(-positions[:, 2], 0.0) - masses * GRAVITY
+    return found
+
+
+def _inside_out(positions: Points, elements: Ints) -> bool:
+    corners = positions[elements]
+    return bool((np.linalg.det(corners[:, 1:] - corners[:, :1]) <= 0.0).any())
