@@ -1,7 +1,7 @@
 """How an elastic body rests on the floor under its weight: an equilibrium, found without following a motion."""
 
 import numpy as np
-from scipy.sparse import diags
+from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import splu
 from scipy.spatial import ConvexHull
 
@@ -12,7 +12,8 @@ __all__ = ["lying", "sag", "standing"]
 
 GRAVITY = 9.81  # m/s^2
 SINKS = 5e-5  # m, of the whole weight on one node into the floor
-STEPS, FIRST, LONGEST = 30, 0.02, 1.0  # of pseudo time; s, the first and the longest of them
+TOUCHES = 6  # times that what touches the floor is found anew, in one step
+STEPS, FIRST, LONGEST = 20, 0.005, 1.0  # of pseudo time; s, the first and the longest of them
 STILL = 1e-3  # acceleration that is left, relative to gravity
 FOOT = 0.02  # of the height, near the floor
 ROLLS = 30  # over edges of its hull, at most
@@ -69,31 +70,48 @@ def standing(
     nodes, `masses` (N,) kg, holds back; steps that turn a tetrahedron inside out are taken again, shorter.
     """
     positions = points - [0.0, 0.0, points[:, 2].min()]
-    weights, stiff = np.repeat(masses, 3), float(masses.sum()) * GRAVITY / SINKS
-    step, left = FIRST, _forces(points, elements, positions, masses, young, poisson, stiff)
+    mass, step = float(masses.sum()), FIRST
+    stiff = mass * GRAVITY / SINKS
+    left = _forces(points, elements, positions, masses, young, poisson)
     for _ in range(STEPS):
-        below = np.zeros_like(positions)
-        below[:, 2] = stiff * (positions[:, 2] < 0.0)
-        matrix = tangent_stiffness(points, elements, positions, young, poisson)
-        held = (matrix + diags(weights / step**2 + below.ravel())).tocsc()
-        found = splu(held, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(left.ravel())
-        moved = positions + found.reshape(-1, 3)
+        matrix = tangent_stiffness(points, elements, positions, young, poisson) + diags(np.repeat(masses / step**2, 3))
+        moved = _stepped(matrix, left, positions, stiff)
         if not np.isfinite(moved).all() or _inside_out(moved, elements):
             step *= 0.25
             continue
-        positions, left = moved, _forces(points, elements, moved, masses, young, poisson, stiff)
-        if np.sqrt((left**2 / masses[:, None]).sum() / masses.sum()) < STILL * GRAVITY:
+        positions, left = moved, _forces(points, elements, moved, masses, young, poisson)
+        still = left.copy()
+        still[:, 2] += stiff * np.maximum(-positions[:, 2], 0.0)
+        if np.sqrt((still**2 / masses[:, None]).sum() / mass) < STILL * GRAVITY:
             return positions, True
-        step = min(2.0 * step, LONGEST)
+        step = min(4.0 * step, LONGEST)
     return positions, False
 
 
+def _stepped(matrix: csc_matrix, left: Floats, positions: Points, stiff: float) -> Points:
+    """(N, 3) m: one step of Newton's method, under forces `left` (N, 3) N besides those of the floor, which hold the
+    nodes that would be below it."""
+    held = positions[:, 2] <= 0.0
+    moved = positions
+    for _ in range(TOUCHES):
+        floor = np.zeros_like(positions)
+        floor[held, 2] = stiff
+        system = (matrix + diags(floor.ravel())).tocsc()
+        forces = left - floor * positions
+        solver = splu(system, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+        moved = positions + solver.solve(forces.ravel()).reshape(-1, 3)
+        before, held = held, moved[:, 2] < 0.0
+        if (held == before).all():
+            break
+    return moved
+
+
 def _forces(
-    points: Points, elements: Ints, positions: Points, masses: Perpoint, young: float, poisson: float, stiff: float
+    points: Points, elements: Ints, positions: Points, masses: Perpoint, young: float, poisson: float
 ) -> Floats:
-    """(N, 3) N of elasticity, weight and floor."""
+    """(N, 3) N of elasticity and weight."""
     found = elastic_forces(points, elements, positions, young, poisson)
-    found[:, 2] += stiff * np.maximum(-positions[:, 2], 0.0) - masses * GRAVITY
+    found[:, 2] -= masses * GRAVITY
     return found
 
 
