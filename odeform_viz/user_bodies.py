@@ -31,12 +31,12 @@ def read_user_body(name: str | Path) -> UserBody:
 
 
 def describe_user_body(body: UserBody) -> str:
-    """One line: points, size and material."""
+    """One line: points, size, weight and material, and what was done to make a solid of it."""
     size = 1e3 * float(np.ptp(body.item.settled, axis=0).max())
     points = len(body.fit.geometry.points)
     return (
         f"{body.item.name}: {points:,} points move with a soft body of {body.item.surface_count:,} surface vertices, "
-        f"{size:.0f} mm long, of the {body.like}'s material"
+        f"{size:.0f} mm long and {1e3 * body.item.mass:,.0f} g, {body.made}"
     )
 
 

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> None:
     elif args.geometry is not None and takes_user_bodies(predictor):
         predictor = UserBodyPredictor(predictor, user_body(read_shape(args.geometry)[0], Path(args.geometry).name))
         fit, settings = predictor.user_body.fit, {**predictor.parameters_like(), **settings}
-        _note(f"{args.geometry}: its material and forces are those of the {predictor.user_body.like}")
+        _note(f"{args.geometry}: {predictor.user_body.made}")
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
         as_it_is = None if predictor.rescales_input else Similarity(rotation=UPRIGHT[shape.up or "+z"])

@@ -6,7 +6,7 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.solids.tetrahedra import keys_of
-from odeform.types import Faces, Floats, Ints, Mesh, Points
+from odeform.types import Bools, Faces, Floats, Ints, Mesh, Points
 
 __all__ = ["clean_mesh", "oriented"]
 
@@ -79,14 +79,15 @@ def oriented(points: Points, faces: Ints) -> tuple[Faces, tuple[str, ...]]:
     directed = ends[:, 0] * len(points) + ends[:, 1]
     mixed = len(np.unique(directed)) < len(directed)
     if mixed:
-        faces, label = igl.bfs_orient(faces)
+        faces, label = (np.asarray(found) for found in igl.bfs_orient(faces))
     else:
         label = np.asarray(igl.vertex_components(faces))[faces[:, 0]]
     corners = points[faces] - points.mean(axis=0)
     parts = int(label.max()) + 1
     centre = np.stack([np.bincount(label, corners[..., i].mean(axis=1), parts) for i in range(3)], axis=1)
     corners = corners - (centre / np.maximum(np.bincount(label, minlength=parts), 1)[:, None])[label, None]
-    volume = np.bincount(label, np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])), parts)
+    signed = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = np.bincount(label, signed, parts).astype(float)
     inward = volume < 0.0
     if not mixed and not inward.all():
         inward &= ~_within_another(points, faces, label, volume)
@@ -97,7 +98,7 @@ def oriented(points: Points, faces: Ints) -> tuple[Faces, tuple[str, ...]]:
     return faces, ("its faces look inward and were turned",) if inward.any() else ()
 
 
-def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) -> np.ndarray:
+def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) -> Bools:
     """(P,) which parts lie within the box of one that looks outward."""
     low, high = np.full((len(volume), 3), np.inf), np.full((len(volume), 3), -np.inf)
     for corner in range(3):
@@ -105,4 +106,4 @@ def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) ->
         np.maximum.at(high, label, points[faces[:, corner]])
     outward = np.flatnonzero(volume > 0.0)
     within = (low[:, None] >= low[outward]).all(axis=2) & (high[:, None] <= high[outward]).all(axis=2)
-    return within.any(axis=1)
+    return np.asarray(within.any(axis=1))

@@ -142,7 +142,7 @@ def _keeps_surface(points, rim, count, u, v, field, tolerance):
     nearest, ends = np.inf, 0
     for at in range(count):
         a, b = rim[at, 0], rim[at, 1]
-        if v == a or v == b:
+        if v in (a, b):
             ends += 1
             continue
         x, y = points[a], points[b]
@@ -246,8 +246,9 @@ def _worst(points, tetrahedra, around, count):
 @compiled
 @no_type_check
 def improve_nodes(points, tetrahedra, around, counts, outer, field, good, steps):
-    """Moves nodes whose worst tetrahedron is less than `good` where that one is best, by `steps` (S, 3), relative to the
-    edges; those of the surface only along it. `points` (N, 3) are changed in place."""
+    """Moves nodes whose worst tetrahedron is worse than `good` to where that is best; those of the surface along it.
+
+    They are tried at `steps` (S, 3), relative to the shortest edge. `points` (N, 3) are changed in place."""
     values, origin, cell = field
     for node in range(len(points)):
         if counts[node] == 0:

@@ -12,7 +12,7 @@ from scipy import ndimage
 from odeform.errors import InputError
 from odeform.geometry.solids.cleaning import clean_mesh, oriented
 from odeform.geometry.solids.sampled import Enclosed, grid_around
-from odeform.types import Floats, Ints, Mesh, Points
+from odeform.types import Bools, Floats, Ints, Mesh, Points
 
 __all__ = ["enclosed_by_mesh"]
 
@@ -33,14 +33,14 @@ def enclosed_by_mesh(mesh: Mesh) -> Enclosed:
         raise InputError("the mesh encloses no volume: it is open")
     grid = grid_around(points)
     at = grid.corners
-    inside = (igl.fast_winding_number(points, faces, at) > INSIDE).reshape(grid.values.shape)
+    inside = (np.asarray(igl.fast_winding_number(points, faces, at)) > INSIDE).reshape(grid.values.shape)
     count = int(np.ceil(SAMPLES * area / grid.cell**2))
     surface = grid.indices(_samples(points, faces, count))
     beside = np.zeros(inside.shape, dtype=bool)
     beside[tuple(surface.T)] = True
-    near = np.asarray(ndimage.binary_dilation(beside, iterations=NEAR))
+    near: Bools = np.asarray(ndimage.binary_dilation(beside, iterations=NEAR))
     cells = grid.edge_distance(inside)
-    exact = np.sqrt(igl.point_mesh_squared_distance(at[near.ravel()], points, faces)[0])
+    exact = np.sqrt(np.asarray(igl.point_mesh_squared_distance(at[near.ravel()], points, faces)[0]))
     # a surface within the solid, where parts overlap, is none
     cells[near] = np.where(cells[near] < (NEAR + 1) * grid.cell, exact, cells[near])
     return Enclosed(grid.with_values(np.where(inside, -cells, cells)), (*notes, *turned))

@@ -31,7 +31,9 @@ def enclosed_by_points(geometry: PointCloud | GaussianSplats) -> Enclosed:
     points, notes = np.asarray(geometry.points, dtype=float), []
     if isinstance(geometry, GaussianSplats):
         points = points[geometry.opacities > OPAQUE]
-        notes.append(f"the surface passes through the centres of {len(points):,} splats of more than {OPAQUE:g} opacity")
+        notes.append(
+            f"the surface passes through the centres of {len(points):,} splats of more than {OPAQUE:g} opacity"
+        )
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < FEWEST:
         raise InputError(f"expected at least {FEWEST} points that outline a body, got {len(points)}")

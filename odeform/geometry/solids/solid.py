@@ -14,7 +14,7 @@ from odeform.geometry.solids.of_points import enclosed_by_points
 from odeform.geometry.solids.sampled import Enclosed, Sampled
 from odeform.geometry.solids.stuffing import stuff
 from odeform.geometry.solids.tetrahedra import edges_of, largest_part, outer_first, pulled_apart, volumes
-from odeform.types import Faces, GaussianSplats, Geometry, Ints, Mesh, Points
+from odeform.types import Faces, Geometry, Ints, Mesh, Points
 
 __all__ = ["Changes", "SolidMesh", "solid_inside"]
 
@@ -123,8 +123,7 @@ def _one_body(found: Enclosed) -> Enclosed:
     if large > 1:
         raise InputError(f"the shape holds {large} separate bodies: expected one")
     kept = label == 1 + int(sizes.argmax())
-    box = [part.stop - part.start for part in ndimage.find_objects(kept.astype(int))[0]]
-    if sizes.max() < HOLLOW * np.prod(box):
+    if sizes.max() < HOLLOW * np.prod(np.ptp(np.argwhere(kept), axis=0) + 1):
         raise InputError("the shape encloses no volume: it is open or flat")
     values = np.where(kept | (label == 0), distance.values, distance.cell)
     dropped = int((sizes > 0).sum()) - 1
@@ -135,14 +134,19 @@ def _one_body(found: Enclosed) -> Enclosed:
 def _fine(distance: Sampled) -> tuple[float, Points, Ints]:
     """The spacing of a lattice for about `FINE` nodes, and the solid that it makes, too large by `OUTWARD` spacings."""
     spacing = (distance.volume / FINE * DENSITY) ** (1.0 / 3.0)
+    points, elements = _stuffed(distance, spacing)
     for _ in range(ROUNDS):
-        out = distance.with_values(distance.values - OUTWARD * spacing)
-        box = np.argwhere(out.values < 0.0)
-        low, high = (out.origin + out.cell * end for end in (box.min(axis=0), box.max(axis=0)))
-        points, elements = stuff(out, *cubic_lattice(low - spacing, high + spacing, spacing))
-        points, elements = pulled_apart(points, largest_part(points, elements))
         ratio = len(np.unique(elements)) / FINE
         if abs(ratio - 1.0) < CLOSE:
             break
         spacing *= ratio**0.4
+        points, elements = _stuffed(distance, spacing)
     return spacing, points, elements
+
+
+def _stuffed(distance: Sampled, spacing: float) -> tuple[Points, Ints]:
+    out = distance.with_values(distance.values - OUTWARD * spacing)
+    box = np.argwhere(out.values < 0.0)
+    low, high = (out.origin + out.cell * end for end in (box.min(axis=0), box.max(axis=0)))
+    points, elements = stuff(out, *cubic_lattice(low - spacing, high + spacing, spacing))
+    return pulled_apart(points, largest_part(points, elements))

@@ -1,7 +1,7 @@
 """Tetrahedra inside of a signed distance, well shaped by construction.
 
-Labelle and Shewchuk 2007, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles". A body-centred cubic
-lattice is cut at the surface; corners that are too near to it are moved onto it first.
+Labelle and Shewchuk 2007, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles". A body-centred
+cubic lattice is cut at the surface; corners that are too near to it are moved onto it first.
 """
 
 from collections.abc import Callable
@@ -92,14 +92,16 @@ def _cut_up(points: Points, values: Perpoint, tetrahedra: Ints, edges: Ints, cut
     position[rank] = np.arange(len(points))
     tetrahedra = rank[np.sort(position[tetrahedra], axis=1)]
     inside, outside = (level[tetrahedra] < 0.0).sum(axis=1), (level[tetrahedra] > 0.0).sum(axis=1)
-    found = [tetrahedra[(inside > 0) & (outside == 0)]]
+    found: list[Ints] = [tetrahedra[(inside > 0) & (outside == 0)]]
     a, b, c, d = tetrahedra[(inside == 1) & (outside > 0)].T
     found.append(np.stack([a, cut(a, b), cut(a, c), cut(a, d)], axis=1))
     a, b, c, d = tetrahedra[(inside == 2) & (outside == 1)].T  # c is on the surface
     found += _stacked([a, b, cut(b, d), c], [a, cut(b, d), cut(a, d), c])
     a, b, c, d = tetrahedra[(inside == 2) & (outside == 2)].T
     ac, ad, bc, bd = cut(a, c), cut(a, d), cut(b, c), cut(b, d)
-    first = np.linalg.norm(everywhere[ac] - everywhere[bd], axis=1) < np.linalg.norm(everywhere[ad] - everywhere[bc], axis=1)
+    first = np.linalg.norm(everywhere[ac] - everywhere[bd], axis=1) < np.linalg.norm(
+        everywhere[ad] - everywhere[bc], axis=1
+    )
     found += _stacked([a, b, bc, bd], [a, ac, ad, np.where(first, bd, bc)], [a, np.where(first, ac, ad), bd, bc])
     a, b, c, d = tetrahedra[(inside == 3) & (outside == 1)].T
     found += _stacked([a, b, c, cut(c, d)], [a, b, cut(b, d), cut(c, d)], [a, cut(a, d), cut(b, d), cut(c, d)])

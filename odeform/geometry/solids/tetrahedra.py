@@ -90,7 +90,7 @@ def largest_part(points: Points, elements: Ints) -> Ints:
 
 def pulled_apart(points: Points, elements: Ints) -> tuple[Points, Ints]:
     """The same tetrahedra (M, 4), joined by sides alone: where only a corner or an edge joined some, each side gets
-    nodes of its own, so that the surface is one everywhere. Where an edge stays pinched, the smaller part is left out."""
+    nodes of its own, so that the surface is one everywhere. Where an edge stays pinched, what is outermost goes."""
     for _ in range(PINCHED):
         points, elements = _reglued(points, elements)
         faces = boundary(elements)

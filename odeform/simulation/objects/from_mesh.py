@@ -35,7 +35,7 @@ class PlacedObject:
     changes: Changes
     """What was done to make a solid of it."""
     material: str
-    """What it is of, and why, in part of a sentence."""
+    """What it is of, and why, as in "of foam"."""
 
 
 def placed_object(
@@ -92,5 +92,10 @@ def _at_rest(
         settled, rests = standing(points, elements, masses, one.young, one.poisson)
         if rests and (material is not None or np.ptp(settled[:, 2]) > (1.0 - SAGS) * np.ptp(points[:, 2])):
             shift = masses @ settled / masses.sum() * [1.0, 1.0, 0.0]
-            return settled - shift, one, "" if material else f"{called}, the softest material under which it stands"
+            return settled - shift, one, _described(one, "" if material else called)
     raise InputError(f"{name}: it does not stand: parts of it collapse under its weight, also of {list(choice)[-1]}")
+
+
+def _described(material: SoftMaterial, chosen: str) -> str:
+    figures = f"{1e-3 * material.young:g} kPa and {material.density:g} kg/m^3"
+    return f"{chosen} ({figures}), the softest material under which it stands" if chosen else figures

@@ -34,8 +34,12 @@ FORCES: dict[str, tuple[float, float]] = {
 }
 """Newton, weakest and strongest."""
 
-PLUSH = "polyester filling, as the softest flexible foams: 10 kPa and more, 25 kg/m^3 and more (Gibson and Ashby, ch. 5)"
-DOUGH = "wheat flour dough at small strain: 10 to 40 kPa, 1,100 to 1,200 kg/m^3 (Uthayakumaran et al. 2002, Rheol. Acta 41)"
+PLUSH = (
+    "polyester filling, as the softest flexible foams: 10 kPa and more, 25 kg/m^3 and more (Gibson and Ashby, ch. 5)"
+)
+DOUGH = (
+    "wheat flour dough at small strain: 10 to 40 kPa, 1,100 to 1,200 kg/m^3 (Uthayakumaran et al. 2002, Rheol. Acta 41)"
+)
 NATURAL = "soft natural rubber of Shore A 20: 0.7 MPa (Gent 1958, Rubber Chem. Technol. 31, 896), 1,000 kg/m^3"
 BOARD = "corrugated board across its flutes, about 1 MPa and 150 kg/m^3 (an estimate of its order of magnitude)"
 

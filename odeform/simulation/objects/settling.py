@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from odeform.geometry.solids.tetrahedra import inside_out
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.body import SoftBody
 from odeform.simulation.objects.soft_object import SoftMaterial
-from odeform.simulation.objects.tetrahedra import inside_out
 from odeform.types import Ints, Points
 
 __all__ = ["REST_SPEED", "STEP", "settle"]

@@ -5,6 +5,10 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from odeform.simulation.objects.level_set import surface_of
+from odeform.simulation.objects.remesh import remesh
+from odeform.simulation.objects.repair import even_surface, repaired
+from odeform.simulation.objects.tetrahedra import boundary, tetrahedralise
 
 from odeform.errors import InputError
 from odeform.simulation.errors import SimulationError
@@ -12,11 +16,7 @@ from odeform.simulation.objects.canonical import most_like, plausible_scale
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.files import arrays_of, read_object
 from odeform.simulation.objects.from_mesh import placed_object
-from odeform.simulation.objects.level_set import surface_of
-from odeform.simulation.objects.remesh import remesh
-from odeform.simulation.objects.repair import even_surface, repaired
 from odeform.simulation.objects.settling import settle
-from odeform.simulation.objects.tetrahedra import boundary, tetrahedralise
 from odeform.simulation.objects.thickness import thicknesses
 from odeform.types import Mesh, Perpoint, Points
 
