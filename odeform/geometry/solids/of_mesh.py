@@ -4,6 +4,8 @@ What is inside follows from the generalised winding number, which closes holes b
 inside-outside segmentation"; Barill et al. 2018, "Fast winding numbers for soups and clouds").
 """
 
+from typing import Any
+
 import igl
 import numpy as np
 import trimesh
@@ -12,7 +14,7 @@ from scipy import ndimage
 from odeform.errors import InputError
 from odeform.geometry.solids.cleaning import clean_mesh, oriented
 from odeform.geometry.solids.sampled import Enclosed, grid_around
-from odeform.types import Bools, Floats, Ints, Mesh, Points
+from odeform.types import Floats, Ints, Mesh, Points
 
 __all__ = ["enclosed_by_mesh"]
 
@@ -38,7 +40,7 @@ def enclosed_by_mesh(mesh: Mesh) -> Enclosed:
     surface = grid.indices(_samples(points, faces, count))
     beside = np.zeros(inside.shape, dtype=bool)
     beside[tuple(surface.T)] = True
-    near: Bools = np.asarray(ndimage.binary_dilation(beside, iterations=NEAR))
+    near: Any = ndimage.binary_dilation(beside, iterations=NEAR)
     cells = grid.edge_distance(inside)
     exact = np.sqrt(np.asarray(igl.point_mesh_squared_distance(at[near.ravel()], points, faces)[0]))
     # a surface within the solid, where parts overlap, is none

@@ -1,6 +1,7 @@
 """A closed solid of tetrahedra inside of any shape, and what had to be changed for it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -114,7 +115,8 @@ def _one_body(found: Enclosed) -> Enclosed:
     """Without what is much smaller than the largest body. `InputError` if another one is not."""
     distance = found.distance
     # walls thinner than a cell hold together what they join
-    label, count = ndimage.label(distance.values < 0.5 * distance.cell, np.ones((3, 3, 3)))
+    found_parts: Any = ndimage.label(distance.values < 0.5 * distance.cell, np.ones((3, 3, 3)))
+    label, count = found_parts
     inside = distance.values < 0.0
     sizes = np.bincount(label[inside], minlength=count + 1)[1:]
     if not inside.any():

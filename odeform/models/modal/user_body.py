@@ -173,9 +173,7 @@ class UserBodyPredictor(ModalModel):
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
-        return (
-            f"its motion follows from its shape and material, and from the {self.user_body.like}'s contact parameters"
-        )
+        return f"its motion follows from its shape, its material, and the {self.user_body.like}'s contact parameters"
 
     def _describe_error(self) -> str:
         if self._band is None:
