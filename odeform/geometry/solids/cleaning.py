@@ -106,4 +106,4 @@ def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) ->
         np.maximum.at(high, label, points[faces[:, corner]])
     outward = np.flatnonzero(volume > 0.0)
     within = (low[:, None] >= low[outward]).all(axis=2) & (high[:, None] <= high[outward]).all(axis=2)
-    return np.asarray(within).any(axis=1)
+    return np.asarray(within.sum(axis=1) > 0)
