@@ -8,6 +8,7 @@ import numpy as np
 
 from odeform.models.base import Predictor
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
+from odeform.simulation.objects.materials import material_of
 from odeform_viz.columns import Column
 from odeform_viz.fitting import readable_shape
 
@@ -23,10 +24,11 @@ __all__ = [
 ]
 
 
-def read_user_body(name: str | Path) -> UserBody:
-    """The body of a file; see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
+def read_user_body(name: str | Path, material: str | None = None) -> UserBody:
+    """The body of a file, of a material by name or number (`material_of`); see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
     geometry, _ = readable_shape(name)
-    body = user_body(geometry, Path(name).name)
+    given = None if material is None else material_of(material)
+    body = user_body(geometry, Path(name).name, material=given)
     return replace(body, fit=replace(body.fit, origin=str(name)))
 
 

@@ -13,7 +13,7 @@ __all__ = ["clean_mesh", "oriented"]
 SPECK = 0.02  # extent of a part, relative to the whole, below which it is dropped
 FLAT = 1e-4  # extent across, relative to the longest, below which a mesh encloses nothing
 SEAM = 1e-6  # of the longest extent, within which vertices are one
-MOST, FINE = 150_000, 256  # faces; of more, vertices are merged within the longest extent / FINE
+MOST, FINE = 150_000, 128  # faces; of more, vertices are merged within the longest extent / FINE
 
 
 def clean_mesh(mesh: Mesh) -> tuple[Points, Ints, tuple[str, ...]]:
@@ -29,11 +29,10 @@ def clean_mesh(mesh: Mesh) -> tuple[Points, Ints, tuple[str, ...]]:
     size = float(np.ptp(points, axis=0).max())
     if not np.ptp(points, axis=0).min() > FLAT * size:
         raise InputError("the mesh encloses no volume: it is flat")
-    notes: list[str] = []
     many = len(faces) > MOST
     points, faces = _merged(points, faces, size / FINE if many else SEAM * size)
-    if many:
-        notes.append(f"{len(mesh.faces):,} triangles were reduced to {len(faces):,}")
+    # merged vertices tear a mesh here and there
+    notes = [f"{len(mesh.faces):,} triangles were reduced to {len(faces):,}"] if many else _holes(points, faces, size)
     labels = np.asarray(igl.vertex_components(faces))
     low, high = np.full((labels.max() + 1, 3), np.inf), np.full((labels.max() + 1, 3), -np.inf)
     np.minimum.at(low, labels, points)
@@ -42,7 +41,7 @@ def clean_mesh(mesh: Mesh) -> tuple[Points, Ints, tuple[str, ...]]:
     used = np.unique(labels[faces[:, 0]])
     if specks := int((~large[used]).sum()):
         notes.append(f"{_counted(specks, 'loose speck')} of less than {100 * SPECK:g} % of its size left out")
-    return points, faces[large[labels[faces[:, 0]]]], (*notes, *_holes(points, faces, size))
+    return points, faces[large[labels[faces[:, 0]]]], tuple(notes)
 
 
 def _merged(points: Floats, faces: Ints, width: float) -> tuple[Floats, Ints]:

@@ -18,6 +18,7 @@ CELLS = 56  # along the longest side, at most
 SPACING = 1.5  # width of a cell, in median distances between neighbouring points
 GROWTH = (1, 2, 3, 4)  # cells by which points are thickened until they enclose something
 DEEP, FRACTION = 2, 0.25  # fraction of the cells that are deeper than that many cells: less, and nothing is enclosed
+FOG = 5.0  # cells; points deeper than that outline nothing
 SMOOTHING = 1.0  # cells
 LEVEL = 0.69  # of the smoothed cells: the surface passes through the points, half a cell within the cells' outline
 SLOPE = 0.4  # of the smoothed cells at the surface, for each cell
@@ -43,6 +44,9 @@ def enclosed_by_points(geometry: PointCloud | GaussianSplats) -> Enclosed:
     cell = max(SPACING * spacing, size / CELLS)
     solid = _solid(kept, cell)
     inside = ndimage.gaussian_filter((solid.values < 0.0).astype(float), SMOOTHING)
+    depth = solid.edge_distance(inside > LEVEL) * (inside > LEVEL)
+    if (depth[tuple(solid.indices(kept).T)] > FOG * cell).mean() > FRACTION:
+        raise InputError("the points fill the inside, as fog does: expected points that outline a body")
     near = cell * (LEVEL - inside) / SLOPE
     away = solid.edge_distance(inside > LEVEL)
     distance = np.where(away < cell, near, np.where(inside > LEVEL, -away, away))

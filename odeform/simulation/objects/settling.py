@@ -20,9 +20,10 @@ CALM, LIMIT, UNDAMPED = 20, 3000, 100  # steps that slow before it counts; steps
 def settle(points: Points, elements: Ints, material: SoftMaterial, start: Points | None = None) -> Points:
     """(N, 3) m, the nodes at rest on the floor z = 0, their mass centred at x = y = 0.
 
-    The body starts at `start` (N, 3) m, by default as it is without stress where it touches the floor, and loses its velocity whenever its kinetic energy passes a maximum
-    (kinetic damping), in coarse steps first. Then it moves freely for 0.05 s. Raises `SimulationError` if it is still
-    moving after that, or if tetrahedra are inside out: parts too thin for this material collapse under the weight.
+    The body starts at `start` (N, 3) m, by default without stress where it touches the floor, and loses its velocity
+    whenever its kinetic energy passes a maximum (kinetic damping); without a start in coarse steps first. Then it moves
+    freely for 0.05 s. Raises `SimulationError` if it is still moving after that, or if tetrahedra are inside out: parts
+    too thin for this material collapse under the weight.
     """
     positions = points - [0.0, 0.0, points[:, 2].min()] if start is None else start
     for step in (COARSE, STEP) if start is None else (STEP,):
