@@ -25,7 +25,10 @@ __all__ = [
 
 
 def read_user_body(name: str | Path, material: str | None = None) -> UserBody:
-    """The body of a file, of a material by name or number (`material_of`); see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
+    """The body of a file; see `odeform.models.modal.user_body.user_body`, and `material_of` for its material.
+
+    `InputError` for a file without one.
+    """
     geometry, _ = readable_shape(name)
     given = None if material is None else material_of(material)
     body = user_body(geometry, Path(name).name, material=given)

@@ -6,7 +6,7 @@ import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.solids.tetrahedra import keys_of
-from odeform.types import Bools, Faces, Floats, Ints, Mesh, Points
+from odeform.types import Bools, Floats, Ints, Mesh, Points
 
 __all__ = ["clean_mesh", "oriented"]
 
@@ -72,13 +72,14 @@ def _counted(count: int, name: str) -> str:
     return f"{count:,} {name}{'s were' if count > 1 else ' was'}"
 
 
-def oriented(points: Points, faces: Ints) -> tuple[Faces, tuple[str, ...]]:
+def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
     """Faces that look outward, and what was done. Parts that look inward within another are cavities, and stay."""
     ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     directed = ends[:, 0] * len(points) + ends[:, 1]
     mixed = len(np.unique(directed)) < len(directed)
     if mixed:
-        faces, label = (np.asarray(found) for found in igl.bfs_orient(faces))
+        found, label = igl.bfs_orient(faces)
+        faces, label = np.ascontiguousarray(found), np.asarray(label)
     else:
         label = np.asarray(igl.vertex_components(faces))[faces[:, 0]]
     corners = points[faces] - points.mean(axis=0)

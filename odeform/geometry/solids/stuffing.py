@@ -20,7 +20,7 @@ ROOT = 4  # steps of a search for the surface along an edge
 Distance = Callable[[Points], Perpoint]
 
 
-def stuff(distance: Distance, points: Points, tetrahedra: Ints) -> tuple[Points, Ints]:
+def stuff(distance: Distance, points: Points, tetrahedra: Ints) -> tuple[Floats, Ints]:
     """Nodes (N, 3) and tetrahedra (M, 4) of the inside of a signed distance, from those of a lattice around it."""
     values = distance(points)
     tetrahedra = tetrahedra[(values[tetrahedra] < 0.0).any(axis=1)]
@@ -69,7 +69,7 @@ def _moved(points: Points, values: Perpoint, edges: Ints, cuts: Floats) -> tuple
     return points, values
 
 
-def _cut_up(points: Points, values: Perpoint, tetrahedra: Ints, edges: Ints, cuts: Floats) -> tuple[Points, Ints]:
+def _cut_up(points: Points, values: Perpoint, tetrahedra: Ints, edges: Ints, cuts: Floats) -> tuple[Floats, Ints]:
     """Cuts tetrahedra (M, 4) at the `edges` that cross the surface, and leaves what is outside out.
 
     Diagonals of cut sides start at the corner of theirs that comes first in the tetrahedra's order, which is the same

@@ -88,7 +88,7 @@ def largest_part(points: Points, elements: Ints) -> Ints:
     return elements[label == int(sizes.argmax())]
 
 
-def pulled_apart(points: Points, elements: Ints) -> tuple[Points, Ints]:
+def pulled_apart(points: Points, elements: Ints) -> tuple[Floats, Ints]:
     """The same tetrahedra (M, 4), joined by sides alone: where only a corner or an edge joined some, each side gets
     nodes of its own, so that the surface is one everywhere. Where an edge stays pinched, what is outermost goes."""
     for _ in range(PINCHED):
@@ -106,7 +106,7 @@ def pulled_apart(points: Points, elements: Ints) -> tuple[Points, Ints]:
     return points, elements
 
 
-def _reglued(points: Points, elements: Ints) -> tuple[Points, Ints]:
+def _reglued(points: Points, elements: Ints) -> tuple[Floats, Ints]:
     """Gives each group of corners that sides join a node of its own."""
     one, other = _neighbours(elements)
     first, second = SIDES[one % 4], SIDES[other % 4]
@@ -121,7 +121,7 @@ def _reglued(points: Points, elements: Ints) -> tuple[Points, Ints]:
     return points[node], label.reshape(-1, 4)
 
 
-def outer_first(points: Points, elements: Ints) -> tuple[Points, Ints, Faces]:
+def outer_first(points: Points, elements: Ints) -> tuple[Floats, Ints, Faces]:
     """The nodes in use, those of the boundary first, with the tetrahedra (M, 4) and their boundary
     (F, 3) by their new numbers."""
     faces = boundary(elements)
