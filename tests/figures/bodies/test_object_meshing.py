@@ -39,6 +39,7 @@ def test_remeshing_makes_even_triangles():
 
 
 def test_tetrahedra_fill_the_solid_with_its_surface_first():
+    pytest.importorskip("pyvista")  # pytetwild imports it
     fine = mesh_of(trimesh.creation.icosphere(2, 0.05))
     points, elements, faces = tetrahedralise(fine, 0.02)
     corners = points[elements]
