@@ -25,7 +25,9 @@ __all__ = ["main", "make_columns"]
 WAKING = 0.5  # s; a Ctrl-C that the system gives to another thread does not end a sleep, and is noticed after it
 
 
-def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) -> list[Column]:
+def make_columns(
+    checkpoint: str, compare: Sequence[str], geometry: str | None, material: str | None = None
+) -> list[Column]:
     """A column for each checkpoint. A shape from a file is fitted to the body of the first model, and printed how.
 
     `InputError` for checkpoints and shapes that cannot be read.
@@ -33,7 +35,7 @@ def make_columns(checkpoint: str, compare: Sequence[str], geometry: str | None) 
     models = {name: odeform.load(name) for name in dict.fromkeys((checkpoint, *compare))}
     if geometry is not None and takes_user_bodies(models[checkpoint]):
         print(f"{geometry}: making a soft body of it...", flush=True)
-        body = read_user_body(geometry)
+        body = read_user_body(geometry, material)
         print(describe_user_body(body))
         columns = [Column(_label(m, None), m, m.rest, origin=name) for name, m in models.items()]
         return with_user_body(columns, body)
@@ -60,7 +62,7 @@ def _serve(args: argparse.Namespace) -> None:
             f"--host {args.host}: whoever reaches this address can drive the viewer and write recordings; add --expose "
             "if that is meant"
         )
-    columns = make_columns(args.checkpoint, args.compare, args.geometry)
+    columns = make_columns(args.checkpoint, args.compare, args.geometry, args.material)
     if args.sequence:
         columns.append(truth_column(args.sequence))
     from odeform_viz.app import App
@@ -107,6 +109,11 @@ def _parser() -> argparse.ArgumentParser:
         "--geometry",
         metavar="FILE",
         help="move this shape instead of the trained body: a mesh, points or Gaussian splats (bundled: volleyball)",
+    )
+    show.add_argument(
+        "--material",
+        metavar="NAME",
+        help="of a shape that becomes a soft body: a name, or KPA:DENSITY (see `odeform predict --help`)",
     )
     show.add_argument(
         "--sequence", metavar="PATH", help="show a sequence of a data set, DATASET/NAME, as the truth beside the models"

@@ -8,6 +8,7 @@ import numpy as np
 
 from odeform.models.base import Predictor
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
+from odeform.simulation.objects.materials import material_of
 from odeform_viz.columns import Column
 from odeform_viz.fitting import readable_shape
 
@@ -23,20 +24,24 @@ __all__ = [
 ]
 
 
-def read_user_body(name: str | Path) -> UserBody:
-    """The body of a file; see `odeform.models.modal.user_body.user_body`. `InputError` for a file without one."""
+def read_user_body(name: str | Path, material: str | None = None) -> UserBody:
+    """The body of a file; see `odeform.models.modal.user_body.user_body`, and `material_of` for its material.
+
+    `InputError` for a file without one.
+    """
     geometry, _ = readable_shape(name)
-    body = user_body(geometry, Path(name).name)
+    given = None if material is None else material_of(material)
+    body = user_body(geometry, Path(name).name, material=given)
     return replace(body, fit=replace(body.fit, origin=str(name)))
 
 
 def describe_user_body(body: UserBody) -> str:
-    """Returns one line: points, size and material."""
+    """Returns one line: points, size, weight and material, and what was done to make a solid of it."""
     size = 1e3 * float(np.ptp(body.item.settled, axis=0).max())
     points = len(body.fit.geometry.points)
     return (
         f"{body.item.name}: {points:,} points move with a soft body of {body.item.surface_count:,} surface vertices, "
-        f"{size:.0f} mm long, of the {body.like}'s material"
+        f"{size:.0f} mm long and {1e3 * body.item.mass:,.0f} g, {body.made}"
     )
 
 

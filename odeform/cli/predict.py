@@ -21,6 +21,7 @@ HELP = "Predict one motion and write it to a file"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     from odeform.formats.registry import motion_endings
+    from odeform.simulation.objects.materials import CHOICE
 
     add_checkpoint(parser)
     parser.add_argument("--out", required=True, metavar="FILE", help=f"file to write: {motion_endings()}")
@@ -28,6 +29,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--geometry",
         metavar="FILE",
         help="mesh, points or Gaussian splats to move, or volleyball (bundled); default: the trained body",
+    )
+    parser.add_argument(
+        "--material",
+        metavar="NAME",
+        help=f"of a shape that becomes a body: {', '.join(CHOICE)}, or KPA:DENSITY, as 60:120 (default: the softest of "
+        "these under which it stands)",
     )
     parser.add_argument(
         "--set",
@@ -58,6 +65,7 @@ def run(args: argparse.Namespace) -> None:
     from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
     from odeform.models.registry import load, observations
     from odeform.motion.caveats import caveats
+    from odeform.simulation.objects.materials import material_of
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
@@ -67,9 +75,11 @@ def run(args: argparse.Namespace) -> None:
     if args.geometry is None and not predictor.rescales_input:
         _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
     elif args.geometry is not None and takes_user_bodies(predictor):
-        predictor = UserBodyPredictor(predictor, user_body(read_shape(args.geometry)[0], Path(args.geometry).name))
+        material = None if args.material is None else material_of(args.material)
+        own = user_body(read_shape(args.geometry)[0], Path(args.geometry).name, material=material)
+        predictor = UserBodyPredictor(predictor, own)
         fit, settings = predictor.user_body.fit, {**predictor.parameters_like(), **settings}
-        _note(f"{args.geometry}: its material and forces are those of the {predictor.user_body.like}")
+        _note(f"{args.geometry}: {predictor.user_body.made}")
     elif args.geometry is not None:
         shape, region = read_shape(args.geometry)
         as_it_is = None if predictor.rescales_input else Similarity(rotation=UPRIGHT[shape.up or "+z"])

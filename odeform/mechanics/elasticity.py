@@ -14,7 +14,7 @@ from scipy.sparse.linalg import eigsh
 from odeform.mechanics.hinges import hinge_stiffness
 from odeform.types import Floats, Ints, Perpoint, Points
 
-__all__ = ["ElasticModes", "elastic_modes", "rigid_modes", "tangent_stiffness"]
+__all__ = ["ElasticModes", "elastic_forces", "elastic_modes", "rigid_modes", "tangent_stiffness"]
 
 SHIFT = -2e3  # 1/s^2, where eigenvalues are searched from: below those of bodies that hardly stand
 SPARE = 8  # eigenvectors computed besides those wanted; six are rigid
@@ -46,8 +46,7 @@ def tangent_stiffness(
         lame = young * poisson / (1.0 - poisson**2)  # plane stress
         sides, size = _flattened(_sides(points, elements)), 3.0 * thickness
     volume = size * np.abs(np.linalg.det(sides)) / 6.0
-    inverse = np.linalg.inv(sides)
-    slopes = np.concatenate([-inverse.sum(axis=1)[:, None], inverse], axis=1)  # of the shape functions
+    slopes = _slopes(sides)
     blocks = _blocks(slopes, np.asarray(positions, dtype=float)[elements], lame, shear)
     blocks *= volume[:, None, None, None, None]
     stiffness = _assembled(blocks, elements, len(points))
@@ -55,6 +54,32 @@ def tangent_stiffness(
         rigidity = young * thickness**3 / (12.0 * (1.0 - poisson**2))
         stiffness = stiffness + _assembled(*hinge_stiffness(points, elements, positions, rigidity), len(points))
     return stiffness
+
+
+def elastic_forces(points: Points, elements: Ints, positions: Points, young: float, poisson: float) -> Points:
+    """(N, 3) N: what tetrahedra (M, 4), without stress at `points` (N, 3) m, exert on their nodes at `positions`."""
+    lame, shear = young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson))
+    sides = _sides(points, elements)
+    volume = np.abs(np.linalg.det(sides)) / 6.0
+    slopes = _slopes(sides)
+    gradient, stress = _stress(slopes, np.asarray(positions, dtype=float)[elements], lame, shear)
+    found = np.zeros(np.shape(points))
+    np.add.at(found, elements, -volume[:, None, None] * (slopes @ (gradient @ stress).transpose(0, 2, 1)))
+    return found
+
+
+def _slopes(sides: Floats) -> Floats:
+    """(M, a, d) slopes of the shape functions of elements with sides (M, d, d)."""
+    inverse = np.linalg.inv(sides)
+    return np.concatenate([-inverse.sum(axis=1)[:, None], inverse], axis=1)
+
+
+def _stress(slopes: Floats, corners: Floats, lame: float, shear: float) -> tuple[Floats, Floats]:
+    """(M, 3, d) deformation gradients, and (M, d, d) second Piola-Kirchhoff stresses."""
+    gradient = np.einsum("mai,maj->mij", corners, slopes)
+    unit = np.eye(slopes.shape[2])
+    strain = 0.5 * (gradient.transpose(0, 2, 1) @ gradient - unit)
+    return gradient, lame * np.trace(strain, axis1=1, axis2=2)[:, None, None] * unit + 2.0 * shear * strain
 
 
 def _sides(points: Points, elements: Ints) -> Floats:
@@ -70,10 +95,7 @@ def _flattened(sides: Floats) -> Floats:
 
 def _blocks(slopes: Floats, corners: Floats, lame: float, shear: float) -> Floats:
     """(M, a, 3, a, 3) stiffness of elements with a corners for each unit of their volume."""
-    gradient = np.einsum("mai,maj->mij", corners, slopes)
-    unit = np.eye(slopes.shape[2])
-    strain = 0.5 * (gradient.transpose(0, 2, 1) @ gradient - unit)
-    stress = lame * np.trace(strain, axis1=1, axis2=2)[:, None, None] * unit + 2.0 * shear * strain
+    gradient, stress = _stress(slopes, corners, lame, shear)
     carried = slopes @ gradient.transpose(0, 2, 1)
     blocks = lame * np.einsum("mai,mbj->maibj", carried, carried)
     blocks += shear * np.einsum("mbi,maj->maibj", carried, carried)

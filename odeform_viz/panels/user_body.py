@@ -23,8 +23,8 @@ from odeform_viz.user_bodies import (
 
 __all__ = ["UserBodyPanel"]
 
-TRAINED = "The trained bodies. A closed mesh, or points or splats of a solid, can be pushed as well."
-WORKING = "**{}** is being repaired, filled with tetrahedra and laid on the floor. This takes up to a minute."
+TRAINED = "The trained bodies. A mesh with any defects, or points or splats of a solid, can be pushed as well."
+WORKING = "**{}** is being filled with tetrahedra and laid on the floor. This takes some seconds."
 
 
 class UserBodyPanel(Panel):

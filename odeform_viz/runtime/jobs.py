@@ -148,9 +148,10 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
 
 def simulate_user_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
     """Simulates a motion of a soft object (`SoftObject`) that is none of the scene's; see `simulate_motion`."""
+    from odeform.simulation.objects.settling import rested
     from odeform.simulation.scenes.contact_force import UNTIL, simulate_object
 
-    return simulate_object(item, parameters, rate, report=report, until=UNTIL)
+    return simulate_object(rested(item), parameters, rate, report=report, until=UNTIL)
 
 
 def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:

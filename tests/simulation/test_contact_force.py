@@ -7,13 +7,14 @@ import pytest
 
 from odeform.errors import InputError
 from odeform.geometry.contact import CONE, RADIUS, nearest_on, touching_centre
+from odeform.geometry.solids.tetrahedra import boundary
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.settling import settle
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
-from odeform.simulation.objects.tetrahedra import CUBE, boundary
 from odeform.simulation.scenes.contact_force import PULSE, SCENE, sample, simulate_object
 from odeform.simulation.scenes.registry import get_scene
+from odeform_figures.bodies.tetrahedra import CUBE
 
 SIDE, CELLS = 0.06, 3  # m; cells along an edge
 MATERIAL = SoftMaterial(80e3, 0.3, 500.0, 0.004, 0.5, "rubber")

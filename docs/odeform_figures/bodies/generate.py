@@ -9,14 +9,14 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
 from odeform.simulation.objects.catalog import OBJECTS
-from odeform.simulation.objects.level_set import surface_of
 from odeform.simulation.objects.materials import FORCES, MATERIALS
-from odeform.simulation.objects.remesh import remesh
 from odeform.simulation.objects.settling import settle
 from odeform.simulation.objects.soft_object import SoftObject
-from odeform.simulation.objects.tetrahedra import small_solid
 from odeform.simulation.objects.thickness import median_thickness
 from odeform.types import Mesh, Perpoint, Points
+from odeform_figures.bodies.level_set import surface_of
+from odeform_figures.bodies.remesh import remesh
+from odeform_figures.bodies.tetrahedra import small_solid
 
 __all__ = ["COUNT", "generate", "proportions", "surface"]
 
@@ -29,7 +29,7 @@ def generate(name: str, variant: int | None = None, factors: Mapping[str, float]
     """An instance of the class `name`, settled on the floor; `variant` is the seed of its proportions, None standard.
 
     `factors` are the proportions themselves, by the names of the class's `RANGES`, in place of a seed. Needs the extra
-    `objects`. Raises `InputError` for an unknown name and `SimulationError` if it is too large or keeps moving.
+    `dev`. Raises `InputError` for an unknown name and `SimulationError` if it is too large or keeps moving.
     """
     if name not in OBJECTS:
         raise InputError(f"object {name!r}: expected one of {', '.join(OBJECTS)}")

@@ -20,7 +20,7 @@ from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.files import arrays_of, object_of
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.scenes.contact_force import simulate_object
-from odeform.types import Mesh, MotionSequence
+from odeform.types import MotionSequence
 
 __all__ = ["INSTANCE", "LEFT_OUT", "SCAN", "UnseenShape", "instance", "pushes_of", "scan", "shape_file", "simulated"]
 
@@ -50,14 +50,12 @@ def instance(key: str, name: str, factors: Mapping[str, float]) -> UnseenShape:
 
 
 def scan(path: Path) -> UnseenShape:
-    """The body of a mesh, aligned automatically. `InputError` for a file that holds no mesh of a solid."""
+    """The body of a mesh, points or splats, aligned automatically. `InputError` for a file that holds no solid."""
     from odeform.simulation.objects.from_mesh import placed_object
+    from odeform.simulation.objects.settling import rested
 
-    mesh = read_geometry(path)
-    if not isinstance(mesh, Mesh):
-        raise InputError(f"shape {path}: expected a mesh")
-    placed = placed_object(mesh, path.stem)
-    return UnseenShape(path.stem, SCAN, placed.like, placed.item)
+    placed = placed_object(read_geometry(path), path.stem)
+    return UnseenShape(path.stem, SCAN, placed.like, rested(placed.item))
 
 
 def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:

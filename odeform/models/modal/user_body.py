@@ -23,12 +23,11 @@ from odeform.models.per_object import PerObject
 from odeform.motion.recent import Recent
 from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, Parameters
-from odeform.simulation.objects.soft_object import SoftObject
-from odeform.types import Floats, GaussianSplats, Geometry, Mesh, Points, Times
+from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
+from odeform.types import Floats, Geometry, Mesh, Points, Times
 
 __all__ = ["UserBody", "UserBodyPredictor", "resting_body", "takes_user_bodies", "user_body"]
 
-OPAQUE = 0.3  # opacity below which a splat does not outline a body
 SIZES = 8  # motions whose size is kept
 NEIGHBOURS = 4  # nodes that carry a point of the shape
 
@@ -40,26 +39,30 @@ class UserBody:
     item: SoftObject
     body: ElasticBody
     like: str
-    """The trained object whose material and forces it has."""
+    """The trained object whose contact parameters it has."""
     fit: FittedShape
     """The shape as it was given, placed where the body rests."""
+    made: str = ""
+    """How it was made, in one line: the material, and what a solid has that the shape does not have."""
 
 
-def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) -> UserBody:
-    """Make a soft body of a shape. It takes 5 to 20 seconds.
+def user_body(
+    geometry: Geometry, name: str = "shape", up: str | None = None, material: SoftMaterial | None = None
+) -> UserBody:
+    """Make a soft body of a shape: a mesh with any defects, or points or splats that outline a solid.
 
-    Splats and points without faces get a closed surface around them first. A defective mesh is repaired. `up` is the
-    axis of the shape that points up, as "+y"; by default what its file says, else a guess. Needs the extra `objects`.
+    It takes about five seconds. `up` is the axis of the shape that points up, as "+y"; by default what its file says,
+    else a guess. `material` is by default the softest of those to choose from under which it stands.
 
     Raises:
-        InputError: for a shape that encloses no volume, holds several bodies, or does not come to rest on the floor.
+        InputError: for a shape that encloses no volume, holds several bodies, or does not stand.
     """
     from odeform.simulation.objects.from_mesh import placed_object  # looking at trained bodies needs no simulator
 
     try:
-        placed = placed_object(_surface(geometry), name, up=up or geometry.up or None)
+        placed = placed_object(geometry, name, up=up, material=material)
     except InputError as error:
-        raise InputError(f"{name}: {str(error).removeprefix(f'mesh {name}: ')}") from None
+        raise InputError(f"{name}: {str(error).removeprefix(f'{name}: ')}") from None
     item = placed.item
     weights = np.full(item.surface_count, 1.0 / item.surface_count)
     free, settled = (nodes[: item.surface_count] for nodes in (item.points, item.settled))
@@ -70,24 +73,16 @@ def user_body(geometry: Geometry, name: str = "shape", up: str | None = None) ->
     sagging = _carried(item.settled - stiff, stiff, np.asarray(shape.points, dtype=float))
     shape = replace(shape, points=(shape.points + sagging).astype(np.float32))
     fit = FittedShape(geometry, None, laid, shape, None, 0.0)
-    return UserBody(item, elastic_body(item), placed.like, fit)
+    size = float(np.ptp(item.settled, axis=0).max())
+    return UserBody(
+        item, elastic_body(item), placed.like, fit, f"of {placed.material}; {placed.changes.describe(size)}"
+    )
 
 
 def resting_body(item: SoftObject, like: str) -> UserBody:
     """A soft object as it rests on the floor, whose shape is its own surface."""
     rest = item.rest_mesh()
     return UserBody(item, elastic_body(item), like, FittedShape(rest, None, Similarity(), rest, None, 0.0))
-
-
-def _surface(geometry: Geometry) -> Mesh:
-    if isinstance(geometry, Mesh):
-        return geometry
-    from odeform.simulation.objects.enclosing import enclosing_surface
-
-    points = np.asarray(geometry.points, dtype=float)
-    if isinstance(geometry, GaussianSplats):
-        points = points[geometry.opacities > OPAQUE]
-    return enclosing_surface(points)
 
 
 def _carried(
@@ -178,9 +173,7 @@ class UserBodyPredictor(ModalModel):
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
-        return (
-            f"its motion follows from its shape, and from the {self.user_body.like}'s material and contact parameters"
-        )
+        return f"its motion follows from its shape, its material, and the {self.user_body.like}'s contact parameters"
 
     def _describe_error(self) -> str:
         if self._band is None:

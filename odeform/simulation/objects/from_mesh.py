@@ -1,85 +1,101 @@
-"""Soft objects of untrained meshes, such as scans."""
+"""Soft objects of shapes of the user's own: meshes, such as scans, points and splats."""
 
-import contextlib
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.similarity import Similarity
+from odeform.geometry.solids.solid import Changes, solid_inside
 from odeform.geometry.upright import guess_up
-from odeform.simulation.errors import SimulationError
+from odeform.mechanics.standing import lying, sag, standing
 from odeform.simulation.objects.canonical import most_like, plausible_scale
-from odeform.simulation.objects.materials import FORCES, MATERIALS
-from odeform.simulation.objects.repair import even_surface, repaired
-from odeform.simulation.objects.settling import settle
-from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
-from odeform.simulation.objects.tetrahedra import small_solid
+from odeform.simulation.objects.materials import CHOICE, forces_on
+from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject, nodal_masses
 from odeform.simulation.objects.thickness import median_thickness
-from odeform.types import Faces, Ints, Mesh, Points
+from odeform.types import Geometry, Ints, Mesh, Points
 
 __all__ = ["PlacedObject", "placed_object"]
 
-COUNTS = (1100, 800, 550)  # surface vertices to try: shapes with thin walls need more nodes than smooth ones
-FACTORS = (2.0, 3.0)  # see `small_solid`
+SAMPLES = 1200  # points of the surface that are compared with the seven objects
+SAGS = 0.1  # of its height, by which a body may give way under its weight
 
 
 @dataclass(frozen=True, eq=False)
 class PlacedObject:
-    """A soft object, and how the mesh that it was made of became it."""
+    """A soft object, and how the shape that it was made of became it."""
 
     item: SoftObject
-    """Its nodes are in metres, at most 1,500 of them."""
+    """Its nodes are in metres."""
     transform: Similarity
-    """Maps the mesh to the nodes of `item` without stress."""
+    """Maps the shape to the nodes of `item` without stress."""
     like: str
-    """The object whose orientation, material and forces it has."""
+    """The object whose orientation it has."""
+    changes: Changes
+    """What was done to make a solid of it."""
+    material: str
+    """What it is of, and why, as in "of foam"."""
 
 
 def placed_object(
-    mesh: Mesh,
+    geometry: Geometry,
     name: str = "object",
     like: str | None = None,
     material: SoftMaterial | None = None,
     up: str | None = None,
     unit: float | None = None,
 ) -> PlacedObject:
-    """Makes a solid of a closed or nearly closed surface, repaired, turned, and settled on the floor.
+    """Makes a solid inside of a shape, turned, and at rest on the floor.
 
     Args:
-        mesh: In any unit and axes. Defects are repaired: seams, holes, self-intersections, parts that overlap.
+        geometry: In any unit and axes. See `odeform.geometry.solids.solid.solid_inside`.
         name: That of the object.
-        like: The object whose orientation, material and forces it gets; default: the most similar solid one.
-        material: Instead of that of `like`.
-        up: Axis of the mesh that points up, as "+y"; default: what its file says, else y if it stands better on
+        like: The object whose orientation it gets; default: the most similar solid one.
+        material: Default: the softest of `CHOICE` under which it stands.
+        up: Axis of the shape that points up, as "+y"; default: what its file says, else y if it stands better on
             it, else z.
-        unit: Metres of one unit of the mesh; default: guessed, see `plausible_scale`.
+        unit: Metres of one unit of the shape; default: guessed, see `plausible_scale`.
 
-    Needs the extra `objects`. Raises `InputError` for a mesh that encloses no volume, holds several bodies, or does not
-    come to rest.
+    Raises `InputError` for a shape that encloses no volume, holds several bodies, or does not stand.
     """
     if unit is not None and not 0.0 < unit < np.inf:
         raise InputError(f"unit: expected a positive number of metres, got {unit}")
-    fine = repaired(mesh)
-    surface = even_surface(fine, COUNTS[0])
-    like, rotation = most_like(surface.points, like, up or mesh.up or guess_up(surface))
+    solid = solid_inside(geometry)
+    surface = Mesh(solid.points[: solid.faces.max() + 1], solid.faces)
+    shape = trimesh.Trimesh(surface.points, surface.faces, process=False)
+    even = np.asarray(trimesh.sample.sample_surface(shape, SAMPLES, seed=0)[0])
+    like, rotation = most_like(even, like, up or geometry.up or guess_up(surface))
     scale = plausible_scale(float(np.ptp(surface.points, axis=0).max()), like) if unit is None else unit
-    place = Similarity(scale, rotation, -scale * rotation @ surface.points.mean(axis=0))
-    turned = Mesh(place.points(fine.points), fine.faces)
-    material = MATERIALS[like] if material is None else material
-    try:
-        points, elements, faces = _solid(turned)
-        settled = settle(points, elements, material)
-    except SimulationError as error:
-        raise InputError(f"mesh {name}: it cannot be simulated: {error}") from None
-    thickness = median_thickness(Mesh(points[: faces.max() + 1], faces))
-    item = SoftObject(name, points, elements, faces, settled, material, FORCES[like], thickness)
-    return PlacedObject(item, place, like)
+    turned = scale * (solid.points @ rotation.T)
+    chosen = material or next(iter(CHOICE.values()))
+    rotation = lying(turned, nodal_masses(turned, solid.elements, chosen)) @ rotation
+    place = Similarity(scale, rotation, -scale * rotation @ even.mean(axis=0))
+    points = place.points(solid.points)
+    settled, used, said = _at_rest(points, solid.elements, material, name)
+    thickness = median_thickness(Mesh(points[: solid.faces.max() + 1], solid.faces))
+    mass = float(nodal_masses(points, solid.elements, used).sum())
+    forces = forces_on(used, thickness, mass)
+    item = SoftObject(name, points, solid.elements, solid.faces, settled, used, forces, thickness)
+    return PlacedObject(item, place, like, solid.changes, said)
 
 
-def _solid(fine: Mesh) -> tuple[Points, Ints, Faces]:
-    """Makes a solid with as many surface vertices as a small one can have."""
-    for count in COUNTS[:-1]:
-        with contextlib.suppress(SimulationError):
-            return small_solid(even_surface(fine, count), FACTORS)
-    return small_solid(even_surface(fine, COUNTS[-1]), FACTORS)
+def _at_rest(
+    points: Points, elements: Ints, material: SoftMaterial | None, name: str
+) -> tuple[Points, SoftMaterial, str]:
+    """The nodes (N, 3) m at rest, the material, and its name with the reason."""
+    choice = CHOICE if material is None else {"given": material}
+    for called, one in choice.items():
+        masses = nodal_masses(points, elements, one)
+        if material is None and sag(points, elements, masses, one.young, one.poisson) > SAGS:
+            continue
+        settled, rests = standing(points, elements, masses, one.young, one.poisson)
+        if rests and (material is not None or np.ptp(settled[:, 2]) > (1.0 - SAGS) * np.ptp(points[:, 2])):
+            shift = masses @ settled / masses.sum() * [1.0, 1.0, 0.0]
+            return settled - shift, one, _described(one, "" if material else called)
+    raise InputError(f"{name}: it does not stand: parts of it collapse under its weight, also of {list(choice)[-1]}")
+
+
+def _described(material: SoftMaterial, chosen: str) -> str:
+    figures = f"{1e-3 * material.young:g} kPa and {material.density:g} kg/m^3"
+    return f"{chosen} ({figures}), the softest material under which it stands" if chosen else figures

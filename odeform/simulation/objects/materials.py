@@ -1,8 +1,12 @@
-"""The materials of the seven objects, and the forces that dent each visibly."""
+"""The materials of the seven objects and those to choose from, and the forces that dent a body visibly."""
 
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.geometry.contact import RADIUS
 from odeform.simulation.objects.soft_object import SoftMaterial
 
-__all__ = ["FORCES", "MATERIALS"]
+__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_of"]
 
 SILICONE = "silicone Ecoflex 00-50, cast solid: 83 kPa at 100 %, 1,070 kg/m^3 (Smooth-On, technical bulletin)"
 FOAM = "flexible polyurethane foam: 10 to 200 kPa, 25 to 300 kg/m^3 (Gibson and Ashby 1997, Cellular Solids, ch. 5)"
@@ -29,3 +33,49 @@ FORCES: dict[str, tuple[float, float]] = {
     "pillow": (2.0, 6.0),
 }
 """Newton, weakest and strongest."""
+
+PLUSH = (
+    "polyester filling, as the softest flexible foams: 10 kPa and more, 25 kg/m^3 and more (Gibson and Ashby, ch. 5)"
+)
+DOUGH = (
+    "wheat flour dough at small strain: 10 to 40 kPa, 1,100 to 1,200 kg/m^3 (Uthayakumaran et al. 2002, Rheol. Acta 41)"
+)
+NATURAL = "soft natural rubber of Shore A 20: 0.7 MPa (Gent 1958, Rubber Chem. Technol. 31, 896), 1,000 kg/m^3"
+BOARD = "corrugated board across its flutes, about 1 MPa and 150 kg/m^3 (an estimate of its order of magnitude)"
+
+CHOICE: dict[str, SoftMaterial] = {
+    "plush": SoftMaterial(12e3, 0.2, 50.0, 0.005, 0.6, PLUSH),
+    "dough": SoftMaterial(25e3, 0.4, 1150.0, 0.005, 0.6, DOUGH),
+    "foam": SoftMaterial(60e3, 0.3, 120.0, 0.004, 0.6, FOAM),
+    "silicone": SoftMaterial(83e3, 0.4, 1070.0, 0.004, 0.6, SILICONE),
+    "rubber": SoftMaterial(700e3, 0.4, 1000.0, 0.003, 0.8, NATURAL),
+    "cardboard": SoftMaterial(1e6, 0.2, 150.0, 0.003, 0.4, BOARD),
+}
+"""What a shape of the user's own can be of, from soft to stiff."""
+DENT, LIFTS, WEAKEST = 0.12, 3.0, 0.3
+"""The strongest force presses a sphere into a half-space by that part of the thickness (Hertz), or is that many weights
+of the body, whichever is less; the weakest is that part of it."""
+
+
+def material_of(text: str) -> SoftMaterial:
+    """A material by name, or by Young's modulus in kPa and density in kg/m^3, as "60:120". `InputError` for others."""
+    if text in CHOICE:
+        return CHOICE[text]
+    try:
+        young, density = (float(part) for part in text.split(":"))
+    except ValueError:
+        young = density = 0.0
+    if not (0.1 <= young <= 1e5 and 1.0 <= density <= 2e4):
+        raise InputError(
+            f"material {text!r}: expected one of {', '.join(CHOICE)}, or KPA:DENSITY, as 60:120, of 0.1 to 100,000 kPa "
+            "and 1 to 20,000 kg/m^3"
+        )
+    return SoftMaterial(1e3 * young, 0.3, density, 0.004, 0.6, "given")
+
+
+def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[float, float]:
+    """Newton, weakest and strongest on a body of that `thickness` in m and `mass` in kg."""
+    stiffness = material.young / (1.0 - material.poisson**2)
+    dents = 4.0 / 3.0 * stiffness * np.sqrt(RADIUS) * (DENT * thickness) ** 1.5
+    strongest = float(min(dents, LIFTS * 9.81 * mass))
+    return WEAKEST * strongest, strongest

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from odeform.geometry.contact import RADIUS, checked_contact
+from odeform.geometry.solids.tetrahedra import inside_out
 from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
 from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.contacts import MASS, YOUNG, vector_of
@@ -14,7 +15,6 @@ from odeform.simulation.errors import SimulationError
 from odeform.simulation.glyphs import Arrow
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.objects.soft_object import SoftObject
-from odeform.simulation.objects.tetrahedra import inside_out
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
 from odeform.simulation.stepping import Rest, run

@@ -1,6 +1,4 @@
-"""From signed distances and foreign meshes to solids."""
-
-import sys
+"""From foreign meshes to soft objects."""
 
 import numpy as np
 import pytest
@@ -12,17 +10,10 @@ from odeform.simulation.objects.canonical import most_like, plausible_scale
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.files import arrays_of, read_object
 from odeform.simulation.objects.from_mesh import placed_object
-from odeform.simulation.objects.level_set import surface_of
-from odeform.simulation.objects.remesh import remesh
-from odeform.simulation.objects.repair import even_surface, repaired
+from odeform.simulation.objects.materials import CHOICE, forces_on, material_of
 from odeform.simulation.objects.settling import settle
-from odeform.simulation.objects.tetrahedra import boundary, tetrahedralise
 from odeform.simulation.objects.thickness import thicknesses
-from odeform.types import Mesh, Perpoint, Points
-
-
-def ball(points: Points) -> Perpoint:
-    return np.linalg.norm(points - [0.01, 0.02, 0.03], axis=1) - 0.05
+from odeform.types import Mesh
 
 
 def mesh_of(shape: trimesh.Trimesh) -> Mesh:
@@ -31,39 +22,6 @@ def mesh_of(shape: trimesh.Trimesh) -> Mesh:
 
 def shape_of(mesh: Mesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(mesh.points, mesh.faces, process=False)
-
-
-def test_a_level_set_is_closed_and_lies_on_the_surface():
-    pytest.importorskip("manifold3d")
-    mesh = surface_of(ball, 0.008)
-    assert shape_of(mesh).is_watertight
-    assert shape_of(mesh).volume == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=0.05)
-    assert np.abs(ball(mesh.points)).max() < 1e-3
-
-
-def test_remeshing_makes_even_triangles():
-    fine = trimesh.creation.icosphere(4, 0.05)
-    even = shape_of(remesh(mesh_of(fine), 200))
-    lengths = even.edges_unique_length
-    assert even.is_watertight
-    assert len(even.vertices) == 200
-    assert lengths.std() < 0.2 * lengths.mean()
-
-
-def test_tetrahedra_fill_the_solid_with_its_surface_first():
-    pytest.importorskip("pytetwild")
-    fine = mesh_of(trimesh.creation.icosphere(2, 0.05))
-    points, elements, faces = tetrahedralise(fine, 0.02)
-    corners = points[elements]
-    volume = np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 6.0
-    assert volume == pytest.approx(shape_of(fine).volume, rel=0.02)
-    assert set(np.unique(faces)) == set(range(faces.max() + 1))
-    assert shape_of(Mesh(points, faces)).volume == pytest.approx(volume)
-
-
-def test_the_boundary_of_one_tetrahedron_faces_outward():
-    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    assert shape_of(Mesh(corners, boundary(np.array([[0, 1, 2, 3]])))).volume == pytest.approx(1.0 / 6.0)
 
 
 def test_the_thickness_of_a_ball_is_its_diameter():
@@ -100,87 +58,39 @@ def test_units_are_guessed(extent: float, metres: float):
     assert extent * plausible_scale(extent, "donut") == pytest.approx(metres, rel=0.01)
 
 
-def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "manifold3d", None)
-    with pytest.raises(InputError, match=r"meshing needs manifold3d.*odeform\[objects\]"):
-        surface_of(ball, 0.02)
+@pytest.mark.parametrize("text", ["wood", "60", "60:120:3", "0:100", "60:1e9"])
+def test_a_material_is_a_name_or_two_numbers(text: str):
+    assert material_of("foam") is CHOICE["foam"]
+    assert (material_of("60:120").young, material_of("60:120").density) == (60e3, 120.0)
+    with pytest.raises(InputError, match="expected one of plush, dough, foam"):
+        material_of(text)
 
 
-def sheet() -> trimesh.Trimesh:
-    x, y = np.meshgrid(np.linspace(0, 1, 8), np.linspace(0, 1, 8))
-    plane = np.stack([x.ravel(), y.ravel(), 0.1 * np.sin(3 * x.ravel())], axis=1)
-    quads = np.array([[i, i + 1, i + 9, i + 8] for i in range(56) if i % 8 != 7])
-    return trimesh.Trimesh(plane, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
+def test_materials_are_listed_from_soft_to_stiff_with_their_sources():
+    moduli = [material.young for material in CHOICE.values()]
+    assert moduli == sorted(moduli)
+    assert all(material.source for material in CHOICE.values())
 
 
-def flat() -> trimesh.Trimesh:
-    shape = trimesh.creation.icosphere(1, 0.05)
-    return trimesh.Trimesh(shape.vertices * [1.0, 1.0, 0.0], shape.faces, process=False)
-
-
-def two_balls() -> trimesh.Trimesh:
-    other = trimesh.creation.icosphere(2, 0.05)
-    other.apply_translation([0.3, 0, 0])
-    return trimesh.util.concatenate([trimesh.creation.icosphere(2, 0.05), other])
-
-
-def not_finite() -> trimesh.Trimesh:
-    shape = trimesh.creation.icosphere(1, 0.05)
-    shape.vertices[3] = np.nan
-    return shape
-
-
-@pytest.mark.parametrize(
-    ("shape", "reason"),
-    [
-        (lambda: trimesh.Trimesh(np.eye(3), [[0, 1, 2]], process=False), "at least 4 triangles"),
-        (flat, "flat"),
-        (sheet, "encloses no volume"),
-        (two_balls, "2 separate bodies"),
-        (not_finite, "not finite"),
-    ],
-    ids=["triangle", "flat", "sheet", "two", "nan"],
-)
-def test_what_is_no_solid_is_refused_with_the_reason(shape, reason: str):
-    pytest.importorskip("pytetwild")
-    with pytest.raises(InputError, match=reason):
-        repaired(mesh_of(shape()))
-
-
-def holed() -> trimesh.Trimesh:
-    shape = trimesh.creation.icosphere(3, 0.05)
-    return trimesh.Trimesh(shape.vertices, shape.faces[5:], process=False)
-
-
-def soup() -> trimesh.Trimesh:
-    shape = trimesh.creation.icosphere(3, 0.05)
-    return trimesh.Trimesh(shape.vertices[shape.faces].reshape(-1, 3), np.arange(3 * len(shape.faces)).reshape(-1, 3))
-
-
-def overlapping() -> trimesh.Trimesh:
-    other = trimesh.creation.icosphere(2, 0.04)
-    other.apply_translation([0.05, 0, 0])
-    return trimesh.util.concatenate([trimesh.creation.icosphere(3, 0.05), other])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("shape", [holed, soup, overlapping])
-@pytest.mark.parametrize("scale", [1.0, 1e-5, 1e5])
-def test_defects_are_repaired(shape, scale: float):
-    mesh = mesh_of(shape())
-    closed = shape_of(even_surface(repaired(Mesh(mesh.points * scale, mesh.faces)), 400))
-    assert closed.is_watertight
-    assert np.ptp(closed.vertices, axis=0) == pytest.approx(scale * np.ptp(mesh.points, axis=0), rel=0.05)
+def test_forces_follow_stiffness_until_weight_limits_them():
+    foam = CHOICE["foam"]
+    weakest, strongest = forces_on(foam, 0.02, 10.0)
+    assert 0.0 < weakest < strongest == pytest.approx(forces_on(foam, 0.08, 10.0)[1] / 8.0)
+    assert forces_on(foam, 0.02, 0.01)[1] == pytest.approx(3.0 * 9.81 * 0.01)
 
 
 @pytest.mark.slow
 def test_a_mesh_becomes_a_solid_of_its_size():
     shape = trimesh.creation.torus(60.0, 25.0)  # millimetres
-    item = placed_object(mesh_of(shape), "ring").item
+    placed = placed_object(mesh_of(shape), "ring")
+    item = placed.item
+    assert item.material == CHOICE["plush"]
+    assert placed.material.startswith("plush (12 kPa and 50 kg/m^3), the softest")
     assert item.name == "ring"
     assert np.ptp(item.settled, axis=0) == pytest.approx([0.17, 0.17, 0.05], abs=0.004)
     assert shape_of(item.rest_mesh()).is_watertight
-    assert len(item.points) <= 1500
+    assert len(item.points) <= 2500
+    assert np.ptp(item.settled[:, 2]) > 0.9 * np.ptp(item.points[:, 2])
 
 
 @pytest.mark.slow

@@ -54,7 +54,7 @@ def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predicto
     assert curves.error is None
     assert curves.error_band is None
     said = describe_column(column, 0.05)
-    assert "model error: unknown, this shape was not trained" in said
+    assert "error expected: not known, this shape was not trained" in said
     assert "test error" not in said
     assert "90 %" not in said
     assert "shape not trained" in summarize(frame)
@@ -67,7 +67,7 @@ def test_the_same_shape_keeps_its_figures(kick: Predictor) -> None:
     frame = shown(kick, "ball")
     (column,) = frame.columns
     assert not column.untrained
-    assert "model error here ≈" in describe_column(column, 0.05)
+    assert "error expected here: half below" in describe_column(column, 0.05)
     assert "inside the trained range" in summarize(frame)
     assert "not trained" not in summarize(frame) + title_of(column, 1e3)
 

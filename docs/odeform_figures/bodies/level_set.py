@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
+import manifold3d
 import numpy as np
 
-from odeform.simulation.objects.libraries import manifold3d
 from odeform.types import Floats, Ints, Mesh, Perpoint, Points
 
 __all__ = ["surface_of"]
@@ -33,7 +33,7 @@ def surface_of(distance: Callable[[Points], Perpoint], edge: float) -> Mesh:
         line = plane[0] + (plane[1] - plane[0]) * min(max(v - j, 0.0), 1.0)
         return float(line[0] + (line[1] - line[0]) * min(max(w - k, 0.0), 1.0))
 
-    solid = manifold3d().Manifold.level_set(inside, [*low, *high], edge, 0.0, -1.0).to_mesh()
+    solid = manifold3d.Manifold.level_set(inside, [*low, *high], edge, 0.0, -1.0).to_mesh()
     return Mesh(np.asarray(solid.vert_properties[:, :3], dtype=float), np.asarray(solid.tri_verts, dtype=np.int32))
 
 

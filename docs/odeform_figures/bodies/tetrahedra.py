@@ -5,20 +5,20 @@ Hu et al. 2020, "Fast tetrahedral meshing in the wild".
 
 import contextlib
 import tempfile
+from importlib import import_module
+from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
 from scipy.spatial import KDTree
 
+from odeform.geometry.solids.tetrahedra import outer_first, outward
 from odeform.simulation.errors import SimulationError
-from odeform.simulation.objects.libraries import pytetwild
 from odeform.types import Faces, Floats, Ints, Mesh, Points
 
-__all__ = ["boundary", "inside_out", "small_solid", "tetrahedralise"]
+__all__ = ["CUBE", "small_solid", "tetrahedralise"]
 
 ENVELOPE = 5e-4  # largest distance of the new surface from the old one, relative to the diagonal of the bounding box
 GROWTH = 8.0  # metres by which the edges inside lengthen for each metre of depth
-SIDES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])  # of a tetrahedron, outward
 CUBE = np.array([[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]])
 """Six tetrahedra of a cube; bit 2, 1 and 0 of a corner are its steps along x, y and z."""
 
@@ -48,7 +48,8 @@ def tetrahedralise(surface: Mesh, edge: float) -> tuple[Points, Ints, Faces]:
     """
     points = np.array(surface.points, dtype=float, order="C")
     nodes, cells, lengths = _lengths(points, edge)
-    mesher = pytetwild()
+    mesher: Any = import_module("pytetwild")  # it takes a second
+
     # fTetWild leaves a file behind in the working directory
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         nodes, elements = mesher.tetrahedralize(
@@ -61,39 +62,14 @@ def tetrahedralise(surface: Mesh, edge: float) -> tuple[Points, Ints, Faces]:
             bg_tets=cells,
             bg_values=lengths,
         )[:2]
-    return _outer_first(np.asarray(nodes, dtype=float), np.asarray(elements, dtype=np.int64))
+    points = np.asarray(nodes, dtype=float)
+    return outer_first(points, outward(points, np.asarray(elements, dtype=np.int64)))
 
 
 def _quality(points: Points, elements: Ints) -> float:
     """The least volume of a tetrahedron, relative to the cube of its longest edge from one corner; 0.12 if regular."""
     sides = points[elements[:, 1:]] - points[elements[:, :1]]
     return float((np.linalg.det(sides) / 6.0 / np.linalg.norm(sides, axis=2).max(axis=1) ** 3).min())
-
-
-def boundary(elements: Ints) -> Faces:
-    """(F, 3) sides that belong to one tetrahedron only, outward."""
-    sides = elements[:, SIDES].reshape(-1, 3)
-    _, first, count = np.unique(np.sort(sides, axis=1), axis=0, return_index=True, return_counts=True)
-    return sides[np.sort(first[count == 1])]
-
-
-def inside_out(points: Points, elements: Ints) -> Bool[np.ndarray, " elements"]:
-    """(M,) which tetrahedra (M, 4) of points (N, 3) have a negative volume; triangles of shells have none."""
-    if elements.shape[1] == 3:
-        return np.zeros(len(elements), dtype=bool)
-    corners = points[elements]
-    return np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0.0
-
-
-def _outer_first(nodes: Points, elements: Ints) -> tuple[Points, Ints, Faces]:
-    inverted = inside_out(nodes, elements)
-    elements[inverted] = elements[inverted][:, [0, 2, 1, 3]]
-    faces = boundary(elements)
-    outer = np.unique(faces)
-    order = np.concatenate([outer, np.setdiff1d(np.unique(elements), outer)])
-    position = np.full(len(nodes), -1)
-    position[order] = np.arange(len(order))
-    return nodes[order], position[elements].astype(np.int32), position[faces].astype(np.int32)
 
 
 def _lengths(points: Points, edge: float) -> tuple[Floats, Ints, Floats]:

@@ -1,0 +1,1 @@
+"""Solids of tetrahedra inside of any shape: meshes with defects, points, splats."""

@@ -1,0 +1,109 @@
+"""Meshes without seams, doubles and specks, whose faces look outward."""
+
+import igl
+import numpy as np
+import trimesh
+
+from odeform.errors import InputError
+from odeform.geometry.solids.tetrahedra import keys_of
+from odeform.types import Bools, Floats, Ints, Mesh, Points
+
+__all__ = ["clean_mesh", "oriented"]
+
+SPECK = 0.02  # extent of a part, relative to the whole, below which it is dropped
+FLAT = 1e-4  # extent across, relative to the longest, below which a mesh encloses nothing
+SEAM = 1e-6  # of the longest extent, within which vertices are one
+MOST, FINE = 150_000, 128  # faces; of more, vertices are merged within the longest extent / FINE
+
+
+def clean_mesh(mesh: Mesh) -> tuple[Points, Ints, tuple[str, ...]]:
+    """Vertices (N, 3), faces (F, 3), and what was done, in parts of a sentence.
+
+    Raises `InputError` for a mesh without an extent in each direction.
+    """
+    points, faces = np.asarray(mesh.points, dtype=float), np.asarray(mesh.faces, dtype=np.int64)
+    if len(faces) < 4:
+        raise InputError(f"expected a mesh of at least 4 triangles, got {len(faces)}")
+    if not np.isfinite(points).all():
+        raise InputError("the mesh has vertices that are not finite")
+    size = float(np.ptp(points, axis=0).max())
+    if not np.ptp(points, axis=0).min() > FLAT * size:
+        raise InputError("the mesh encloses no volume: it is flat")
+    many = len(faces) > MOST
+    points, faces = _merged(points, faces, size / FINE if many else SEAM * size)
+    # merged vertices tear a mesh here and there
+    notes = [f"{len(mesh.faces):,} triangles were reduced to {len(faces):,}"] if many else _holes(points, faces, size)
+    labels = np.asarray(igl.vertex_components(faces))
+    low, high = np.full((labels.max() + 1, 3), np.inf), np.full((labels.max() + 1, 3), -np.inf)
+    np.minimum.at(low, labels, points)
+    np.maximum.at(high, labels, points)
+    large = (high - low).max(axis=1) > SPECK * size
+    used = np.unique(labels[faces[:, 0]])
+    if specks := int((~large[used]).sum()):
+        notes.append(f"{_counted(specks, 'loose speck')} of less than {100 * SPECK:g} % of its size left out")
+    return points, faces[large[labels[faces[:, 0]]]], tuple(notes)
+
+
+def _merged(points: Floats, faces: Ints, width: float) -> tuple[Floats, Ints]:
+    """Vertices within cells of that `width` become one; faces without an area, and doubles, are left out."""
+    cell = np.round((points - points.min(axis=0)) / width).astype(np.int64)
+    shape = cell.max(axis=0) + 1
+    _, first, label = np.unique(np.ravel_multi_index(tuple(cell.T), shape), return_index=True, return_inverse=True)
+    faces = label.ravel()[faces]
+    faces = faces[(np.diff(np.sort(faces, axis=1), axis=1) > 0).all(axis=1)]
+    _, kept = np.unique(keys_of(faces), return_index=True)
+    return points[first], faces[np.sort(kept)]
+
+
+def _holes(points: Points, faces: Ints, size: float) -> list[str]:
+    """Says how many rims there are, and how wide the widest is."""
+    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    _, first, count = np.unique(keys_of(ends), return_index=True, return_counts=True)
+    rim = ends[first[count == 1]]
+    if not len(rim):
+        return []
+    used, local = np.unique(rim, return_inverse=True)
+    label = trimesh.graph.connected_component_labels(local.reshape(-1, 2), node_count=len(used))
+    widest = max(float(np.ptp(points[used[label == one]], axis=0).max()) for one in range(label.max() + 1))
+    return [f"{_counted(int(label.max()) + 1, 'hole')} closed, the widest {100.0 * widest / size:.0f} % of its size"]
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count:,} {name}{'s were' if count > 1 else ' was'}"
+
+
+def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
+    """Faces that look outward, and what was done. Parts that look inward within another are cavities, and stay."""
+    ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    directed = ends[:, 0] * len(points) + ends[:, 1]
+    mixed = len(np.unique(directed)) < len(directed)
+    if mixed:
+        found, label = igl.bfs_orient(faces)
+        faces, label = np.ascontiguousarray(found), np.asarray(label)
+    else:
+        label = np.asarray(igl.vertex_components(faces))[faces[:, 0]]
+    corners = points[faces] - points.mean(axis=0)
+    parts = int(label.max()) + 1
+    centre = np.stack([np.bincount(label, corners[..., i].mean(axis=1), parts) for i in range(3)], axis=1)
+    corners = corners - (centre / np.maximum(np.bincount(label, minlength=parts), 1)[:, None])[label, None]
+    signed = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = np.bincount(label, signed, parts).astype(float)
+    inward = volume < 0.0
+    if not mixed and not inward.all():
+        inward &= ~_within_another(points, faces, label, volume)
+    turned = inward[label]
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    if mixed:
+        return faces, ("faces that look inward were turned",)
+    return faces, ("its faces look inward and were turned",) if inward.any() else ()
+
+
+def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) -> Bools:
+    """(P,) which parts lie within the box of one that looks outward."""
+    low, high = np.full((len(volume), 3), np.inf), np.full((len(volume), 3), -np.inf)
+    for corner in range(3):
+        np.minimum.at(low, label, points[faces[:, corner]])
+        np.maximum.at(high, label, points[faces[:, corner]])
+    outward = np.flatnonzero(volume > 0.0)
+    within = (low[:, None] >= low[outward]).all(axis=2) & (high[:, None] <= high[outward]).all(axis=2)
+    return np.asarray(within.sum(axis=1) > 0)
