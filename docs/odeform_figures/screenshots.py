@@ -217,7 +217,8 @@ def _stability(view: View) -> None:
     view.show(MOMENT)
     view.tab("Stability")
     view.client.click("Map stability")
-    view.wait(lambda: not view.client.controls["Map stability"].visible)
+    controls = view.client.controls
+    view.wait(lambda: not controls["Map stability"].visible and not controls["Cancel the map"].visible)
 
 
 def _simulate(view: View) -> None:

@@ -28,9 +28,6 @@ OUTWARD = 0.5  # spacings by which the surface is out meanwhile: a lattice loses
 MOVED = 0.01  # of the longest extent, from which on a point of the surface counts as moved
 PART = 0.1  # fraction of the volume of a second body that is not dropped any more
 HOLLOW = 0.005  # fraction of the box's volume below which nothing is enclosed
-GRADING = 2.5  # of the lattice's coarsest spacing to its finest
-FIT = 1.2  # longest edge, relative to the thickness
-DENSITY = 5.5  # nodes within a spacing's cube, at first
 
 
 @dataclass(frozen=True)
