@@ -63,7 +63,7 @@ def histogram_of(values: Iterable[Perpoint], scale: ColorScale) -> Floats:
 
 
 def gradient_html(histogram: Floats | None) -> str:
-    """Returns the colors from 0 to the top, below a histogram where one is given."""
+    """Returns the colors from 0 to the top, below a histogram (BINS,) where one is given."""
     stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in STOPS.tolist())
     shares = [] if histogram is None else histogram.tolist()
     bars = "".join(

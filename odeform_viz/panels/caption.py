@@ -32,7 +32,7 @@ def caption_html(frame: Frame, options: DisplayOptions) -> str:
 
 
 def scale_html(scale: ColorScale | None, histogram: Floats | None) -> str:
-    """The colours of values with their quantity and unit, and how many points have them; empty without a scale."""
+    """Draws the colours of values with quantity and unit, and a histogram (BINS,) of them; empty without a scale."""
     if scale is None:
         return ""
     of = "this moment" if scale.momentary else "the whole motion"

@@ -37,7 +37,7 @@ class Sampled:
         return np.stack([(self(points + step) - self(points - step)) / (2.0 * self.cell) for step in steps], axis=1)
 
     def with_values(self, values: Floats) -> "Sampled":
-        """Other values at the same corners."""
+        """Takes other values (X, Y, Z) at the same corners."""
         return replace(self, values=values)
 
     @property

@@ -80,7 +80,7 @@ def outward(points: Points, elements: Ints) -> Ints:
 
 
 def largest_part(points: Points, elements: Ints) -> Ints:
-    """The tetrahedra of the part with the most volume; parts are joined by sides, not by edges or corners alone."""
+    """Chooses the tetrahedra (M, 4) of the part with the most volume; parts are joined by sides alone."""
     one, other = _neighbours(elements)
     links = coo_array((np.ones(len(one)), (one // 4, other // 4)), shape=(len(elements),) * 2)
     count, label = connected_components(links, directed=False)

@@ -75,8 +75,8 @@ def placed_object(
     settled, used, said = _at_rest(points, solid.elements, material, name)
     thickness = median_thickness(Mesh(points[: solid.faces.max() + 1], solid.faces))
     mass = float(nodal_masses(points, solid.elements, used).sum())
-    forces = forces_on(used, thickness, mass)
-    item = SoftObject(name, points, solid.elements, solid.faces, settled, used, forces, thickness)
+    weakest, strongest = (float(f"{force:.2g}") for force in forces_on(used, thickness, mass))
+    item = SoftObject(name, points, solid.elements, solid.faces, settled, used, (weakest, strongest), thickness)
     return PlacedObject(item, place, like, solid.changes, said)
 
 
