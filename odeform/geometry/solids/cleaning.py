@@ -73,7 +73,10 @@ def _counted(count: int, name: str) -> str:
 
 
 def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
-    """Turns faces (F, 3) so that they look outward, and says what was done. Parts that look inward within another are cavities, and stay."""
+    """Turns faces (F, 3) so that they look outward, and says what was done.
+
+    Parts that look inward within another are cavities, and stay.
+    """
     ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     directed = ends[:, 0] * len(points) + ends[:, 1]
     mixed = len(np.unique(directed)) < len(directed)
