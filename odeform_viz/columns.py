@@ -5,13 +5,13 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from odeform.dataset.recorded import read_recorded
 from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
 from odeform.models.base import Predictor
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Parameters, Schema
+from odeform.simulation.recorded import read_truth
 from odeform.types import Geometry
 
 __all__ = ["Column", "Columns", "truth_column"]
@@ -105,7 +105,7 @@ class Columns:
             raise InputError(
                 f"cannot compare {column.label}: its scene is {schema.scene}, expected {self._schema.scene}"
             )
-        names = {p.name for p in schema.parameters}
+        names = {p.name for p in schema.parameters} | set(column.truth.setting if column.truth else ())
         return [p.name for p in self._schema.parameters if p.name not in names]
 
     def remove(self, key: int) -> None:
@@ -172,5 +172,5 @@ def truth_column(origin: str) -> Column:
 
     `InputError` where there is no such data set or sequence.
     """
-    motion = read_recorded(origin)
+    motion = read_truth(origin)
     return Column("truth", motion, motion.geometry, origin=origin)

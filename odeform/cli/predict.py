@@ -104,11 +104,11 @@ def _read_truth(
     args: argparse.Namespace, predictor: "Predictor", settings: dict[str, Any]
 ) -> "tuple[RecordedMotion, dict[str, Any]]":
     """The sequence of `--truth`, and its parameters with those of `--set`."""
-    from odeform.dataset.recorded import read_recorded
+    from odeform.simulation.recorded import read_truth
 
     if args.geometry is not None:
         raise InputError("--truth compares the truth's own body: leave out --geometry")
-    truth, schema = read_recorded(args.truth), predictor.schema
+    truth, schema = read_truth(args.truth), predictor.schema
     if truth.schema.scene != schema.scene:
         raise InputError(f"--truth {args.truth}: expected a sequence of {schema.scene}, got {truth.schema.scene}")
     settings = schema.complete({**schema.known(truth.setting), **schema.expanded(settings)})

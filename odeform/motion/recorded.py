@@ -102,11 +102,13 @@ class RecordedMotion:
         """Whether this may be the motion under these parameters, to the resolution of a slider."""
         if parameters.get(OBJECT) != self.parameters.get(OBJECT):
             return False
+        varied = [p for p in self.schema.parameters if p.name in self.parameters]
+        fixed = {
+            name: value for name, value in self.fixed.items() if name in parameters and name not in self.parameters
+        }
         return all(
-            abs(p.normalise(parameters[p.name]) - p.normalise(self.parameters[p.name])) < 2e-3
-            for p in self.schema.parameters
-            if p.name in self.parameters
-        )
+            abs(p.normalise(parameters[p.name]) - p.normalise(self.parameters[p.name])) < 2e-3 for p in varied
+        ) and all(np.isclose(parameters[name], value, rtol=1e-3) for name, value in fixed.items())
 
     @cached_property
     def _centre(self) -> Floats:
