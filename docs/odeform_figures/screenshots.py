@@ -323,6 +323,7 @@ def _take_objects(browser: Browser, out: Path) -> None:
     parts = []
     for name in OBJECTS:
         with _open(browser, _push(name), SIZE) as view:
+            view.page.add_style_tag(content="#odeform-view { display: none }")  # words would lie over the bodies
             view.show(0.0)
             view.set("go to", "peak")
             view.wait(lambda v=view: v.app.clock.time() > 0.0 and v.app.presenter.settled)
