@@ -268,9 +268,8 @@ class Session:
         true = truth.vertices(request.time)
         difference = np.subtract(predicted, true, dtype=float)
         distances = np.linalg.norm(difference, axis=1)
-        worst = int(distances.argmax())
         rmse, mae = 1e3 * np.sqrt((difference**2).mean()), 1e3 * np.abs(difference).mean()
-        return Error(distances, float(rmse), float(mae), worst, true[worst].astype(float))
+        return Error(distances, float(rmse), float(mae))
 
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, request: ViewRequest) -> Curves:
         motion, times, predictor = shown.motion, self.curve_times, shown.column.predictor

@@ -13,7 +13,7 @@ from odeform.motion.limits import DEPTH
 from odeform.motion.plausibility import Stop
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Window
-from odeform.types import Floats, Geometry, Perpoint, Times, Vector
+from odeform.types import Floats, Geometry, Perpoint, Times
 from odeform_viz.columns import Column
 
 __all__ = [
@@ -115,9 +115,6 @@ class Error:
     rmse_mm: float
     """Over all coordinates, as is `mae_mm`: what recordings keep. The page shows distances."""
     mae_mm: float
-    worst_vertex: int
-    worst_position: Vector
-    """(3,) metres: where the truth has the worst vertex."""
 
     @property
     def rms_mm(self) -> float:
@@ -132,7 +129,7 @@ class Error:
     @property
     def worst_mm(self) -> float:
         """The largest distance, in millimetres."""
-        return 1e3 * float(self.distances[self.worst_vertex])
+        return 1e3 * float(self.distances.max())
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from scipy.optimize import minimize
 
 from odeform.mechanics.body import ReducedBody
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Perpoint
 
 __all__ = ["Floor", "stand"]
 
-GRAVITY = 9.81  # m/s^2
 TOUCHING = 4.0  # inverse of the fraction of a body's surface that typically stands
 
 

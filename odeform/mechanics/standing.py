@@ -5,12 +5,13 @@ from scipy.sparse import csc_matrix, diags
 from scipy.sparse.linalg import splu
 from scipy.spatial import ConvexHull
 
+from odeform.geometry.solids.tetrahedra import inside_out
 from odeform.mechanics.elasticity import elastic_forces, tangent_stiffness
+from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Ints, Perpoint, Points, Rotations, Vector
 
 __all__ = ["lying", "sag", "standing"]
 
-GRAVITY = 9.81  # m/s^2
 SINKS = 5e-5  # m, of the whole weight on one node into the floor
 TOUCHES = 6  # times that what touches the floor is found anew, in one step
 STEPS, FIRST, LONGEST = 14, 0.005, 1.0  # of pseudo time; s, the first and the longest of them
@@ -74,7 +75,7 @@ def standing(points: Points, elements: Ints, masses: Perpoint, young: float, poi
     for _ in range(STEPS):
         matrix = tangent_stiffness(points, elements, positions, young, poisson) + diags(np.repeat(masses / step**2, 3))
         moved = _stepped(matrix, left, positions, stiff)
-        if not np.isfinite(moved).all() or _inside_out(moved, elements):
+        if not np.isfinite(moved).all() or inside_out(moved, elements).any():
             step *= 0.25
             continue
         positions, left = moved, _forces(points, elements, moved, masses, young, poisson)
@@ -111,8 +112,3 @@ def _forces(
     found = elastic_forces(points, elements, positions, young, poisson)
     found[:, 2] -= masses * GRAVITY
     return found
-
-
-def _inside_out(positions: Points, elements: Ints) -> bool:
-    corners = positions[elements]
-    return bool((np.linalg.det(corners[:, 1:] - corners[:, :1]) <= 0.0).any())

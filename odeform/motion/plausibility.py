@@ -61,8 +61,9 @@ class Stop:
     """Whether the motion ends there; false where later moments are valid again, or may be."""
 
     def __str__(self) -> str:
-        at = f"t = {self.time:.3f} s: {self.reason} afterwards"
-        return f"stopped at {at}" if self.for_good else f"held at {at}, until it is valid again"
+        if self.for_good:
+            return f"stopped at t = {self.time:.3f} s: {self.reason} afterwards"
+        return f"held at t = {self.time:.3f} s while {self.reason}"
 
 
 class PlausibilityCheck:

@@ -22,7 +22,7 @@ __all__ = ["BEYOND", "Watched", "draws_of", "stress_objects", "watch"]
 BEYOND = 1.25  # times the trained forces, at most
 PATIENCE = 10.0  # s
 BATCH = 32  # pushes that a process takes at a time
-MOVING = 0.1  # fraction of bodies that may still move at the end: a bottle that lies rolls on
+MOVING = 0.02  # fraction of bodies that may still move at the end
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ def badge_of(frame: Frame) -> Badge:
     models = [c for c in frame.columns if c.column.predictor]
     if not models:
         return Badge("unknown", "only the truth is in view" if frame.columns else "no column is in view")
-    expected = _expected(models[0])
+    expected = _expected(models[0], alone=len(models) == 1)
     for shown in models:
         if stop := shown.stop_at(frame.request.time):
             return Badge("unknown", f"not modelled: {stop}")
@@ -59,9 +59,14 @@ def badge_of(frame: Frame) -> Badge:
     return Badge("outside", where, expected) if outside else Badge("inside", "inside the trained range", expected)
 
 
-def _expected(shown: ColumnFrame) -> str:
-    band = shown.error_band(np.array([shown.time]))
-    return "error not known" if band is None else f"error in 9 of 10 cases below {band[0, 1]:.2g} mm"
+def _expected(shown: ColumnFrame, alone: bool) -> str:
+    """What is known of the error of the first model, which is named if it is not `alone`."""
+    band, of = shown.error_band(np.array([shown.time])), "" if alone else f"{shown.column.label}: "
+    if band is None:
+        return f"{of}error not known"
+    # outside of what was measured the band is carried on
+    rough = "roughly " if shown.motion.outside or shown.motion.extrapolates(shown.time) else ""
+    return f"{of}error in 9 of 10 cases {rough}below {band[0, 1]:.2g} mm"
 
 
 def summarize(frame: Frame) -> str:

@@ -4,12 +4,12 @@ import numpy as np
 
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Floats, Vector
+from odeform.types import Floats, Pose, Vector
 from odeform_viz.pushing import push_shown
 from odeform_viz.rendering.framing import Axes, Box
 from odeform_viz.view import ColumnFrame
 
-__all__ = ["direction_of", "outline_of"]
+__all__ = ["climb_of", "direction_of", "outline_of"]
 
 MOMENTS = 60  # of a motion that are looked at
 POINTS = 200  # of a body
@@ -29,8 +29,7 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
 
 def outline_of(shown: ColumnFrame, axes: Axes) -> Box:
     """The box of the body within the trained window, whatever it travels along the floor, and of what acts on it."""
-    window = shown.motion.schema.window
-    poses = shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
+    poses = _poses(shown)
     points = np.asarray(shown.column.geometry.points, dtype=float)
     points = points[:: max(len(points) // POINTS, 1)]
     centre = points.mean(axis=0)
@@ -42,6 +41,18 @@ def outline_of(shown: ColumnFrame, axes: Axes) -> Box:
     corners = turned.reshape(-1, 3) if acting is None else np.concatenate([turned.reshape(-1, 3), acting])
     across, upwards = corners @ axes.right, corners @ axes.above
     return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
+
+
+def _poses(shown: ColumnFrame) -> Pose:
+    """(T, 4, 4) over the trained window."""
+    window = shown.motion.schema.window
+    return shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
+
+
+def climb_of(shown: ColumnFrame) -> float:
+    """Metres by which the centre of the body rises at most within the trained window."""
+    centre, poses = np.asarray(shown.column.geometry.points, dtype=float).mean(axis=0), _poses(shown)
+    return float((poses[:, 2, :3] @ centre + poses[:, 2, 3]).max() - centre[2])
 
 
 def direction_of(shown: ColumnFrame) -> Vector | None:

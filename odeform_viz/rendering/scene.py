@@ -16,7 +16,7 @@ from odeform_viz.rendering.column_view import ColumnView
 from odeform_viz.rendering.framing import Axes, Box, Framing, Viewport, frame_columns
 from odeform_viz.rendering.lights import Lights
 from odeform_viz.rendering.look import Colors, Look
-from odeform_viz.rendering.outline import direction_of, outline_of
+from odeform_viz.rendering.outline import climb_of, direction_of, outline_of
 from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
 from odeform_viz.rendering.titles import title_of
@@ -53,6 +53,7 @@ class SceneView:
         if pick is not None:
             server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
         self._framed: object = None  # what the framing was made for
+        self._climb = 0.0  # m by which bodies rise in it
         start = Box(-extent, extent, 0.0, extent)
         self._framing = frame_columns(1, Axes.beside(None), start, extent, self.viewport, together=True, level=False)
         self._lights = Lights(server)
@@ -87,7 +88,7 @@ class SceneView:
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
                 view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
-            self._stage.shift(*self._offset(frame, options, discs))
+            self._stage.shift(self._offset(frame, options, discs))
         self._server.flush()
         for shown in frame.columns:
             self._views[shown.column.key][1].annotate(shown, frame.request.time, options)
@@ -125,6 +126,7 @@ class SceneView:
             box, extent = _around([outline_of(c, axes) for c in frame.columns]), max(map(self._size, frame.columns))
             level = frame.still is not None
             self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level)
+            self._climb = max(map(climb_of, frame.columns))
             self._cameras.aim(self._framing)
             self._lights.aim(self._framing, everywhere=level)
             self._framed = reasons  # last: a request cancelled on the way is framed anew
@@ -153,14 +155,15 @@ class SceneView:
                 view = ColumnView(self._server, shown.column, color_of(shown.column), pull, _finest(frame))
                 self._views[shown.column.key] = (shown.column, view)
 
-    def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> tuple[float, float]:
-        """The shift of the world, in m, that keeps the first body in front of the camera."""
+    def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> Floats:
+        """The shift (3,) of the world, in m, that keeps the first body in front of the camera; downwards where it rises
+        higher than what was framed, as after a harder kick."""
         if discs or not options.follow or not frame.columns:
-            return (0.0, 0.0)
+            return np.zeros(3)
         first = frame.columns[0]
         # in invisible steps, so that a body that falls straight down moves nothing
-        x, y, _ = np.round(self._views[first.column.key][1].displacement(first) / INVISIBLE) * INVISIBLE
-        return (-float(x), -float(y))
+        x, y, z = np.round(self._views[first.column.key][1].displacement(first) / INVISIBLE) * INVISIBLE
+        return -np.array([x, y, max(z - self._climb, 0.0)])
 
 
 @dataclass(frozen=True, eq=False)

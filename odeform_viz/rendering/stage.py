@@ -68,9 +68,9 @@ class Stage:
         """(3,) m: where the world is; see `shift`."""
         return np.asarray(self._world.position, dtype=float)
 
-    def shift(self, x: float, y: float) -> None:
-        """Move the whole world, in metres, past a camera that the user controls."""
-        self._world.position = (x, y, 0.0)
+    def shift(self, by: Floats) -> None:
+        """Move the whole world by (3,) m, past a camera that the user controls."""
+        self._world.position = by
 
 
 def set_floor_theme(client: viser.ClientHandle, dark: bool) -> None:

@@ -163,5 +163,5 @@ def test_mechanics_goes_on_after_a_moment_that_is_not_valid() -> None:
     assert shown[1] == shown[2] == pytest.approx(1.2, abs=2e-5)
     stop = check.first_stop(1.5)
     assert stop == check.stop_at(1.25)
-    assert str(stop) == "held at t = 1.200 s: it sinks into the floor afterwards, until it is valid again"
+    assert str(stop) == "held at t = 1.200 s while it sinks into the floor"
     assert check.stop_at(1.5) is None

@@ -4,7 +4,7 @@ import igl
 import numpy as np
 import trimesh
 
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.geometry.solids.tetrahedra import keys_of
 from odeform.types import Bools, Floats, Ints, Mesh, Points
 
@@ -33,15 +33,12 @@ def clean_mesh(mesh: Mesh) -> tuple[Points, Ints, tuple[str, ...]]:
     points, faces = _merged(points, faces, size / FINE if many else SEAM * size)
     # merged vertices tear a mesh here and there
     notes = [f"{len(mesh.faces):,} triangles were reduced to {len(faces):,}"] if many else _holes(points, faces, size)
-    labels = np.asarray(igl.vertex_components(faces))
-    low, high = np.full((labels.max() + 1, 3), np.inf), np.full((labels.max() + 1, 3), -np.inf)
-    np.minimum.at(low, labels, points)
-    np.maximum.at(high, labels, points)
+    labels = np.asarray(igl.vertex_components(faces))[faces[:, 0]]
+    low, high = _boxes(points, faces, labels)
     large = (high - low).max(axis=1) > SPECK * size
-    used = np.unique(labels[faces[:, 0]])
-    if specks := int((~large[used]).sum()):
-        notes.append(f"{_counted(specks, 'loose speck')} of less than {100 * SPECK:g} % of its size left out")
-    return points, faces[large[labels[faces[:, 0]]]], tuple(notes)
+    if specks := int((~large[np.unique(labels)]).sum()):
+        notes.append(f"{counted(specks, 'loose speck')} of less than {100 * SPECK:g} % of its size left out")
+    return points, faces[large[labels]], tuple(notes)
 
 
 def _merged(points: Floats, faces: Ints, width: float) -> tuple[Floats, Ints]:
@@ -65,11 +62,7 @@ def _holes(points: Points, faces: Ints, size: float) -> list[str]:
     used, local = np.unique(rim, return_inverse=True)
     label = trimesh.graph.connected_component_labels(local.reshape(-1, 2), node_count=len(used))
     widest = max(float(np.ptp(points[used[label == one]], axis=0).max()) for one in range(label.max() + 1))
-    return [f"{_counted(int(label.max()) + 1, 'hole')} closed, the widest {100.0 * widest / size:.0f} % of its size"]
-
-
-def _counted(count: int, name: str) -> str:
-    return f"{count:,} {name}{'s were' if count > 1 else ' was'}"
+    return [f"{counted(int(label.max()) + 1, 'hole')} closed, the widest {100.0 * widest / size:.0f} % of its size"]
 
 
 def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
@@ -103,10 +96,17 @@ def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
 
 def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) -> Bools:
     """(P,) which parts lie within the box of one that looks outward."""
-    low, high = np.full((len(volume), 3), np.inf), np.full((len(volume), 3), -np.inf)
-    for corner in range(3):
-        np.minimum.at(low, label, points[faces[:, corner]])
-        np.maximum.at(high, label, points[faces[:, corner]])
+    low, high = _boxes(points, faces, label)
     outward = np.flatnonzero(volume > 0.0)
     within = (low[:, None] >= low[outward]).all(axis=2) & (high[:, None] <= high[outward]).all(axis=2)
     return np.asarray(within.sum(axis=1) > 0)
+
+
+def _boxes(points: Points, faces: Ints, label: Ints) -> tuple[Floats, Floats]:
+    """(P, 3) the lowest and the highest coordinates of the parts that faces (F, 3) belong to, by `label` (F,)."""
+    parts = int(label.max()) + 1
+    low, high = np.full((parts, 3), np.inf), np.full((parts, 3), -np.inf)
+    for corner in range(3):
+        np.minimum.at(low, label, points[faces[:, corner]])
+        np.maximum.at(high, label, points[faces[:, corner]])
+    return low, high

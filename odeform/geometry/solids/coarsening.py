@@ -7,19 +7,16 @@ each only if no tetrahedron around it becomes too flat.
 import numpy as np
 
 from odeform.geometry.solids.compiled_collapse import MOST, collapse_edges, improve_nodes
-from odeform.geometry.solids.projection import projected
+from odeform.geometry.solids.projection import QUALITY, projected
 from odeform.geometry.solids.sampled import Sampled
 from odeform.geometry.solids.tetrahedra import boundary, edges_of
 from odeform.types import Floats, Ints, Perpoint, Points
 
 __all__ = ["Coarsening"]
 
-QUALITY = 0.25  # of tetrahedra, 1 if regular: they get no worse than that
 TOLERANCES = (0.002, 0.004, 0.006, 0.009, 0.013)  # of the longest extent, by which the surface may be off
 LONGEST = 5.0  # times the first edges
 GROWTH = 1.35  # of the edges that collapse, from one pass to the next
-
-
 GOOD, SWEEPS = 0.45, 2  # quality from which on nodes stay, and times that all others are moved
 STEPS = np.concatenate([width * np.concatenate([np.eye(3), -np.eye(3)]) for width in (0.06, 0.2)])
 """Relative to the shortest edge."""

@@ -6,7 +6,7 @@ from odeform.geometry.solids.sampled import Sampled
 from odeform.geometry.solids.tetrahedra import edges_of, qualities
 from odeform.types import Floats, Ints, Perpoint, Points
 
-__all__ = ["projected"]
+__all__ = ["QUALITY", "projected"]
 
 STEPS = 8
 QUALITY = 0.25  # of tetrahedra, 1 if regular: they get no worse than that
@@ -41,11 +41,11 @@ def _means(points: Points, edges: Ints) -> Floats:
 def _guarded(points: Points, elements: Ints, moves: Floats) -> Points:
     """Moves nodes, but for those that would make a tetrahedron worse than `QUALITY`, or worse than it is."""
     before = np.minimum(qualities(points, elements), QUALITY)
-    share: Perpoint = np.ones(len(points))
+    fraction: Perpoint = np.ones(len(points))
     for retreat in range(RETREATS):
-        bad = qualities(points + share[:, None] * moves, elements) < before
+        bad = qualities(points + fraction[:, None] * moves, elements) < before
         if not bad.any():
-            return points + share[:, None] * moves
-        share[np.unique(elements[bad])] *= 0.5 if retreat < RETREATS // 2 else 0.0
-    bad = qualities(points + share[:, None] * moves, elements) < before
-    return points if bad.any() else points + share[:, None] * moves
+            return points + fraction[:, None] * moves
+        fraction[np.unique(elements[bad])] *= 0.5 if retreat < RETREATS // 2 else 0.0
+    bad = qualities(points + fraction[:, None] * moves, elements) < before
+    return points if bad.any() else points + fraction[:, None] * moves

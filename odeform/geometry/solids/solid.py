@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import KDTree
 
-from odeform.errors import InputError
+from odeform.errors import InputError, counted
 from odeform.geometry.solids.coarsening import Coarsening
 from odeform.geometry.solids.lattice import cubic_lattice
 from odeform.geometry.solids.of_mesh import enclosed_by_mesh
@@ -126,7 +126,7 @@ def _one_body(found: Enclosed) -> Enclosed:
         raise InputError("the shape encloses no volume: it is open or flat")
     values = np.where(kept | (label == 0), distance.values, distance.cell)
     dropped = int((sizes > 0).sum()) - 1
-    notes = (f"{dropped} smaller part{'s were' if dropped > 1 else ' was'} left out",) if dropped else ()
+    notes = (f"{counted(dropped, 'smaller part')} left out",) if dropped else ()
     return Enclosed(distance.with_values(values), (*found.notes, *notes))
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.geometry.contact import RADIUS
 from odeform.simulation.objects.soft_object import SoftMaterial
+from odeform.surroundings import GRAVITY
 
 __all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_of"]
 
@@ -77,5 +78,5 @@ def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[fl
     """Newton, weakest and strongest on a body of that `thickness` in m and `mass` in kg."""
     stiffness = material.young / (1.0 - material.poisson**2)
     dents = 4.0 / 3.0 * stiffness * np.sqrt(RADIUS) * (DENT * thickness) ** 1.5
-    strongest = float(min(dents, LIFTS * 9.81 * mass))
+    strongest = float(min(dents, LIFTS * GRAVITY * mass))
     return WEAKEST * strongest, strongest

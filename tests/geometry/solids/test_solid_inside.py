@@ -101,7 +101,7 @@ def test_walls_thinner_than_the_tetrahedra_survive_and_it_is_said() -> None:
 def test_what_was_done_is_said() -> None:
     speck = ball(0.005, (1.5, 0.0, 0.0))
     changes = solid_inside(mesh_of(kept(ball(), np.arange(5120) >= 40), speck)).changes
-    assert "1 hole was closed, the widest" in changes.describe(1.0)
+    assert "1 hole closed, the widest" in changes.describe(1.0)
     assert "1 loose speck" in changes.describe(1.0)
     inward = solid_inside(mesh_of(turned(trimesh.creation.box(), np.ones(12, dtype=bool))))
     assert "its faces look inward and were turned" in inward.changes.notes

@@ -8,6 +8,7 @@ import trimesh
 import viser
 from stubs import SCHEMA, StubPredictor, recorded
 
+import odeform
 from odeform.cancellation import Cancelled
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
@@ -73,6 +74,32 @@ def test_a_body_alone_is_of_clay_and_one_of_a_sweep_has_the_color_of_its_rank(
     view.publish(session.frame(request), DisplayOptions(overlay=True), None)
     assert isinstance(colors[0], viser.MeshHandle)
     assert colors[0].color == color_of(columns[0])  # told apart in one place
+
+
+def test_a_ball_that_flies_higher_than_what_was_framed_stays_in_view(server: viser.ViserServer) -> None:
+    rolling = odeform.load("kick")
+    session, view = Session(rolling.schema), SceneView(server, 0.2, lambda: None)
+    columns = Columns.of([Column("kick", rolling, rolling.rest)]).all
+    usual = ViewRequest(session.schema.complete({}), 0.15, "balanced", columns)
+    world = server.scene.get_handle_by_name("/world")
+    assert isinstance(world, viser.FrameHandle)
+    view.publish(session.frame(usual), DisplayOptions(), None)
+    assert world.position[2] == 0.0
+    hard = replace(usual, parameters=session.schema.complete({"force": 160.0, "mass": 0.4, "elevation": 1.1}))
+    centre = rolling.rest.points.mean(axis=0, dtype=float)
+
+    def height(request: ViewRequest) -> float:
+        pose = session.frame(request).columns[0].motion.pose(request.time)
+        return float(pose[2, :3] @ centre + pose[2, 3] - centre[2])
+
+    times = np.linspace(0.0, 1.0, 61)
+    framed = max(height(replace(usual, time=t)) for t in times)
+    hard = replace(hard, time=max(times, key=lambda t: height(replace(hard, time=t))))
+    view.publish(session.frame(hard), DisplayOptions(), None)
+    assert height(hard) > framed + 0.1
+    assert height(hard) + world.position[2] == pytest.approx(framed, abs=0.01)
+    view.publish(session.frame(hard), DisplayOptions(follow=False), None)
+    assert world.position[2] == 0.0
 
 
 def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(server: viser.ViserServer) -> None:
