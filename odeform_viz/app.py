@@ -10,8 +10,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
+from odeform.locks import Lock
 from odeform_viz.browser.scripts import run_scripts
-from odeform_viz.columns import Column, Columns
+from odeform_viz.columns import Column, Columns, columns_under
 from odeform_viz.layout import Layout
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.registry import PANELS, Entry, build_panels
@@ -22,7 +23,7 @@ from odeform_viz.runtime.access import Access, reachable_address
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.memory import Tidier, share_memory
 from odeform_viz.runtime.notices import Notices
-from odeform_viz.runtime.server import open_server, stop_server
+from odeform_viz.runtime.server import forget_clients, open_server, stop_server
 from odeform_viz.runtime.worker import Worker
 from odeform_viz.session import Session
 from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest, played_until
@@ -55,21 +56,27 @@ class App:
 
         `InputError` for a port in use, columns of different scenes, or a recording that cannot be written.
         """
-        self.columns = Columns.of(columns)
-        self.session = Session(columns[0].source.schema)
+        Columns.of(columns)  # wrong ones are refused before anything starts
         share_memory()
         # threads of a matrix product wait for each other: with one core busy, two take ten times as long as one
         self._threads = threadpool_limits(1, "blas")
         self._tidy = Tidier()
-        window = self.session.schema.window
-        self.clock = Clock(window.start, played_until(window))
         self._access = Access.of(host, origins)
-        self.server = open_server(self._access, port, f"ODeform · {self.session.schema.scene}")
+        self.server = open_server(self._access, port, _title(columns))
         try:
             self.recording = RecordingControl(record, lambda: bool(self.server.get_clients()))
         except InputError:
             stop_server(self.server)
             raise
+        self._panels, self._workspace, self._switching = panels, workspace, Lock()
+        self._build(columns)
+
+    def _build(self, columns: Sequence[Column]) -> None:
+        """Build a page for these columns on the server, and start it."""
+        self.columns = Columns.of(columns)
+        self.session = Session(columns[0].source.schema)
+        window = self.session.schema.window
+        self.clock = Clock(window.start, played_until(window))
         self._worker = Worker(lambda: self.presenter.serve())
         self.page = Page(
             self.server,
@@ -80,9 +87,10 @@ class App:
             Notices(self.server),
             self._worker.wake,
             Layout(self.server),
-            Workspace.of(workspace, columns),
+            Workspace.of(self._workspace, columns),
         )
-        build_panels(self.page, panels)
+        self.page.controls.show_load = self.show_load
+        build_panels(self.page, self._panels)
         run_scripts(self.server)
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
         controls = self.page.controls
@@ -97,6 +105,28 @@ class App:
         self.server.on_client_connect(lambda _: self._worker.wake())  # recordings wait for somebody who watches
         self._play_first()
         self._worker.start()
+
+    def show_load(self, load: str) -> None:
+        """Build the page anew, with its models under another load; models that know one scene only are left out.
+
+        `InputError` while a recording, which is of one scene, is in progress.
+        """
+        with self._switching:
+            if self.recording.active:
+                raise InputError("a recording is of one scene: stop it before something else happens")
+            columns = columns_under(self.columns.all, load)
+            self._end_page()
+            self.scene.close()
+            forget_clients(self.server)
+            self.server.gui.reset()
+            self.server.scene.reset()
+            self.server.gui.set_panel_label(_title(columns))
+            self._build(columns)
+
+    def _end_page(self) -> None:
+        for panel in self.page.panels:
+            panel.close()
+        self._worker.stop()
 
     def _play_first(self) -> None:
         """Play slowly through the first impact, then at the chosen speed."""
@@ -120,9 +150,7 @@ class App:
 
     def close(self) -> None:
         """Stop serving, end what panels have started, and complete the recording."""
-        for panel in self.page.panels:
-            panel.close()
-        self._worker.stop()
+        self._end_page()
         stop_server(self.server)
         self._threads.restore_original_limits()
         self.recording.close()
@@ -156,3 +184,7 @@ class App:
     def settle(self) -> None:
         """Return unused memory to the system; see `Output`."""
         self._tidy()
+
+
+def _title(columns: Sequence[Column]) -> str:
+    return f"ODeform · {columns[0].source.schema.scene}"

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from odeform.errors import InputError
 from odeform.geometry.shape import FittedShape
+from odeform.loads.registry import PUSH, load_of_scene
 from odeform.models.base import Predictor
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
@@ -14,7 +15,7 @@ from odeform.schema import Parameters, Schema
 from odeform.simulation.recorded import read_truth
 from odeform.types import Geometry
 
-__all__ = ["Column", "Columns", "truth_column"]
+__all__ = ["Column", "Columns", "columns_under", "truth_column"]
 
 MOST = 12  # columns; nobody can tell more of them apart
 
@@ -165,6 +166,30 @@ def _followed(column: Column, parameters: Parameters) -> Column:
 def _unused(label: str, taken: set[str]) -> str:
     names = itertools.chain([label], (f"{label} #{n}" for n in itertools.count(2)))
     return next(name for name in names if name not in taken)
+
+
+def columns_under(columns: Sequence[Column], load: str) -> list[Column]:
+    """The models of columns under another load of `odeform.loads`, where they can be, each with its own body.
+
+    Truths, predicted motions, and models that know one scene only are left out. `InputError` if nothing is left.
+    """
+    out = []
+    for column in columns:
+        predictor = column.predictor
+        if predictor is None or column.pinned is not None or load not in predictor.loads:
+            continue
+        found, base = predictor.under(load), column.origin.removesuffix(f":{_load_of(predictor)}")
+        origin = base if load == PUSH or not base else f"{base}:{load}"
+        geometry = column.geometry if column.loaded else found.rest
+        out.append(replace(column, source=found, geometry=geometry, origin=origin))
+    if not out:
+        raise InputError(f"load {load!r}: no model of the page computes its bodies under it")
+    return out
+
+
+def _load_of(predictor: Predictor) -> str:
+    load = load_of_scene(predictor.schema.scene)
+    return PUSH if load is None else load.name
 
 
 def truth_column(origin: str) -> Column:

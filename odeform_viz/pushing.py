@@ -70,8 +70,10 @@ class ShownPush:
 
     @cached_property
     def centre(self) -> Vector:
-        """(3,) m: that of the sphere at time 0."""
+        """(3,) m: that of the sphere at time 0; the contact of a force that acts without one."""
         contact = self.push.contact
+        if self.contacts.radius == 0.0:
+            return contact.point
         fitting = touching_centre(self.surface, contact)
         return contact.point + self.contacts.radius * contact.normal if fitting is None else fitting
 

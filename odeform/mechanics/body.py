@@ -9,9 +9,10 @@ from scipy.spatial import KDTree
 
 from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
-__all__ = ["ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
+__all__ = ["SUPPORT", "ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
 
-SUPPORT = 96  # points spread over the surface that may touch the floor
+SUPPORT = 96
+"""Points spread over the surface that may touch the floor under a body that stands and is pushed."""
 NEAR_FLOOR, NEAREST = 0.004, 40  # metres, and how many of the vertices below that may, too
 
 
@@ -110,9 +111,11 @@ def reduce_body(
     modal_rotations: Float[np.ndarray, "points 3 modes"],
     eigenvalues: Floats,
     solid: Solid,
+    support: int = SUPPORT,
 ) -> ReducedBody:
     """Makes the body from its surface (N, 3) m relative to the mass centre, the modes there in m per root kilogram, how
-    they turn it (`surface_turns`), and the rest."""
+    they turn it (`surface_turns`), and the rest. `support` points spread over all of it, and some more below it, may
+    touch the floor."""
     corners = surface[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
@@ -125,14 +128,14 @@ def reduce_body(
         np.concatenate([rows, rows[:, faces].mean(axis=2)], axis=1),
         np.concatenate([around, areas]),
     )
-    return ReducedBody(solid, eigenvalues, _support(surface, rows, solid.mass), everywhere)
+    return ReducedBody(solid, eigenvalues, _support(surface, rows, solid.mass, support), everywhere)
 
 
-def _support(points: Points, rows: Floats, mass: float) -> Samples:
+def _support(points: Points, rows: Floats, mass: float, count: int) -> Samples:
     low = int(points[:, 2].argmin())
     bottom = np.flatnonzero(points[:, 2] < points[low, 2] + NEAR_FLOOR)
     kept = bottom[spread(points[bottom], NEAREST, int(np.flatnonzero(bottom == low)[0]))]
-    chosen = np.unique(np.concatenate([spread(points, SUPPORT, low), kept]))
+    chosen = np.unique(np.concatenate([spread(points, count, low), kept]))
     owner = KDTree(points[chosen]).query(points)[1]
     masses = mass * np.bincount(owner, minlength=len(chosen)) / len(points)
     return Samples(points[chosen], rows[:, chosen], masses)

@@ -16,7 +16,7 @@ __all__ = ["Constants", "advance_all", "slope_of"]
 MARGIN = 1e-3
 SLIP = 1e-4
 AHEAD = 0.02
-MOST = 64
+PUSH = 64
 SHORTEST = 1e-9
 SMALL = 1e-18
 
@@ -53,6 +53,12 @@ class Constants(NamedTuple):
     projectile: float  # kg
     reach: float  # m, of the farthest sample from the mass centre
     pulse: float  # s
+    onset: float  # s: the floor acts on what would be in contact after that time
+    most: int  # contacts with the floor that are followed
+    patch_points: ndarray  # (B, 3) m
+    patch_rows: ndarray  # (B, 6, K)
+    patch_forces: ndarray  # (B, 3) N
+    patch_pulse: float  # s, 0 without a patch
 
 
 @compiled
@@ -105,9 +111,9 @@ def _centre(c, b, z, size, out):
 
 @compiled
 @no_type_check
-def _keep(chosen, first, count, gaps, i):
-    """Add sample i to those chosen from `first` on, or in place of the one with the largest gap."""
-    if count - first < MOST:
+def _keep(chosen, first, count, most, gaps, i):
+    """Add sample i to at most `most` chosen from `first` on, or in place of the one with the largest gap."""
+    if count - first < most:
         chosen[count] = i
         return count + 1
     worst = first
@@ -141,7 +147,7 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
         _bent(points, i, motion, place)
         gaps[i] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
         if gaps[i] < margin:
-            floor = _keep(chosen, 0, floor, gaps, i)
+            floor = _keep(chosen, 0, floor, c.most, gaps, i)
     if not pushed:
         return floor, floor
     _centre(c, b, z, size, centre)
@@ -159,7 +165,7 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
         _bent(points, i, motion, place)
         gaps[i] = np.sqrt((place[0] - centre[0]) ** 2 + (place[1] - centre[1]) ** 2 + (place[2] - centre[2]) ** 2)
         if gaps[i] < margin:
-            count = _keep(chosen, floor, count, gaps, i)
+            count = _keep(chosen, floor, count, PUSH, gaps, i)
     return floor, count
 
 
@@ -281,8 +287,37 @@ def _local(z, size, v):
 
 @compiled
 @no_type_check
-def _free(c, b, z, size, pushed, v, momentum, rate):
-    """Momentum and its rate without contacts and damping, in axes of the body."""
+def _patch(c, b, z, size, time, rate):
+    """Add the force on the patch at a time to the rate of the momentum, in axes of the body."""
+    motion, place, rows = np.zeros(6), np.empty(3), c.patch_rows[b]
+    for axis in range(6):
+        for k in range(size):
+            motion[axis] += rows[axis, k] * z[12 + k]
+    square, once, twice = _bent(c.patch_points[b].reshape(3, 1), 0, motion, place)
+    strength = np.sin(np.pi * time / c.patch_pulse) ** 2
+    f = np.empty(3)
+    for axis in range(3):
+        f[axis] = strength * (
+            z[3 + axis] * c.patch_forces[b, 0] + z[6 + axis] * c.patch_forces[b, 1] + z[9 + axis] * c.patch_forces[b, 2]
+        )
+        rate[axis] += f[axis]
+    rate[3] += place[1] * f[2] - place[2] * f[1]
+    rate[4] += place[2] * f[0] - place[0] * f[2]
+    rate[5] += place[0] * f[1] - place[1] * f[0]
+    t0, t1, t2 = motion[3], motion[4], motion[5]
+    along, rest = twice * (t0 * f[0] + t1 * f[1] + t2 * f[2]), 1.0 - twice * square
+    # the force in axes that turn with the patch
+    b0 = rest * f[0] + along * t0 - once * (t1 * f[2] - t2 * f[1])
+    b1 = rest * f[1] + along * t1 - once * (t2 * f[0] - t0 * f[2])
+    b2 = rest * f[2] + along * t2 - once * (t0 * f[1] - t1 * f[0])
+    for k in range(size):
+        rate[6 + k] += b0 * rows[0, k] + b1 * rows[1, k] + b2 * rows[2, k]
+
+
+@compiled
+@no_type_check
+def _free(c, b, z, size, pushed, time, v, momentum, rate):
+    """Momentum and its rate at a time without contacts and damping, in axes of the body."""
     inertia = c.inertia
     for axis in range(3):
         momentum[axis] = c.mass * v[axis]
@@ -296,6 +331,8 @@ def _free(c, b, z, size, pushed, v, momentum, rate):
     if pushed:
         momentum[6 + size] = c.projectile * v[6 + size]
         rate[6 + size] = c.forces[b]
+    if 0.0 < time < c.patch_pulse:
+        _patch(c, b, z, size, time, rate)
 
 
 @compiled
@@ -335,12 +372,12 @@ def _drag(c, b, j, i, floor, force, r1, r2):
 
 @compiled
 @no_type_check
-def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps, matrix, out):
-    """The state after one step of first order; false where it cannot be solved for."""
+def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, matrix, out):
+    """The state after one step of first order, which ends at a time; false where it cannot be solved for."""
     width = 6 + size + (1 if pushed else 0)
     v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
     _local(z, size, v)
-    _free(c, b, z, size, pushed, v, momentum, rate)
+    _free(c, b, z, size, pushed, end, v, momentum, rate)
     for k in range(width):
         momentum[k] += step * rate[k]
     for _ in range(2):
@@ -351,7 +388,7 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
             r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
             time = step + (c.floor_damping if j < floor else c.push_damping)
             force = c.stiffness[b, i] * (-gaps[j] - time * r0)
-            if force <= 0.0:
+            if force <= 0.0 or (j < floor and gaps[j] + (step + c.onset) * r0 > 0.0):
                 continue
             active = step * c.stiffness[b, i]
             drag = step * _drag(c, b, j, i, floor, force, r1, r2)
@@ -387,8 +424,8 @@ def _implicit(c, b, z, size, pushed, step, chosen, floor, count, jacobian, gaps,
 
 @compiled
 @no_type_check
-def _step(c, b, z, pushed, step, out, work):
-    """The state after a step of second order; returns its error in m."""
+def _step(c, b, z, pushed, time, step, out, work):
+    """The state after a step of second order from a time on; returns its error in m."""
     size = c.eigenvalues.shape[1]
     chosen, gaps, jacobian, whole, half, matrix = work
     floor, count = _near(c, b, z, size, pushed, step, chosen, gaps)
@@ -400,7 +437,8 @@ def _step(c, b, z, pushed, step, out, work):
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
             end = out
-        good &= _implicit(c, b, begin, size, pushed, length, chosen, floor, count, jacobian, gaps, matrix, end)
+        last = time + (0.5 * step if part == 1 else step)
+        good &= _implicit(c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, matrix, end)
         if part == 1:
             begin = half
     if not good:
@@ -467,9 +505,9 @@ def _work(c):
     size = c.eigenvalues.shape[1]
     state, width = 20 + 2 * size, 7 + size
     return (
-        np.empty(2 * MOST, np.int64),
-        np.empty(max(c.points.shape[2], 2 * MOST)),
-        np.empty((2 * MOST, 3, width)),
+        np.empty(c.most + PUSH, np.int64),
+        np.empty(max(c.points.shape[2], c.most + PUSH)),
+        np.empty((c.most + PUSH, 3, width)),
         np.empty(state),
         np.empty(state),
         np.empty((width, width)),
@@ -493,7 +531,8 @@ def advance_all(c, rows, times, states, steps, out, slopes, errors):
             length = left if pushed else step - left
             if length > SHORTEST or not (pushed or left > SHORTEST):
                 _copy(after, middle)
-                error += _step(c, rows[row], middle, pushed, length, after, work)
+                begin = times[row] if pushed else times[row] + left
+                error += _step(c, rows[row], middle, pushed, begin, length, after, work)
                 _slope(middle, after, size, pushed, length, slopes[row])
         errors[row] = error
 
@@ -512,14 +551,14 @@ def slope_of(c, rows, times, states, out):
         _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps)
         v, momentum, rate = np.empty(width), np.empty(width), np.empty(width)
         _local(z, size, v)
-        _free(c, b, z, size, pushed, v, momentum, rate)
+        _free(c, b, z, size, pushed, times[row], v, momentum, rate)
         for k in range(size):
             rate[6 + k] -= c.relaxation * c.eigenvalues[b, k] * v[6 + k]
         for j in range(count):
             n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
             r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
             force = c.stiffness[b, i] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
-            if force <= 0.0:
+            if force <= 0.0 or (j < floor and gaps[j] + c.onset * r0 > 0.0):
                 continue
             drag = _drag(c, b, j, i, floor, force, r1, r2)
             for k in range(width):

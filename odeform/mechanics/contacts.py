@@ -29,6 +29,8 @@ class Contacts:
     """Coulomb coefficients."""
     grip: Float[np.ndarray, "batch contacts"]
     """N s/m: friction of contacts that slide too slowly for Coulomb's, by the speed of sliding."""
+    onset: Float[np.ndarray, "batch contacts"]
+    """s: a contact acts from where it would be one after that time."""
 
     @property
     def _rows(self) -> Float[np.ndarray, "batch rows velocities"]:
@@ -42,7 +44,7 @@ class Contacts:
         that ends with about `velocity`: springs and dampers along the normal, friction against sliding, all
         implicit."""
         time = step + self.damping
-        relative, force = self._at(velocity, time)
+        relative, force = self._at(velocity, time, step + self.onset)
         active = np.where(force > 0.0, step * self.stiffness, 0.0)
         # square roots, or else products that are symmetric by themselves take twice as long
         weights = np.empty((*force.shape, 3, 1))
@@ -69,15 +71,17 @@ class Contacts:
 
     def forces(self, velocity: Float[np.ndarray, "batch velocities"]) -> Float[np.ndarray, "batch velocities"]:
         """Returns what they add to the rate of the momentum, at these velocities."""
-        relative, force = self._at(velocity[None], self.damping)
+        relative, force = self._at(velocity[None], self.damping, self.onset)
         pushes = -self._drag(force, relative)[..., None] * relative
         pushes[..., 0] = force
         return (pushes.reshape(1, len(velocity), 1, -1) @ self._rows)[0, :, 0]
 
-    def _at(self, velocity: Floats, time: Floats) -> tuple[Floats, Floats]:
-        """Relative velocities (H, B, C, 3) m/s, and normal forces (H, B, C) N once the bodies have moved for `time`."""
+    def _at(self, velocity: Floats, time: Floats, begun: Floats) -> tuple[Floats, Floats]:
+        """Relative velocities (H, B, C, 3) m/s, and normal forces (H, B, C) N once the bodies have moved for `time`, of
+        those contacts that are reached in the time `begun`."""
         relative = (self._rows @ velocity[..., None]).reshape(*velocity.shape[:2], -1, 3)
-        return relative, self.stiffness * np.maximum(-self.gap - time * relative[..., 0], 0.0)
+        force = self.stiffness * np.maximum(-self.gap - time * relative[..., 0], 0.0)
+        return relative, np.where(self.gap + begun * relative[..., 0] > 0.0, 0.0, force)
 
     def _drag(self, force: Floats, relative: Floats) -> Floats:
         """(H, B, C) N s/m: friction by the speed of sliding, under a normal force."""

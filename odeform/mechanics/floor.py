@@ -1,6 +1,6 @@
 """The floor z = 0 under a body: stiff springs under the samples of its support."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -27,6 +27,10 @@ class Floor:
     """(S,) N/m of each sample."""
     preload: Float[np.ndarray, " modes"]
     """(K,) modal force of the floor at rest, which the body's own stress balances."""
+
+    def under_any_side(self, height: float) -> "Floor":
+        """The same springs for a body that may lie on any side; its mass centre rests at `height` m."""
+        return replace(self, level=np.full_like(self.level, height))
 
 
 def stand(body: ReducedBody, parameters: ContactParameters) -> Floor:

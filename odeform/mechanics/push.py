@@ -6,15 +6,37 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from odeform.loads.situation import Pulse
 from odeform.mechanics.body import ReducedBody
-from odeform.types import Floats, Ints, Vectors
+from odeform.types import Floats, Ints, Vector, Vectors
 
-__all__ = ["WIDTHS", "Push", "make_push", "no_push"]
+__all__ = ["WIDTHS", "Patch", "Push", "kicked", "make_push", "no_push"]
 
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
 LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
 PARTS = ("modes", "eigenvalues", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """A force on a patch of each of B bodies, which rises and falls as sin^2 of the time, from time 0 on.
+
+    It acts on what the patch does in the mean, and keeps its direction when the body turns.
+    """
+
+    points: Float[np.ndarray, "batch 3"]
+    """m, from the mass centre."""
+    rows: Float[np.ndarray, "batch 6 directions"]
+    """Displacement (3) and rotation (3) by the directions of deformation, as in `Push`."""
+    forces: Float[np.ndarray, "batch 3"]
+    """N at the peak, in axes of the scene."""
+    duration: float
+    """s"""
+
+    def some(self, rows: Ints) -> "Patch":
+        """Those of the bodies `rows` (R,)."""
+        return replace(self, points=self.points[rows], rows=self.rows[rows], forces=self.forces[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +66,13 @@ class Push:
     """Directions of unit length."""
     forces: Float[np.ndarray, "batch 1"]
     """N along the guide."""
+    patch: Patch | None = None
+    """A force besides that of the sphere."""
 
     def some(self, rows: Ints) -> "Push":
         """The pushes `rows` (R,)."""
         each = {name: getattr(self, name)[rows] for name in PARTS}
-        return replace(self, **each)
+        return replace(self, **each, patch=None if self.patch is None else self.patch.some(rows))
 
     @cached_property
     def over(self) -> "Push":
@@ -85,18 +109,31 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
 
 def no_push(body: ReducedBody, soft: int) -> Push:
     """A body that nothing but the floor touches, in its `soft` softest modes."""
-    support, soft = body.support, min(soft, len(body.eigenvalues))
-    return Push(
-        np.eye(len(body.eigenvalues))[None, :, :soft],
-        body.eigenvalues[None, :soft],
-        len(support.points),
-        np.ascontiguousarray(support.points.T)[None],
-        np.ascontiguousarray(support.rows[..., :soft])[None],
-        support.masses[None],
-        np.zeros((1, 3)),
-        np.eye(3)[:1],
-        np.zeros((1, 1)),
-    )
+    soft = min(soft, len(body.eigenvalues))
+    return _without_sphere(body, np.eye(len(body.eigenvalues))[None, :, :soft], body.eigenvalues[None, :soft], soft)
+
+
+def kicked(body: ReducedBody, soft: int, middle: Vector, pulse: Pulse) -> Push:
+    """A body that a pulse acts on around a point (3,) m, relative to its mass centre. The `soft` softest modes are
+    among the directions of deformation."""
+    around = body.near(middle[None], LOADED)
+    modes, eigenvalues = _directions(body, soft, middle[None], around)
+    surface, near = body.surface, around[0]
+    weights = pulse.weights(surface.points[near], surface.masses[near], middle)
+    rows = np.stack([weights @ row.take(near, axis=0) for row in surface.rows]) @ modes[0]
+    patch = Patch((weights @ surface.points[near])[None], rows[None], pulse.force[None], pulse.duration)
+    return replace(_without_sphere(body, modes, eigenvalues, soft), patch=patch)
+
+
+def _without_sphere(body: ReducedBody, modes: Floats, eigenvalues: Floats, soft: int) -> Push:
+    """One body that moves in directions (1, M, K)."""
+    support = body.support
+    rows = np.empty((1, 6, len(support.points), modes.shape[2]))
+    for row, known in zip(rows[0], support.rows, strict=True):
+        _fill(row, known, modes[0], soft)
+    points, masses = np.ascontiguousarray(support.points.T)[None], support.masses[None]
+    none = np.zeros((1, 3)), np.eye(3)[:1], np.zeros((1, 1))
+    return Push(modes, eigenvalues, len(support.points), points, rows, masses, *none)
 
 
 def _fill(out: Floats, values: Floats, modes: Floats, soft: int) -> None:

@@ -9,8 +9,9 @@ from jaxtyping import Bool, Float, Int
 from odeform.compiling import compiles
 from odeform.mechanics.flat import flat_slopes, packed, unpacked
 from odeform.mechanics.floor import GRAVITY
-from odeform.mechanics.push import Push
+from odeform.mechanics.push import Patch, Push
 from odeform.mechanics.step import Mechanics, Steps
+from odeform.mechanics.touching import most_contacts
 
 if TYPE_CHECKING:
     from odeform.mechanics.compiled_push import Constants
@@ -45,7 +46,7 @@ class PushedBodies:
             some = (times < self._pulse) == pushing
             if some.any():
                 now = unpacked(states[some], pushing)
-                out[some] = flat_slopes(now, self._steps(rows[some], pushing).slope(now))
+                out[some] = flat_slopes(now, self._steps(rows[some], pushing).slope(now, times[some]))
         return out
 
     def advance(self, rows: Rows, times: Each, states: States, steps: Each) -> tuple[States, States, Each]:
@@ -56,8 +57,8 @@ class PushedBodies:
         left = np.minimum(np.maximum(self._pulse - times, 0.0), steps)
         out = states, np.empty_like(states), np.zeros(len(rows))
         pushed = left > SHORTEST
-        out = self._advanced(rows, out, pushed, True, left)
-        return self._advanced(rows, out, ~pushed | (steps - left > SHORTEST), False, steps - left)
+        out = self._advanced(rows, out, pushed, True, times, left)
+        return self._advanced(rows, out, ~pushed | (steps - left > SHORTEST), False, times + left, steps - left)
 
     def _advanced(
         self,
@@ -65,14 +66,15 @@ class PushedBodies:
         known: tuple[States, States, Each],
         some: Bool[np.ndarray, " rows"],
         pushing: bool,
+        times: Each,
         steps: Each,
     ) -> tuple[States, States, Each]:
-        """Some of the states go on; states, slopes and errors of all."""
+        """Some of the states go on from `times`; states, slopes and errors of all."""
         if not some.any():
             return known
         states, slopes, errors = (values.copy() for values in known)
         now, step = unpacked(states[some], pushing), steps[some]
-        after, error = self._steps(rows[some], pushing).advance(now, step)
+        after, error = self._steps(rows[some], pushing).advance(now, step, times[some])
         slopes[some] = flat_slopes(after, (after.velocity - now.velocity) / step[:, None])
         states[some] = packed(after, states[some])
         errors[some] += error
@@ -102,6 +104,8 @@ class CompiledBodies:
 
         mechanics, push, parameters = self._mechanics, self._push, self._mechanics.parameters
         solid, floor, stands = mechanics.body.solid, mechanics.floor, push.support
+        batch, size = push.eigenvalues.shape
+        patch = push.patch or Patch(np.zeros((batch, 3)), np.zeros((batch, 6, size)), np.zeros((batch, 3)), 0.0)
         spread = np.full(6 + push.eigenvalues.shape[1], 1.0 / solid.mass)
         spread[:3], spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
         stiffness, grip = parameters.push_stiffness * push.masses, parameters.push_regularisation * push.masses
@@ -134,6 +138,12 @@ class CompiledBodies:
             projectile=mechanics.projectile.mass,
             reach=mechanics.body.reach,
             pulse=self._pulse,
+            onset=0.0 if mechanics.lands else parameters.floor_damping,
+            most=most_contacts(stands),
+            patch_points=patch.points,
+            patch_rows=patch.rows,
+            patch_forces=patch.forces,
+            patch_pulse=patch.duration,
         )
 
     @property

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import get_lapack_funcs
 
+from odeform.loads.situation import pulse_strength
 from odeform.mechanics.body import ReducedBody
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import parts_of, start_of, unpacked
@@ -17,7 +18,7 @@ from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.push import Push
 from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State, apart, extrapolated
-from odeform.mechanics.touching import Near, Touching
+from odeform.mechanics.touching import Near, Touching, bent
 from odeform.types import Floats
 
 __all__ = ["Mechanics", "Projectile", "Rest", "Steps"]
@@ -59,11 +60,17 @@ class Mechanics:
     rests there."""
     rest: Rest | None = None
     """None where it rests in zero."""
+    free: Float[np.ndarray, " modes"] | None = None
+    """Amplitudes of the body's modes without stress; None where its stress is what balances the floor."""
+    lands: bool = False
+    """Whether it may fall on any side, at any speed: the floor is level for all of them, and its dampers do not act
+    before contact."""
 
     @cached_property
     def floor(self) -> Floor:
         """Springs of the floor."""
-        return stand(self.body, self.parameters)
+        floor = stand(self.body, self.parameters)
+        return floor.under_any_side(self.body.solid.height) if self.lands else floor
 
     @property
     def relaxation(self) -> float:
@@ -83,6 +90,8 @@ class Mechanics:
     def preload(self, push: Push) -> Float[np.ndarray, "batch directions"]:
         """(B, K): what the body's own stress does to its directions of deformation in zero. Where it rests elsewhere,
         it is what keeps each of them there: stiff directions, in which the rest is not known, do not begin to ring."""
+        if self.free is not None:
+            return -(self.parameters.stiffness * self.body.eigenvalues * self.free) @ push.modes
         if self.rest is None:
             return self.stress * self.floor.preload @ push.modes
         steps = Steps(self, push, np.zeros_like(push.eigenvalues))
@@ -97,6 +106,7 @@ class Steps:
         parameters, solid = mechanics.parameters, mechanics.body.solid
         batch, size = push.eigenvalues.shape
         self._solid, self._relaxation, self._forces = solid, mechanics.relaxation, push.forces
+        self._patch = push.patch
         self._eigenvalues, self._preload = parameters.stiffness * push.eigenvalues, preload
         self._masses = np.concatenate([np.full(3, solid.mass), np.zeros(3), np.ones(size), [mechanics.projectile.mass]])
         self._stiffness = np.zeros((batch, len(self._masses)))
@@ -111,17 +121,20 @@ class Steps:
                 parameters,
                 mechanics.projectile.radius,
                 mechanics.body.reach,
+                mechanics.lands,
             )
             for pushed in (True, False)
         }
 
-    def advance(self, state: State, step: float | Floats) -> tuple[State, Floats]:
-        """One step of second order, of `step` seconds, or of (B,) for each motion its own: twice two half steps less a
-        whole one. Also returns its error (B,) in m: how far the two half steps are from the whole one."""
+    def advance(self, state: State, step: float | Floats, time: float | Floats = 0.0) -> tuple[State, Floats]:
+        """One step of second order from `time` s on, of `step` seconds, or of (B,) for each motion its own: twice two
+        half steps less a whole one. Also returns its error (B,) in m: how far the two half steps are from the whole
+        one."""
         # the whole step and the first half begin with the same contacts
-        near = self._touching[state.pushed].near(state, step)
-        begun = self._implicit(state, near, np.array([step, 0.5 * step]))
-        whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step])).after(0)
+        near, middle = self._touching[state.pushed].near(state, step), time + 0.5 * np.asarray(step)
+        begun = self._implicit(state, near, np.array([step, 0.5 * step]), np.array([time + np.asarray(step), middle]))
+        end = np.array([time + np.asarray(step)])
+        whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step]), end).after(0)
         between = apart(fine, whole)
         return extrapolated(whole, fine, between), self._size(between, fine.velocity - whole.velocity)
 
@@ -130,21 +143,23 @@ class Steps:
         ahead = AHEAD * speed[:, : between.shape[1]]
         return np.sqrt((between * between + ahead * ahead) @ self._spread)
 
-    def slope(self, state: State) -> Floats:
-        """Computes (B, V) accelerations."""
+    def slope(self, state: State, time: float | Floats = 0.0) -> Floats:
+        """Computes (B, V) accelerations at `time` s, one or (B,)."""
         local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
         _, rate = self._free(state, local)
         rate[:, inner] -= self._relaxation * self._eigenvalues * local[:, inner]
         rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
+        rate += self._patched(state, np.asarray(time)[None])[0]
         matrix = np.zeros((*local.shape, local.shape[1]))
         self._add_masses(matrix, self._masses[: local.shape[1]])
         return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
 
-    def _implicit(self, state: State, near: Near, steps: Floats) -> State:
-        """The states (H, B) after one step of first order of each of H lengths in s, (H,) or (H, B)."""
+    def _implicit(self, state: State, near: Near, steps: Floats, ends: Floats) -> State:
+        """The states (H, B) after one step of first order of each of H lengths in s, which end at `ends`, both (H,) or
+        (H, B)."""
         velocity, step = _turned(state.velocity, state.rotation), steps.reshape(len(steps), -1, 1)
         momentum, rate = self._free(state, velocity)
-        momentum, size = momentum + step * rate, velocity.shape[1]
+        momentum, size = momentum + step * (rate + self._patched(state, ends)), velocity.shape[1]
         masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]
         contacts, velocity = near.contacts(state), velocity[None]
         for _ in range(SWEEPS):
@@ -165,6 +180,21 @@ class Steps:
         rate[:, 6 : state.body] = -self._eigenvalues * state.modes - self._preload
         rate[:, state.body :] = self._forces[:, : int(state.pushed)]
         return momentum, rate
+
+    def _patched(self, state: State, times: Floats) -> Floats:
+        """(H, B, V) what the force on the patch adds to the rate of the momentum of a state at each of H times in s,
+        (H,) or (H, B), in axes of the bodies."""
+        patch, out = self._patch, np.zeros((len(times), *state.velocity.shape))
+        if patch is None:
+            return out
+        turning, place = bent(patch.points[:, :, None], patch.rows[:, :, None], state)
+        force = (patch.forces[:, None] @ state.rotation)[:, 0]
+        local = (force[:, None] @ turning.rotations[:, 0])[:, 0]
+        strength = pulse_strength(times, patch.duration).reshape(len(times), -1, 1)
+        out[..., :3] = strength * force
+        out[..., 3:6] = strength * np.cross(place[..., 0], force)
+        out[..., 6 : state.body] = strength * (local[:, None] @ patch.rows[:, :3])[:, 0]
+        return out
 
     def _add_masses(self, matrix: Floats, masses: Floats) -> None:
         """To matrices (..., V, V): masses (..., V), and inertia."""

@@ -14,11 +14,16 @@ from odeform.mechanics.state import State
 from odeform.mechanics.warping import Turning
 from odeform.types import Floats, Ints, Rotations
 
-__all__ = ["Near", "Touching"]
+__all__ = ["Near", "Touching", "bent", "most_contacts"]
 
 MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
-FLOOR, PUSH = 64, 64  # contacts with the floor and with the projectile that are followed: thin parts wrap around it
+PUSH = 64  # contacts with the projectile that are followed: thin parts wrap around it
 UP_FIRST = [2, 0, 1]  # the scene's axes, as those of contacts with the floor
+
+
+def most_contacts(support: int) -> int:
+    """How many contacts with the floor are followed, of the samples that may touch it."""
+    return max(64, support // 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +39,12 @@ class Near:
     """Displacements there by the directions of deformation, as in `Push`."""
     level: Float[np.ndarray, "batch floor"]
     """m, as in `Floor`."""
-    springs: Float[np.ndarray, "4 batch contacts"]
+    springs: Float[np.ndarray, "5 batch contacts"]
     """Parameters of springs, as in `Contacts`."""
 
     def contacts(self, state: State) -> Contacts:
         """Linearised about a state, in axes of the bodies, in which samples need no rotation."""
-        turning, place = _bent(self.points, self.rows, state)
+        turning, place = bent(self.points, self.rows, state)
         floor, at_sphere = self.level.shape[1], place[..., self.level.shape[1] :]
         axes = np.empty((len(place), place.shape[2], 3, 3))
         gap = np.empty((len(place), place.shape[2]))
@@ -64,13 +69,16 @@ class Near:
 class Touching:
     """Finds where B pushed bodies may touch something."""
 
-    def __init__(self, push: Push, floor: Floor, parameters: ContactParameters, radius: float, reach: float) -> None:
+    def __init__(
+        self, push: Push, floor: Floor, parameters: ContactParameters, radius: float, reach: float, lands: bool
+    ) -> None:
         """Spheres of `radius` m push for as long as states hold them; no sample of the support is farther than `reach`
-        m from the mass centre."""
+        m from the mass centre. The floor's dampers act before contact, unless a body `lands`."""
         self._push, self._parameters = push, parameters
+        self._most = most_contacts(push.support)
         self._radius, self._level, self._reach = radius, floor.level, reach
         batch, _, samples = push.points.shape
-        self._springs = np.empty((4, batch, samples))
+        self._springs = np.empty((5, batch, samples))
         stands, pushed = self._springs[..., : push.support], self._springs[..., push.support :]
         mass = push.masses[:, push.support :]
         stands[0], stands[1], stands[2] = floor.stiffness, parameters.floor_damping, parameters.floor_friction
@@ -78,6 +86,7 @@ class Touching:
         pushed[0] = parameters.push_stiffness * mass
         pushed[1], pushed[2] = parameters.push_damping, parameters.push_friction
         pushed[3] = parameters.push_regularisation * mass
+        stands[4], pushed[4] = 0.0 if lands else parameters.floor_damping, parameters.push_damping
         self._first = samples * np.arange(batch)[:, None]  # of each body, among all samples
         self._row = samples * np.arange(6)[:, None]
 
@@ -85,11 +94,11 @@ class Touching:
         """The samples that may touch something in a step of `step` seconds, one or (B,). There may be none. Where
         another motion has more, others go along, which have no stiffness."""
         push = self._push
-        _, place = _bent(push.points, push.rows, state)
+        _, place = bent(push.points, push.rows, state)
         height = _heights(place[..., : push.support], self._level, state)
         spin = np.sqrt((state.velocity[:, 3:6] ** 2).sum(axis=1))
         down = np.minimum(state.velocity[:, 2] - self._reach * spin, 0.0)
-        stand, real = _nearest(height, MARGIN - (2.0 * step + self._parameters.floor_damping) * down, FLOOR)
+        stand, real = _nearest(height, MARGIN - (2.0 * step + self._parameters.floor_damping) * down, self._most)
         chosen = stand
         if state.pushed:
             away = place[..., push.support :] - _centre(push, state)
@@ -99,7 +108,7 @@ class Touching:
             pushed, touched = _nearest(distance, self._radius + MARGIN + way, PUSH)
             chosen = np.concatenate([stand, push.support + pushed], axis=1)
             real = np.concatenate([real, touched], axis=1)
-        springs = self._springs.reshape(4, -1).take(self._first + chosen, axis=1)
+        springs = self._springs.reshape(5, -1).take(self._first + chosen, axis=1)
         springs[0] *= real
         return Near(
             push,
@@ -111,7 +120,7 @@ class Touching:
         )
 
 
-def _bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
+def bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
     """How much samples turn, and where they are, in m from the mass centre."""
     batch, _, samples, size = rows.shape
     motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)

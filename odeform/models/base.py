@@ -12,6 +12,8 @@ import numpy as np
 from odeform.checkpoint import Checkpoint, arrays_of_object, write_checkpoint
 from odeform.errors import InputError
 from odeform.geometry.upright import stand_up
+from odeform.loads.load import Load
+from odeform.loads.registry import PUSH, get_load, known_loads
 from odeform.models.batch_parameters import parameter_sets
 from odeform.models.error_band import error_band
 from odeform.models.frontier import FrontierPoint
@@ -87,6 +89,10 @@ class Predictor(ABC):
     final_only: bool = False
     """Whether only the state at the end of the window is predicted; nothing else is scored then."""
 
+    takes_loads: bool = False
+    """Whether it computes its bodies under any load of `odeform.loads`."""
+    unloaded: "Predictor | None" = None
+    """The model as it was trained, of one under another load."""
     knows_objects: bool = False
     """Whether one training covers all objects of a scene; otherwise there is one for each object."""
     closed_form: bool = False
@@ -307,6 +313,44 @@ class Predictor(ABC):
             return None
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
         return None if band is None else band.at(self.schema.vector(parameters), times)
+
+    @property
+    def loads(self) -> tuple[str, ...]:
+        """Names of the loads under which it computes its bodies; empty for models that know one scene only."""
+        return known_loads() if self.takes_loads else ()
+
+    def under(self, load: str) -> "Predictor":
+        """The model of the same bodies under another load, such as "drop", "throw" or "kick".
+
+        Nothing of it is learned from motions under that load but what its contacts with the floor are like.
+
+        Raises:
+            InputError: An unknown load, or a model that knows the motions of its training data only.
+
+        Examples:
+            >>> import odeform
+            >>> drop = odeform.load("contact-force").under("drop")
+            >>> motion = drop.solve(parameters={"object": "donut", "height": 0.2, "turn_x": 90.0})
+            >>> round(float(motion.vertices(0.0)[:, 2].min()), 3)
+            0.2
+        """
+        root = self.unloaded or self
+        if load == PUSH:
+            return root
+        found = root.of_same_kind(root.under_load(root.checkpoint, get_load(load)))
+        found.unloaded = root
+        return found
+
+    @classmethod
+    def under_load(cls, checkpoint: Checkpoint, load: Load) -> Checkpoint:
+        """The checkpoint of the same bodies in the scene of a load; `InputError` where that cannot be."""
+        raise InputError(
+            f"load {load.name!r}: {cls.model} knows the motions of its training data only; expected a mechanical model"
+        )
+
+    def of_same_kind(self, checkpoint: Checkpoint) -> "Predictor":
+        """Reads another checkpoint as this one was read."""
+        return type(self)(checkpoint)
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint, which `odeform.load` reads."""

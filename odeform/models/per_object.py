@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from odeform.checkpoint import Checkpoint, arrays_of_object
+from odeform.loads.load import Load
 from odeform.models.base import Predictor
 from odeform.models.frontier import FrontierPoint
 from odeform.motion.base import Motion
@@ -79,7 +80,7 @@ class PerObject(Predictor):
         self.model, self.made_of = self._kind.model, self._kind.made_of
         self.qualities, self.frontier = first.qualities, first.frontier
         self.rescales_input, self.extrapolates = first.rescales_input, first.extrapolates
-        self.final_only = first.final_only
+        self.final_only, self.takes_loads = first.final_only, first.takes_loads
 
     def _solve(
         self,
@@ -96,6 +97,12 @@ class PerObject(Predictor):
     ) -> MotionBatch:
         # the object is the same for all
         return self.parts[sets[0][OBJECT]]._solve_batch(geometry, sets, settings, until)
+
+    def under_load(self, checkpoint: Checkpoint, load: Load) -> Checkpoint:  # pyright: ignore[reportIncompatibleMethodOverride]
+        return self._kind.under_load(checkpoint, load)
+
+    def of_same_kind(self, checkpoint: Checkpoint) -> Predictor:
+        return PerObject(checkpoint, self._kind)
 
     def model_of(self, parameters: Parameters) -> Predictor:
         return self.parts[parameters[OBJECT]]

@@ -42,6 +42,8 @@ class ReducedModel(Predictor):
     """How many motions are solved at once, as many as need a few tens of megabytes; 0: one by one."""
     reach: ClassVar[tuple[float, float]] = (1.0, BEYOND)
     """Half trained ranges up to which inputs are as they are asked for, and how far they go beyond."""
+    flat_on: float | None = None
+    """Height in metres of a floor on which points that would be below it lie, as of `ReducedMotion`."""
     continues_itself: bool = False
     """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
 
@@ -111,9 +113,8 @@ class ReducedModel(Predictor):
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
         trajectory = self._continued(self.inputs(parameters), evaluated, settings, until)
         shown = Shown(trajectory, self.to_body)
-        return ReducedMotion(
-            self.schema, parameters, geometry, self.space, evaluated, shown, self.validity, self.checked_body
-        )
+        valid, body = self.validity, self.checked_body
+        return ReducedMotion(self.schema, parameters, geometry, self.space, evaluated, shown, valid, body, self.flat_on)
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
         """Returns what is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
@@ -147,6 +148,7 @@ class ReducedModel(Predictor):
             window,
             parts,
             lambda azimuth: self.evaluate_basis(geometry, azimuth),
+            self.flat_on,
         )
 
     def _continued_batch(

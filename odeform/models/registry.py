@@ -6,6 +6,7 @@ from typing import TypeVar
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
+from odeform.loads.registry import PUSH, get_load, known_loads
 from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
 from odeform.models.names import ALIASES, MODELS, TRAINABLE
@@ -49,11 +50,20 @@ def model_class(name: str) -> type[Predictor]:
 
 def open_checkpoint(name: str | Path) -> Checkpoint:
     """Opens a checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE
-    or SCENE/MODEL. `InputError` for anything else."""
-    path = resolve_checkpoint(str(name))
+    or SCENE/MODEL; of a mechanical model also NAME:LOAD, its bodies under another load. `InputError` for anything
+    else."""
+    file, load = _split(str(name))
+    path = resolve_checkpoint(file)
     if path.suffix.lower() == ENDING:
         return read_authors_checkpoint(path)
-    return read_checkpoint(path)
+    checkpoint = read_checkpoint(path)
+    return checkpoint if load == PUSH else model_class(checkpoint.model).under_load(checkpoint, get_load(load))
+
+
+def _split(name: str) -> tuple[str, str]:
+    """The checkpoint and the load of a name as "contact-force:drop"."""
+    start, separator, end = name.rpartition(":")
+    return (start, end) if separator and end in known_loads() and not Path(name).exists() else (name, PUSH)
 
 
 def load(name: str | Path) -> Predictor:
@@ -61,7 +71,8 @@ def load(name: str | Path) -> Predictor:
 
     Args:
         name: Path of a checkpoint (`.safetensors`, or `.pth` of the paper's authors), or name of a bundled one: SCENE,
-            which is its own ODeform model, or SCENE/MODEL.
+            which is its own ODeform model, or SCENE/MODEL. NAME:LOAD are the bodies of a mechanical model under
+            another load, as `Predictor.under` has them.
 
     Raises:
         InputError: Not a checkpoint, or one of an unknown model.
@@ -72,6 +83,8 @@ def load(name: str | Path) -> Predictor:
         'rolling'
         >>> odeform.load("mass-elastic/pod-rbf").model
         'pod-rbf'
+        >>> odeform.load("contact-force:drop").schema.scene
+        'object-drop'
     """
     checkpoint = open_checkpoint(name)
     try:

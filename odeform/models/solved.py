@@ -33,6 +33,8 @@ class Problem(NamedTuple):
     """(T,) seconds and states (T, S) there -> coordinates (T, 6 + K) in metres and radians."""
     begin: float = 0.0
     """Seconds; at times before it, the readout is given the state at it."""
+    at_rest: bool = True
+    """Whether the motion begins at rest in zero of its coordinates."""
 
 
 class SolvedTrajectory:
@@ -96,12 +98,13 @@ class SolvedTrajectory:
         return self._sample(times)
 
     def reduced(self, times: Floats) -> Floats:
-        """Maps (T,) seconds to (T, 6 + K); zero at time 0."""
+        """Maps (T,) seconds to (T, 6 + K); zero at time 0 of a motion that begins there."""
         times = np.asarray(times, dtype=float)
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))
         # y(0) = 0 bit-exactly: a product over many rows rounds differently from that over one
-        return self._problem.readout(times, self._sample(times)) * (times > 0.0)[:, None]
+        moves = (times > 0.0)[:, None] | (not self._problem.at_rest)
+        return self._problem.readout(times, self._sample(times)) * moves
 
     @cached_property
     def _error_mm(self) -> float | None:

@@ -29,6 +29,8 @@ class BatchProblem(NamedTuple):
     readout: BatchReadout
     begin: float = 0.0
     """Seconds."""
+    at_rest: bool = True
+    """As of `Problem`."""
 
 
 class SolvedBatch:
@@ -46,7 +48,7 @@ class SolvedBatch:
         self._wall_ms = 1e3 * (time.perf_counter() - begin)
 
     def _solved(self, until: float) -> tuple[BatchSolution, BatchReadout]:
-        field, start, readout, begin = self._make()
+        field, start, readout, begin, self._at_rest = self._make()
         until = max(until, begin + self._least)
         return integrate_batch(field, start, self._settings, until, check_cancelled, begin), readout
 
@@ -76,6 +78,6 @@ class SolvedBatch:
         return self._solution.sample(times)
 
     def reduced(self, times: Times) -> Float[np.ndarray, "batch times y"]:
-        """Maps (T,) seconds to (B, T, 6 + K); zero at time 0."""
+        """Maps (T,) seconds to (B, T, 6 + K); zero at time 0 of motions that begin there."""
         states = self.states(times)
-        return self._readout(times, states) * (times > 0.0)[:, None]
+        return self._readout(times, states) * ((times > 0.0)[:, None] | (not self._at_rest))

@@ -57,9 +57,11 @@ class ReducedBatch(MotionBatch):
         window: Window,
         parts: Sequence[BatchPart],
         basis: Callable[[float], EvaluatedBasis],
+        flat_on: float | None = None,
     ) -> None:
-        """`basis` evaluates that of the geometry at an azimuth in radians."""
+        """`basis` evaluates that of the geometry at an azimuth in radians; `flat_on` is as of `ReducedMotion`."""
         super().__init__(sets, one)
+        self._flat_on = flat_on
         self._window, self._parts, self._basis = window, parts, basis
 
     @property
@@ -93,6 +95,8 @@ class ReducedBatch(MotionBatch):
             for row, *one in zip(rows.tolist(), y, weights, rotations, strict=True):
                 # as of a single motion: products of more rows round differently
                 out[row] = moved_points(evaluated, *one)
+                if self._flat_on is not None:
+                    np.maximum(out[row][..., 2], np.float32(self._flat_on), out=out[row][..., 2])
 
         return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
 

@@ -40,6 +40,9 @@ class ReducedMotion(Motion):
     trajectory: Trajectory
     validity: Validity = UNKNOWN
     body: CheckedBody | None = None
+    flat_on: float | None = None
+    """Height in metres of a floor on which points that would be below it lie: what is in contact gives way there.
+    None: a motion is as its coordinates say."""
 
     def _make_check(self) -> PlausibilityCheck | None:
         body, trajectory, window = self.body, self.trajectory, self.schema.window
@@ -74,6 +77,8 @@ class ReducedMotion(Motion):
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)
         out = moved_points(self.evaluated, y, *placements(self.space, y, self.schema.azimuth(self.parameters)))
+        if self.flat_on is not None:
+            np.maximum(out[..., 2], np.float32(self.flat_on), out=out[..., 2])
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
@@ -81,7 +86,13 @@ class ReducedMotion(Motion):
         return out[0] if np.ndim(t) == 0 else out
 
     def local(self, t: float | Times) -> Points | Frames:
-        out = self._deformation(self._reduced(t)) @ self._to_canonical_axes.astype(np.float32)
+        y = self._reduced(t)
+        out = self._deformation(y) @ self._to_canonical_axes.astype(np.float32)
+        if self.flat_on is not None:
+            poses = poses_of(self.space, y, self.schema.azimuth(self.parameters)).astype(np.float32)
+            upwards = poses[:, None, 2, :3]
+            heights = ((self.evaluated.points + out) * upwards).sum(axis=-1) + poses[:, 2, 3, None]
+            out += np.maximum(np.float32(self.flat_on) - heights, 0.0)[..., None] * upwards
         return out[0] if np.ndim(t) == 0 else out
 
     def deformed(self, t: float) -> Points:

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from odeform.loads.arrow import Arrow
 from odeform.schema import OBJECT, Parameters, Schema
-from odeform.simulation.glyphs import Arrow
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
 from odeform.surroundings import Contacts, Surroundings
 from odeform.types import Mesh, MotionSequence, Points

@@ -1,17 +1,21 @@
 """The sliders of the scene's parameters, with presets and marks where the model was trained."""
 
 import math
+import threading
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import viser
 
 from odeform.errors import InputError
-from odeform.schema import Parameter, Schema
+from odeform.loads.registry import load_of_scene
+from odeform.schema import OBJECT, Parameter, Schema
 from odeform.types import Floats
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.object_choice import LABELS, ObjectChoice
 from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 from odeform_viz.view import Description
@@ -43,8 +47,11 @@ def slider_step(low: float, high: float) -> float:
 
 
 def presets(schema: Schema) -> dict[str, dict[str, float]]:
-    """Returns the defaults, and the corners of the trained range of the first two learned parameters."""
+    """Returns what a load has; in other scenes the defaults, and the corners of the trained range of the first two
+    learned parameters."""
     defaults = {p.name: p.default for p in schema.parameters}
+    if (load := load_of_scene(schema.scene)) is not None:
+        return {name: {**defaults, **values} for name, values in load.presets.items()}
     out = {"defaults": defaults}
     first, second = schema.learned[0], schema.learned[min(1, len(schema.learned) - 1)]
     for one in ("low", "high"):
@@ -90,22 +97,32 @@ class ParameterPanel(Panel):
     """A slider per parameter with its unit, its trained range and the training samples in it."""
 
     def __init__(self, page: Page) -> None:
-        self._schema, self._wake, self._on_event_loop = page.schema, page.wake, page.on_event_loop
+        self._page, self._schema = page, page.schema
+        self._wake, self._on_event_loop = page.wake, page.on_event_loop
         self._samples, self._presets = _training_samples(page.model), presets(page.schema)
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
         self._strips: dict[str, viser.GuiHtmlHandle] = {}
+        self._lock = threading.RLock()
         self._gui = page.server.gui
-        with self._gui.add_folder("Parameters"):
+        load = load_of_scene(self._schema.scene)
+        with self._gui.add_folder("Parameters" if load is None else load.name.capitalize()):
+            self._body = ObjectChoice(page) if self._schema.objects else None
             for parameter in self._schema.parameters:
                 self._add_slider(parameter)
             self._preset = self._gui.add_dropdown(
-                "preset", (NO_PRESET, *self._presets), hint="corners of the trained range"
+                "preset",
+                (NO_PRESET, *self._presets),
+                hint="values worth seeing" if load else "corners of the trained range",
             )
             self._handled_preset = self._preset.value
             self._preset.on_update(self._choose)
             reset = self._gui.add_button_group("reset", ("all", *(p.name for p in self._schema.parameters)))
             reset.on_click(self._reset)
         page.controls.parameters, page.controls.set_parameters = self.parameters, self.set
+        if self._body is not None:
+            self._body.changed()
+            self._show_body()
+            page.on_columns_changed(self._follow_body)
         self._refresh()
 
     @classmethod
@@ -115,35 +132,65 @@ class ParameterPanel(Panel):
     def _add_slider(self, parameter: Parameter) -> None:
         low, high = slider_range(parameter)
         trained = f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
+        name = LABELS.get(parameter.name, parameter.name)
         slider = self._gui.add_slider(
-            parameter.label,
+            f"{name} ({parameter.unit})" if parameter.unit else name,
             min=round(low, 4),
             max=round(high, 4),
             step=slider_step(low, high),
             initial_value=parameter.default,
-            marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}")),
-            hint=f"{parameter.description}; trained range {trained}",
+            marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}"))
+            if parameter.role != "body"
+            else None,
+            hint=f"{parameter.description}; trained range {trained}"
+            if parameter.role != "body"
+            else parameter.description,
         )
         slider.on_update(lambda _: self._wake())
         self._sliders[parameter.name] = slider
-        if parameter.role != "azimuth":
+        if parameter.role == "physical":
             self._strips[parameter.name] = self._gui.add_html("")
 
-    def parameters(self) -> dict[str, float]:
-        """The values of the sliders. `InputError` for values that no slider can have."""
-        values = self._values()
+    def parameters(self) -> dict[str, Any]:
+        """The values of the sliders, and the object. `InputError` for values that no slider can have."""
+        with self._lock:
+            if self._body is not None and self._body.changed():
+                self._show_body()
+            values = self._values()
         for name, slider in self._sliders.items():
             if not slider.min <= values[name] <= slider.max:
                 expected = f"expected a finite number from {slider.min:g} to {slider.max:g}"
                 raise InputError(f"{name}: {expected}, got {values[name]:g}")
-        return values
+        return {**self._of_object(), **values}
 
-    def set(self, parameters: Mapping[str, float]) -> None:
+    def set(self, parameters: Mapping[str, Any]) -> None:
         """Move the sliders of these names. `InputError` for unknown names and values that no motion can have."""
         complete = self._schema.complete(parameters)
-        for name in parameters:
-            slider = self._sliders[name]
-            slider.value = min(max(complete[name], slider.min), slider.max)
+        with self._lock:
+            if self._body is not None and OBJECT in parameters and self._body.choose(str(parameters[OBJECT])):
+                self._show_body()
+            for name in parameters.keys() & self._sliders.keys():
+                slider = self._sliders[name]
+                slider.value = min(max(complete[name], slider.min), slider.max)
+        self._wake()
+
+    def _of_object(self) -> dict[str, str]:
+        return {} if self._body is None else {OBJECT: self._body.name}
+
+    def _show_body(self) -> None:
+        """Let the sliders of the body be those of the chosen object, as it is by itself."""
+        assert self._body is not None
+        self._presets = {name: {**preset, **self._body.own} for name, preset in self._presets.items()}
+        for parameter in self._body.parameters:
+            slider = self._sliders[parameter.name]
+            slider.min, slider.max = _rounded(parameter.low), _rounded(parameter.high)
+            slider.step, slider.value = _rounded(parameter.low / 50.0), _rounded(parameter.default)
+
+    def _follow_body(self) -> None:
+        """After another shape was loaded, mass and stiffness are its own."""
+        with self._lock:
+            if self._body is not None and self._body.changed():
+                self._show_body()
 
     def describe(self, description: Description) -> None:
         self._refresh()
@@ -164,15 +211,17 @@ class ParameterPanel(Panel):
 
     async def _reset(self, event: viser.GuiEvent) -> None:
         # likewise
-        name, defaults = event.target.value, self._presets["defaults"]
+        name, own = event.target.value, {} if self._body is None else self._body.own
+        defaults = {**{p.name: p.default for p in self._schema.parameters}, **own}
         self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
 
     def _refresh(self) -> None:
         """Let the preset and the marks below the sliders follow the sliders."""
         values = self._values()
         self._on_event_loop(self._refresh_preset)
+        known = self._schema.parameters if self._body is None else (*self._body.parameters, *self._schema.parameters)
         for name, strip in self._strips.items():
-            parameter = next(p for p in self._schema.parameters if p.name == name)
+            parameter = next(p for p in known if p.name == name)
             set_content(strip, samples_svg(parameter, self._samples.get(name), values[name]))
 
     def _refresh_preset(self) -> None:
@@ -182,3 +231,7 @@ class ParameterPanel(Panel):
         preset = next((name for name, preset in self._presets.items() if preset == values), NO_PRESET)
         if self._preset.value != preset:
             self._preset.value = self._handled_preset = preset
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")

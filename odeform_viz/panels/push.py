@@ -16,6 +16,7 @@ from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.object_choice import LABELS
 from odeform_viz.pushing import ShownPush, contacts_of, push_excess, surface_of
 from odeform_viz.state import PageState
 from odeform_viz.user_bodies import user_body_of
@@ -25,8 +26,7 @@ __all__ = ["PushPanel"]
 
 MARGIN = 1.5  # times the strongest trained force: the end of the slider
 WIDEST = 60.0  # degrees of each tilt
-LABELS = {"young": "stiffness"}
-HINT = "Click the body to choose where the sphere pushes. Drag the ball at the arrow's tail to change the force."
+HINT = "Click the body to choose where {what}. Drag the ball at the arrow's tail to change the force."
 
 
 class PushPanel(Panel):
@@ -42,9 +42,11 @@ class PushPanel(Panel):
         self._parameters = self._defaults(body.like if body and liked else self._schema.objects[0])
         self._surface = surface_of(page.model, self._parameters)
         gui = page.server.gui
-        with gui.add_folder("Push"):
+        contacts = contacts_of(page.schema)
+        self._sphere = contacts is not None and contacts.radius > 0.0
+        with gui.add_folder("Push" if self._sphere else "Kick"):
             self._object = gui.add_dropdown(
-                "object", self._schema.objects, visible=len(self._schema.objects) > 1, hint="the body that is pushed"
+                "object", self._schema.objects, visible=len(self._schema.objects) > 1, hint="the body"
             )
             self._text = gui.add_markdown("")
             self._strength = gui.add_slider("force (N)", 0.0, 1.0, 0.01, 0.0, hint="")
@@ -54,7 +56,7 @@ class PushPanel(Panel):
                 p.name: gui.add_slider(f"{LABELS.get(p.name, p.name)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)
                 for p in self._of_body()
             }
-            buttons = gui.add_button_group("set", ("no tilt", "first push"), hint="the direction, or the whole push")
+            buttons = gui.add_button_group("set", ("no tilt", "first one"), hint="the direction, or the whole push")
             buttons.on_click(self._clicked)
         for control in (self._object, self._strength, self._up, self._side, *self._body.values()):
             control.on_update(lambda _: page.wake())
@@ -115,7 +117,7 @@ class PushPanel(Panel):
                 parameters = self.parameters()
                 self._check_pick(column, parameters)
                 contact = nearest_on(self._surface, point)
-                if touching_centre(self._surface, contact) is None:
+                if self._sphere and touching_centre(self._surface, contact) is None:
                     raise InputError("The sphere does not fit there: the floor or a part of the body is in its way.")
                 self._adopt(push_from(parameters, self._surface).at(contact))
                 self._write()
@@ -222,7 +224,8 @@ class PushPanel(Panel):
             push, (weakest, strongest) = push_from(self._parameters, self._surface), self._forces()
             self._object.visible = len(self._schema.objects) > 1 and not self._page.model.loaded
             self._strength.max = MARGIN * strongest
-            self._strength.hint = f"of the sphere on the body; trained range {weakest:g} to {strongest:g} N"
+            of = "of the sphere on the body" if self._sphere else "peak of the pulse"
+            self._strength.hint = f"{of}; trained range {weakest:g} to {strongest:g} N"
             shown = (round(push.strength, 3), round(math.degrees(push.up), 1), round(math.degrees(push.side), 1))
             self._object.value = name
             for slider, value in zip((self._strength, self._up, self._side), shown, strict=True):
@@ -241,12 +244,12 @@ class PushPanel(Panel):
         excess = push_excess(push, self._forces())
         parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
         warning = f"⚠ **extrapolated**: {parts}  \n" if excess else ""
-        set_content(self._text, warning + HINT)
+        set_content(self._text, warning + HINT.format(what="the sphere pushes" if self._sphere else "it is kicked"))
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
         # a coroutine runs soon where the message arrives, before a drag that follows it
         with self._lock:
-            if event.target.value == "first push":
+            if event.target.value == "first one":
                 self._parameters = self._defaults(str(self._parameters[OBJECT]))
             else:
                 push = push_from(self.parameters(), self._surface)

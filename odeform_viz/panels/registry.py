@@ -22,6 +22,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("side", "odeform_viz.panels.shape_warning:ShapeWarningPanel"),
     Entry("side", "odeform_viz.panels.playback:PlaybackPanel"),
     Entry("side", "odeform_viz.panels.summary:SummaryPanel"),
+    Entry("side/Explore", "odeform_viz.panels.load:LoadPanel"),
     Entry("side/Explore", "odeform_viz.panels.push:PushPanel"),
     Entry("side/Explore", "odeform_viz.panels.parameters:ParameterPanel"),
     Entry("side/Explore", "odeform_viz.panels.quality:QualityPanel"),

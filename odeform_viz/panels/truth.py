@@ -188,7 +188,7 @@ class TruthPanel(Panel):
         if body is None:
             work, arguments = simulate_motion, (self._schema.scene, parameters, rate)
         else:
-            work, arguments = simulate_user_body, (body.item, parameters, rate)
+            work, arguments = simulate_user_body, (self._schema.scene, body.item, parameters, rate)
         with self._starting:
             if self._job is not None and self._job.running:
                 return

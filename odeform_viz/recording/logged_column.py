@@ -6,9 +6,9 @@ import numpy as np
 import rerun as rr
 
 from odeform.geometry.normals import vertex_normals
+from odeform.loads.arrow import Arrow
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.simulation.glyphs import Arrow
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import GaussianSplats, Mesh, Points
 from odeform_viz.colors import Color, color_of, paler

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from odeform.simulation.glyphs import Arrow
+from odeform.loads.arrow import Arrow
 from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint
 from odeform_viz.colors import ACTING
 from odeform_viz.recording.entities import FLOOR, STILL

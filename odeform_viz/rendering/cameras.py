@@ -29,6 +29,10 @@ class Cameras:
         sizes = [_size(client) for client in self._server.get_clients().values()]
         return max(sizes, key=lambda size: size[0] * size[1], default=USUAL)
 
+    def close(self) -> None:
+        """Aim no camera any more."""
+        self._framing = None
+
     def aim(self, framing: Framing) -> None:
         """Aim the cameras of all browsers, and of those that connect later."""
         self._framing = framing

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 from jaxtyping import Int
 
-from odeform.simulation.glyphs import Arrow
+from odeform.loads.arrow import Arrow
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Points, Pose, Vector
 from odeform_viz.colors import ACTING

@@ -15,6 +15,7 @@ Pull = Callable[[ShownPush, Vector, str], None]
 """Called while the arrow's tail is dragged: the push as it was, where the tail is (3,) m, and the phase of the drag
 ("start", "update" or "end")."""
 MARKER, HANDLE_SIZE = 0.022, 0.035  # radius of the contact's marker and of the arrow's handle, in sizes of the body
+SMALLEST = 1e-3  # m, of a sphere that is never drawn
 SHAFT, HEAD, POINT = 0.016, 0.045, 0.1  # radii and the head's length, likewise
 
 
@@ -65,7 +66,7 @@ class _Nodes:
         self.place = scene.add_frame(self._root, show_axes=False)
         self.marker = scene.add_icosphere(f"{body}/contact", 1.0, CONTACT, subdivisions=2, cast_shadow=False)
         self.sphere = scene.add_icosphere(
-            f"{self._root}/sphere", push.contacts.radius, SPHERE, subdivisions=4, receive_shadow=False
+            f"{self._root}/sphere", max(push.contacts.radius, SMALLEST), SPHERE, subdivisions=4, receive_shadow=False
         )
         self.handle = scene.add_icosphere(f"{self._root}/handle", 1.0, HANDLE, subdivisions=2, cast_shadow=False)
         self.label = scene.add_label(f"{self._root}/label", "", anchor="bottom-center")
@@ -75,7 +76,7 @@ class _Nodes:
         """Place everything as at time 0."""
         tail, head = push.arrow
         self.marker.scale = MARKER * push.size
-        self.sphere.position, self.sphere.visible = push.centre, acting
+        self.sphere.position, self.sphere.visible = push.centre, acting and push.contacts.radius > 0.0
         self.handle.position, self.handle.scale = tail, HANDLE_SIZE * push.size
         self.label.position = tail + np.array([0.0, 0.0, HANDLE_SIZE * push.size])
         text = f"{push.push.strength:.3g} N"

@@ -67,6 +67,10 @@ class SceneView:
         """Aim all cameras as they were before users turned them."""
         self._cameras.aim(self._framing)
 
+    def close(self) -> None:
+        """Leave the cameras of browsers that stay connected to another page."""
+        self._cameras.close()
+
     def publish(self, frame: Frame, options: DisplayOptions, coloring: Coloring | None) -> None:
         """Send one frame, in the bodies' own colors without a `coloring`; clients never see it half.
 

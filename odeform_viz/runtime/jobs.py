@@ -16,6 +16,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.observation import Observation
+from odeform.loads.registry import load_of_scene
 from odeform.models.base import Predictor
 from odeform.types import Geometry, MotionSequence
 
@@ -146,12 +147,18 @@ def simulate_motion(report: Report, scene: str, parameters: dict[str, float], ra
     return known.simulate(parameters, rate=rate, report=report, **longer)
 
 
-def simulate_user_body(report: Report, item: Any, parameters: dict[str, Any], rate: float) -> MotionSequence:
+def simulate_user_body(
+    report: Report, scene: str, item: Any, parameters: dict[str, Any], rate: float
+) -> MotionSequence:
     """Simulates a motion of a soft object (`SoftObject`) that is none of the scene's; see `simulate_motion`."""
     from odeform.simulation.objects.settling import rested
     from odeform.simulation.scenes.contact_force import UNTIL, simulate_object
+    from odeform.simulation.scenes.loaded import simulate_load
 
-    return simulate_object(rested(item), parameters, rate, report=report, until=UNTIL)
+    load = load_of_scene(scene)
+    if load is None:
+        return simulate_object(rested(item), parameters, rate, report=report, until=UNTIL)
+    return simulate_load(load, rested(item), parameters, rate, report=report, until=load.until)
 
 
 def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:

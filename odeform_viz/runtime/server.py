@@ -18,7 +18,7 @@ from odeform.errors import InputError
 from odeform_viz.colors import HANDLE
 from odeform_viz.runtime.access import Access
 
-__all__ = ["open_server", "set_theme", "stop_server"]
+__all__ = ["forget_clients", "open_server", "set_theme", "stop_server"]
 
 SWITCH_INTERVAL = 2e-4  # s after which a waiting thread gets the GIL
 STARTING = threading.Lock()
@@ -95,6 +95,12 @@ def _guarded(access: Access) -> Iterator[None]:
             websockets_server.serve = original
     if not guarded:
         raise RuntimeError("viser started its server in an unknown way, without a check of Host and Origin")
+
+
+def forget_clients(server: viser.ViserServer) -> None:
+    """No longer call what was registered for clients that come and go: the page that did so has ended."""
+    server._client_connect_cb.clear()
+    server._client_disconnect_cb.clear()
 
 
 def stop_server(server: viser.ViserServer) -> None:

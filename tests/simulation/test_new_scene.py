@@ -12,7 +12,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.geometry.primitives import octasphere
 from odeform.schema import Parameter, Parameters, Schema, Window
-from odeform.simulation.glyphs import Arrow
+from odeform.loads.arrow import Arrow
 from odeform.simulation.runner import simulate
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import SCENES, find_scene, get_scene

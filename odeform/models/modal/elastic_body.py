@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from odeform.mechanics.body import ReducedBody, Solid, reduce_body, solid_of
+from odeform.geometry.rigid import best_rigid
+from odeform.mechanics.body import SUPPORT, ReducedBody, Solid, reduce_body, solid_of
 from odeform.mechanics.elasticity import elastic_modes, tangent_stiffness
 from odeform.mechanics.warping import surface_turns
 from odeform.simulation.objects.soft_object import SoftObject
@@ -40,11 +41,19 @@ class ElasticBody:
     solid: Solid
     anchor: Float[np.ndarray, "3"]
     """(3,) m: the mass centre."""
+    free: Float[np.ndarray, " modes"] | None = None
+    """Amplitudes without stress, in root kg m; None in files of before bodies could fly."""
 
-    def reduced(self) -> ReducedBody:
-        """Converts it to the body that the mechanics takes."""
+    def reduced(self, support: int = SUPPORT) -> ReducedBody:
+        """Converts it to the body that the mechanics takes, of which about `support` points may touch the floor."""
         return reduce_body(
-            self.points - self.anchor, self.faces, self.modes, self.modal_rotations, self.eigenvalues, self.solid
+            self.points - self.anchor,
+            self.faces,
+            self.modes,
+            self.modal_rotations,
+            self.eigenvalues,
+            self.solid,
+            support,
         )
 
     @cached_property
@@ -60,6 +69,7 @@ class ElasticBody:
             "body.weights": self.weights,
             "body.anchor": self.anchor,
             "body.inertia": self.solid.inertia,
+            **({} if self.free is None else {"body.free": self.free}),
         }
 
     def shown(self) -> Arrays:
@@ -87,6 +97,7 @@ class ElasticBody:
             dynamic,
             solid,
             arrays["body.anchor"],
+            arrays.get("body.free"),
         )
 
 
@@ -103,4 +114,12 @@ def elastic_body(body: SoftObject, count: int = MODES, dynamic: int = DYNAMIC) -
     points = body.settled[surface].astype(np.float32).astype(float)
     # as a checkpoint holds them, so that training and prediction use the same
     shapes = modes.shapes[:, surface].astype(np.float16).astype(float)
-    return ElasticBody(points, body.faces, body.weights, shapes, modes.eigenvalues, dynamic, solid, anchor)
+    free = modes.shapes.reshape(len(modes.shapes), -1) @ (masses[:, None] * _unloading(body)).ravel()
+    return ElasticBody(points, body.faces, body.weights, shapes, modes.eigenvalues, dynamic, solid, anchor, free)
+
+
+def _unloading(body: SoftObject) -> Points:
+    """(N, 3) m by which nodes move from where they rest to where they would be without stress, the whole body aside."""
+    turn, shift = best_rigid(body.points, body.settled, fractions := body.masses / body.mass)
+    centre = fractions @ body.points
+    return (body.points - centre) @ turn.T + centre + shift - body.settled

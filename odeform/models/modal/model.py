@@ -12,9 +12,12 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
+from odeform.loads.load import Load
+from odeform.loads.registry import load_of_scene
+from odeform.loads.situation import Situation
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion
-from odeform.mechanics.push import Push, make_push
+from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.pushed_batch import pushed_bodies
 from odeform.mechanics.step import Mechanics, Projectile
@@ -23,6 +26,8 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.modal.elastic_body import ElasticBody
+from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
+from odeform.models.modal.loaded import SUPPORT as SIDES
 from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.model import Model
@@ -50,6 +55,8 @@ __all__ = ["EXACT", "QUALITIES", "ModalModel"]
 HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
 SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
 SETTLED = 4  # bodies of another mass and stiffness that are kept
+SKIN = 1e-3  # m below the floor, where what lies on it is flat: bodies at rest are up to that deep in it
+FLATTENED = 0.5  # of its smallest extent, by which a body that lands may be deeper than the floor on which it is flat
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost
 
 QUALITIES = {
@@ -99,6 +106,7 @@ class ModalModel(Model):
     finer = MappingProxyType({EXACT: 0.0})
     knows_objects = True
     resumable = True
+    takes_loads = True
     ablations: ClassVar[Mapping[str, str]] = {"residual": "what is left unexplained is not regressed"}
 
     @classmethod
@@ -107,13 +115,24 @@ class ModalModel(Model):
 
         return train_modal(run)
 
+    @classmethod
+    def under_load(cls, checkpoint: Checkpoint, load: Load) -> Checkpoint:
+        return under_load(checkpoint, load)
+
     def _read(self, checkpoint: Checkpoint) -> None:
         config = checkpoint.config
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
-        self.contact_parameters, self.pulse = ContactParameters.from_json(config["law"]), float(config["pulse_s"])
+        self.load = load_of_scene(checkpoint.schema.scene)
+        law = config["law"] if self.load is None else config.get("impact", config["law"])
+        self.contact_parameters, self.pulse = ContactParameters.from_json(law), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest = float(shift), float(deformation)
+        if self.load is not None:
+            size = float(np.ptp(self.body.points, axis=0).max())
+            self._largest = float("inf"), max(self._largest[1], ROOM * size)
+            floor = self.surroundings.floor if self.surroundings else None
+            self.flat_on = None if floor is None else floor - SKIN
         self._read_settings(config)
         self.qualities = self.qualities or QUALITIES
         if "correction" in config:
@@ -132,7 +151,10 @@ class ModalModel(Model):
         # mechanics loses energy by itself (that of the centre alone may grow, as when a body falls over), and what
         # bends too far comes back: its rigid motion goes on meanwhile
         validity = super().validity
-        return replace(validity, limits=replace(validity.limits, ends=False))
+        limits = replace(validity.limits, ends=False)
+        if self.load is not None:
+            limits = replace(limits, depth=FLATTENED * float(np.ptp(self.body.points, axis=0).min()))
+        return replace(validity, limits=limits)
 
     @property
     def mechanics(self) -> Mechanics:
@@ -177,6 +199,7 @@ class ModalModel(Model):
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
+        vars(out).pop("_loaded", None)
         # a softer body deforms more before it is lost
         largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
         out.space = replace(self.space, largest=largest)
@@ -241,22 +264,52 @@ class ModalModel(Model):
 
         return self._recent.get(theta.tobytes(), found)
 
-    def _push(self, theta: Float[np.ndarray, "batch parameters"]) -> Push:
+    def _begin(self, theta: Float[np.ndarray, "batch parameters"]) -> Beginning:
+        """The motions at theta (B, P), about to begin."""
+        if self.load is not None:
+            return self._loaded.begin([self._situation(row) for row in theta])
         inputs, centres = self._pushed(theta)
-        return make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centres, inputs.force)
+        push = make_push(self.mechanics.body, self.body.dynamic, inputs.contact, centres, inputs.force)
+        return Beginning(push, self.mechanics.start(push), self.pulse)
+
+    def _situation(self, theta: Floats) -> Situation:
+        assert self.load is not None
+        values = {p.name: p.denormalise(float(x)) for p, x in zip(self.schema.learned, theta, strict=True)}
+        return self.load.situation(self.rest, values)
+
+    @cached_property
+    def _loaded(self) -> LoadedBody:
+        """The body in mechanics that lets it fly and land."""
+        (mass, stiffness), settled = self._ratios, self.settled_body
+        body = self.body.reduced(SIDES).changed(mass, stiffness)
+        rest = None if settled is None else settled.mechanics.rest
+        free = None
+        if self.load is not None and self.load.pulse is None and self.body.free is not None:
+            free = np.sqrt(mass) * self.body.free
+        mechanics = Mechanics(body, self.contact_parameters, self.projectile, stiffness / mass, rest, free, lands=True)
+        turn = np.eye(3) if settled is None else settled.turn
+        return LoadedBody(mechanics, self.body.dynamic, self.body.anchor, turn)
 
     def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
         """Reads out states in the directions of deformation of one push."""
         return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
+
+    def batch_inputs(self, sets: Sequence[Parameters]) -> Floats:
+        # mechanics takes loads as they are asked for; what is regressed on pushes does not
+        return super().batch_inputs(sets) if self.load is None else np.stack([self.schema.vector(one) for one in sets])
 
     def residual_inputs(self, theta: Floats) -> ContactInputs:
         return self._pushed(np.atleast_2d(theta))[0]
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
-        push = self._push(theta[None])
-        pushed = PushedBody(self.mechanics, push, self.pulse)
-        return Problem(pushed, pushed.start, self._readout(push.modes[0]))
+        begun = self._begin(theta[None])
+        pushed = PushedBody(self._moving, begun.push, begun.pulse)
+        return Problem(pushed, begun.start[0], self._readout(begun.push.modes[0]), at_rest=begun.at_rest)
+
+    @property
+    def _moving(self) -> Mechanics:
+        return self.mechanics if self.load is None else self._loaded.mechanics
 
     def batch_problem(
         self, theta: Floats, geometry: Geometry, azimuths: Times, dtype: type
@@ -265,20 +318,20 @@ class ModalModel(Model):
 
     def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[BatchProblem, list[_Readout]]:
         """The problem of many pushes, and the readout of each."""
-        push = self._push(theta)
-        bodies = pushed_bodies(self.mechanics, push, self.pulse)
-        readouts = [self._readout(modes) for modes in push.modes]
+        begun = self._begin(theta)
+        bodies = pushed_bodies(self._moving, begun.push, begun.pulse)
+        readouts = [self._readout(modes) for modes in begun.push.modes]
 
         def readout(times: Times, states: Floats) -> Floats:
             return np.stack([read(times, each) for read, each in zip(readouts, states, strict=True)])
 
-        return BatchProblem(bodies, bodies.start, readout), readouts
+        return BatchProblem(bodies, begun.start, readout, at_rest=begun.at_rest), readouts
 
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         motion = self._motion(theta, evaluated, settings, until)
-        return Adjusted(motion, self._projection(motion))
+        return Adjusted(motion, self._projection(motion)) if self.load is None else motion
 
     def _motion(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -305,7 +358,7 @@ class ModalModel(Model):
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
     ) -> BatchTrajectory:
         motion = self._motions(geometry, sets, settings, until)
-        return AdjustedBatch(motion, self._projection(motion))
+        return AdjustedBatch(motion, self._projection(motion)) if self.load is None else motion
 
     def _motions(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float

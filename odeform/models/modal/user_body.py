@@ -164,6 +164,9 @@ class UserBodyPredictor(ModalModel):
     def __reduce__(self) -> tuple[Any, ...]:
         return UserBodyPredictor, (self.trained, self.user_body)
 
+    def under(self, load: str) -> Predictor:
+        return UserBodyPredictor(self.trained.under(load), self.user_body)
+
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
         return self.user_body.item.forces
 

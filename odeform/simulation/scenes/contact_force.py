@@ -8,11 +8,11 @@ import numpy as np
 
 from odeform.geometry.contact import RADIUS, checked_contact
 from odeform.geometry.solids.tetrahedra import inside_out
+from odeform.loads.arrow import Arrow
 from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
 from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.contacts import MASS, YOUNG, vector_of
 from odeform.simulation.errors import SimulationError
-from odeform.simulation.glyphs import Arrow
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.physics import GRAVITY

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from odeform.geometry.rigid import rotation_z
+from odeform.loads.arrow import Arrow
 from odeform.schema import Parameter, Parameters, Schema, Window
-from odeform.simulation.glyphs import Arrow
 from odeform.simulation.objects.ball import (
     FIXED,
     NOTES,

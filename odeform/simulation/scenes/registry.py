@@ -3,6 +3,7 @@
 from importlib import import_module
 
 from odeform.errors import InputError
+from odeform.loads.registry import load_of_scene
 from odeform.schema import Schema
 from odeform.simulation.scene import Scene
 from odeform.surroundings import Surroundings
@@ -22,6 +23,10 @@ def find_scene(name: str) -> Scene | None:
 
     Raises `InputError` for a scene whose schema has another name than the registry.
     """
+    if (load := load_of_scene(name)) is not None:
+        from odeform.simulation.scenes.loaded import scene_of
+
+        return scene_of(load)
     if name not in SCENES:
         return None
     module, attribute = SCENES[name].split(":")

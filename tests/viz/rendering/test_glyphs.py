@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import viser
 
-from odeform.simulation.glyphs import Arrow
+from odeform.loads.arrow import Arrow
 from odeform.simulation.scenes import kick
 from odeform.types import Points
 from odeform_viz.rendering import glyphs

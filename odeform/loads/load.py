@@ -1,0 +1,54 @@
+"""Defines a load: what happens to a soft body, with the sliders and the picture of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from odeform.loads.arrow import Arrow
+from odeform.loads.situation import Situation
+from odeform.schema import Parameter, Parameters, Window
+from odeform.types import Mesh
+
+__all__ = ["SCENES_OF_LOADS", "Load"]
+
+SCENES_OF_LOADS = "object-"
+"""Start of the names of scenes in which a load acts on an object; the name of the load follows."""
+
+
+def _no_arrows(rest: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
+    return ()
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What happens to a body that lies on the floor or begins in the air.
+
+    A load is one file: a module-level value, named in `odeform.loads.registry`, or given to `register_load`.
+    """
+
+    name: str
+    """As in "drop"."""
+    title: str
+    """As in "Drop it", for the page."""
+    parameters: tuple[Parameter, ...]
+    """Its sliders. Mass and stiffness of the body come on top."""
+    window: Window
+    """The time over which its motions are scored, and how often."""
+    until: float
+    """s to which a motion on demand is simulated, unless the body rests before."""
+    situation: Callable[[Mesh, Parameters], Situation]
+    """`situation(rest, parameters)` for the body where it rests on the floor. `InputError` for parameters that describe
+    nothing that can happen."""
+    presets: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Values worth seeing, by a name for people; defaults for what they leave out."""
+    notes: tuple[str, ...] = ()
+    """Remarks for people."""
+    arrows: Callable[[Mesh, Parameters], tuple[Arrow, ...]] = _no_arrows
+    """`arrows(start, parameters)` are what a viewer draws at the body where its motion begins."""
+    pulse: float | None = None
+    """s: how long a force acts at a contact that one chooses on the surface; None for a load without one. Its
+    parameters are then `contact_x` to `_z` and `force_x` to `_z`."""
+
+    @property
+    def scene(self) -> str:
+        """The name of the scene in which it acts on the objects."""
+        return SCENES_OF_LOADS + self.name

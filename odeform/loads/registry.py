@@ -1,0 +1,48 @@
+"""All loads by name."""
+
+from importlib import import_module
+
+from odeform.errors import InputError
+from odeform.loads.load import SCENES_OF_LOADS, Load
+
+__all__ = ["LOADS", "PUSH", "get_load", "known_loads", "load_of_scene", "register_load"]
+
+PUSH = "push"
+"""What happens in the scene `contact-force`, for which models are trained: a sphere pushes."""
+
+LOADS: dict[str, str] = {
+    "drop": "odeform.loads.drop:LOAD",
+    "throw": "odeform.loads.throw:LOAD",
+    "kick": "odeform.loads.kick:LOAD",
+}
+"""Load name to "module:attribute", imported when the load is first asked for."""
+
+_registered: dict[str, Load] = {}
+
+
+def register_load(load: Load) -> None:
+    """Add a load of one's own. `InputError` for a name that is taken."""
+    if load.name in LOADS or load.name == PUSH:
+        raise InputError(f"load {load.name!r}: expected a name that is free")
+    _registered[load.name] = load
+
+
+def known_loads() -> tuple[str, ...]:
+    """The names of all loads; that of the push is the first."""
+    return (PUSH, *LOADS, *_registered)
+
+
+def get_load(name: str) -> Load:
+    """The load of that name; `InputError` where there is none."""
+    if name in _registered:
+        return _registered[name]
+    if name not in LOADS:
+        raise InputError(f"unknown load {name!r}: expected one of {', '.join(known_loads())}")
+    module, _, attribute = LOADS[name].partition(":")
+    return getattr(import_module(module), attribute)
+
+
+def load_of_scene(scene: str) -> Load | None:
+    """The load that acts in the scene of that name; None in other scenes."""
+    name = scene.removeprefix(SCENES_OF_LOADS)
+    return get_load(name) if name != scene and name in {*LOADS, *_registered} else None

@@ -1,0 +1,61 @@
+"""Describes how the motion of a body begins and what acts on it: mechanics and simulator take the same description."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from odeform.geometry.contact import SurfacePoint
+from odeform.types import Floats, Perpoint, Points, Rotations, Vector
+
+__all__ = ["Flight", "Pulse", "Situation", "pulse_strength"]
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A body that begins in the air, without stress and as a rigid body."""
+
+    height: float
+    """m, of its lowest point above the floor."""
+    rotation: Rotations = field(default_factory=lambda: np.eye(3))
+    """(3, 3), from how it rests on the floor."""
+    velocity: Vector = field(default_factory=lambda: np.zeros(3))
+    """(3,) m/s, of its mass centre."""
+    spin: Vector = field(default_factory=lambda: np.zeros(3))
+    """(3,) rad/s."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """A force on a patch of the surface, which rises and falls as sin^2 of the time, from time 0 on."""
+
+    place: SurfacePoint
+    """Its middle, on the body where it rests."""
+    force: Vector
+    """(3,) N at its peak. It keeps its direction when the body turns."""
+    duration: float
+    """s"""
+    radius: float
+    """m: the force on a point falls with its distance from the middle as a Gaussian of this width."""
+
+    def weights(self, points: Points, masses: Perpoint, middle: Vector) -> Perpoint:
+        """Computes (N,) the fractions of the force on points (N, 3) m that stand for `masses` (N,) kg, around `middle`
+        (3,) m; they sum to 1."""
+        away = ((points - middle) ** 2).sum(axis=1)
+        # relative to the nearest one, which is loaded however far away it is
+        weights = masses * np.exp((away.min() - away) / self.radius**2)
+        return weights / weights.sum()
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """How a motion begins, and what acts on the body besides its weight and the floor."""
+
+    flight: Flight | None = None
+    """None for a body that begins at rest on the floor."""
+    pulse: Pulse | None = None
+
+
+def pulse_strength(time: float | Floats, duration: float) -> Floats:
+    """The fraction of its peak, sin^2(pi t / duration), of a pulse that lasts from 0 to `duration`, at `time` s."""
+    inside = np.clip(np.asarray(time, dtype=float), 0.0, duration)
+    return np.sin(np.pi * inside / duration) ** 2

@@ -1,0 +1,130 @@
+"""Begins motions of a body under a load: the state it starts from, and what acts on it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.checkpoint import Checkpoint
+from odeform.loads.load import Load
+from odeform.loads.situation import Flight, Situation
+from odeform.mechanics.flat import parts_of, start_of
+from odeform.mechanics.push import PARTS, Push, kicked, no_push
+from odeform.mechanics.step import Mechanics
+from odeform.mechanics.warping import Turning
+from odeform.schema import Schema
+from odeform.simulation.scenes.registry import get_scene
+from odeform.types import Floats, Points, Rotations, Vector
+
+__all__ = ["ROOM", "SUPPORT", "Beginning", "LoadedBody", "under_load"]
+
+SUPPORT = 400  # points all over the surface that may touch the floor
+ROOM = 0.08  # of a body's size: the largest RMS deformation under any load
+OF_PUSHES = ("correction", "qualities", "frontier", "free_from_s", "val", "own_band", "shape_band")
+MEASURED = ("val.", "gp.", "gains", "times")  # starts of the names of arrays that only pushes have
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """B motions that are about to begin."""
+
+    push: Push
+    start: Float[np.ndarray, "batch state"]
+    pulse: float
+    """s, for which a sphere pushes."""
+    at_rest: bool = True
+    """Whether all of them begin where the body rests on the floor."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedBody:
+    """A body under contact parameters that may fly, and land on any side."""
+
+    mechanics: Mechanics
+    soft: int
+    """Number of its modes that move by themselves."""
+    anchor: Vector
+    """(3,) m: where its mass centre rests, in coordinates of the body that was measured."""
+    turn: Rotations
+    """(3, 3), from the body that was measured to how it rests."""
+
+    def begin(self, situations: Sequence[Situation]) -> Beginning:
+        """The motions under several situations, which all have a pulse, or all have none."""
+        push = _together([self._acted(situation) for situation in situations])
+        resting = self.mechanics.start(push)
+        starts = [
+            row if situation.flight is None else self._flying(situation.flight, push.eigenvalues.shape[1])
+            for row, situation in zip(resting, situations, strict=True)
+        ]
+        return Beginning(push, np.stack(starts), 0.0, all(situation.flight is None for situation in situations))
+
+    def _acted(self, situation: Situation) -> Push:
+        pulse = situation.pulse
+        if pulse is None:
+            return no_push(self.mechanics.body, self.soft)
+        return kicked(self.mechanics.body, self.soft, pulse.place.point - self.anchor, pulse)
+
+    @cached_property
+    def _free(self) -> tuple[Floats, Points]:
+        """Amplitudes (K,) of the modes without stress, and the surface (N, 3) m from the mass centre there."""
+        surface, free = self.mechanics.body.surface, self.mechanics.free
+        amplitudes = np.zeros(self.soft) if free is None else free[: self.soft]
+        motion = surface.rows[..., : len(amplitudes)] @ amplitudes
+        return amplitudes, surface.points + Turning(motion[3:]).warped(motion[:3]).T
+
+    def _flying(self, flight: Flight, directions: int) -> Floats:
+        """(20 + 2 K,): the state of a body in the air."""
+        (amplitudes, surface), state = self._free, start_of(directions)
+        rotation = flight.rotation @ self.turn
+        shift, turn, modes, _, velocity = parts_of(state[None])
+        state[shift] = [0.0, 0.0, flight.height - float((surface @ rotation[2]).min())] - self.anchor
+        state[turn], state[modes][: len(amplitudes)] = rotation.ravel(), amplitudes
+        state[velocity][:6] = np.concatenate([flight.velocity, flight.spin])
+        return state
+
+
+def _together(pushes: Sequence[Push]) -> Push:
+    first = pushes[0]
+    if len(pushes) == 1:
+        return first
+    parts = {name: np.concatenate([getattr(push, name) for push in pushes]) for name in PARTS}
+    patches, patch = [push.patch for push in pushes if push.patch is not None], first.patch
+    if patch is not None:
+        names = ("points", "rows", "forces")
+        patch = replace(patch, **{name: np.concatenate([getattr(p, name) for p in patches]) for name in names})
+    return replace(first, **parts, patch=patch)
+
+
+def under_load(checkpoint: Checkpoint, load: Load) -> Checkpoint:
+    """The checkpoint of a mechanical model as that of another scene, in which a load acts on the same bodies.
+
+    What was measured or regressed on pushes is not in it.
+    """
+    config = _config(checkpoint.config)
+    if "objects" in config:
+        config["objects"] = {
+            name: {**_config(part), "schema": _schema(Schema.from_json(part["schema"]), load).to_json()}
+            for name, part in config["objects"].items()
+        }
+    arrays = {key: array for key, array in checkpoint.arrays.items() if not key.split("/")[-1].startswith(MEASURED)}
+    arrays["training.theta"] = np.zeros((0, len(load.parameters)), np.float32)
+    return replace(checkpoint, schema=_schema(checkpoint.schema, load), config=config, arrays=arrays)
+
+
+def _config(config: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in config.items() if key not in OF_PUSHES}
+
+
+def _schema(schema: Schema, load: Load) -> Schema:
+    scene = get_scene(load.scene)
+    return replace(
+        schema,
+        scene=load.scene,
+        parameters=load.parameters + tuple(p for p in schema.parameters if p.role == "body"),
+        window=replace(load.window, reach=load.until / load.window.stop - 1.0),
+        notes=load.notes,
+        surroundings=scene.surroundings,
+    )

@@ -1,0 +1,116 @@
+"""Scenes in which a load of `odeform.loads` acts on one of the seven objects: `object-drop`, `object-throw`, ..."""
+
+import zlib
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from odeform.loads.arrow import Arrow
+from odeform.loads.kick import STRONGER
+from odeform.loads.load import Load
+from odeform.schema import OBJECT, Parameters, Schema
+from odeform.simulation.contact_draws import contact_draws
+from odeform.simulation.loaded import STEP, released, simulate_situation
+from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.simulation.objects.soft_object import SoftObject
+from odeform.simulation.physics import GRAVITY
+from odeform.simulation.scene import Scene
+from odeform.simulation.scenes.contact_force import changed_object
+from odeform.surroundings import Contacts
+from odeform.types import Mesh, MotionSequence, Points
+
+__all__ = ["forces_of", "scene_of", "simulate_load", "start_of"]
+
+COUNT = 24  # sequences of each object in a standard data set
+
+
+def simulate_load(
+    load: Load,
+    item: SoftObject,
+    parameters: Parameters,
+    rate: float | None = None,
+    step: float = STEP,
+    report: Callable[[float], None] = lambda _: None,
+    until: float | None = None,
+) -> MotionSequence:
+    """One motion of the surface of any soft object under a load to `until` seconds (default: over the load's window),
+    with frames at `rate` Hz. Beyond the window it ends where the body rests.
+
+    Contacts are places on `item` as it rests, and move with its surface where `mass` or `young` change it. Raises
+    `InputError` for what the load does not have, and `SimulationError`.
+    """
+    window, until = load.window, until or load.window.stop
+    situation = load.situation(item.rest_mesh(), parameters)
+    item = changed_object(item, parameters)
+    times, vertices = simulate_situation(item, situation, rate or window.rate, until, step, until > window.stop, report)
+    return MotionSequence(times, vertices, item.faces, item.weights, dict(parameters))
+
+
+def start_of(load: Load, item: SoftObject, parameters: Parameters) -> Mesh:
+    """The surface of the body where its motion begins."""
+    situation = load.situation(item.rest_mesh(), parameters)
+    item = changed_object(item, parameters)
+    points, _ = released(item, situation.flight)
+    return Mesh(points[: item.surface_count].astype(np.float32), item.faces)
+
+
+def forces_of(item: SoftObject) -> tuple[float, float]:
+    """The weakest and the strongest peak of a kick on a body, in newton."""
+    return STRONGER * item.forces[0], STRONGER * item.forces[1]
+
+
+@cache
+def scene_of(load: Load) -> Scene:
+    """The scene in which a load acts on the seven objects."""
+    schema = Schema(load.scene, load.parameters, load.window, notes=load.notes, objects=OBJECTS)
+
+    def simulate(parameters: Parameters, **options: Any) -> MotionSequence:
+        return simulate_load(load, get_object(parameters[OBJECT]), parameters, **options)
+
+    def draw(name: str, count: int, seed: int) -> list[dict[str, Any]]:
+        item = get_object(name)
+        drawn = contact_draws(item.rest_mesh(), forces_of(item), count, [seed, zlib.crc32(name.encode())])
+        return [
+            {
+                f"{key}_{axis}": float(x)
+                for key, row in (("contact", c), ("force", f))
+                for axis, x in zip("xyz", row, strict=True)
+            }
+            for c, f in drawn
+        ]
+
+    def glyphs(parameters: Parameters, points: Points) -> tuple[Arrow, ...]:
+        if not {p.name for p in load.parameters} <= set(parameters):
+            return ()
+        rest = Mesh(points, np.zeros((0, 3), np.int32))
+        return load.arrows(_begun(rest, load, parameters), parameters)
+
+    contacts = None
+    if load.pulse is not None:
+        contacts = Contacts({name: forces_of(get_object(name)) for name in OBJECTS}, load.pulse, 0.0)
+    return Scene(
+        schema=schema,
+        simulate=simulate,
+        rest_mesh=partial(_rest_mesh, OBJECTS[0]),
+        step=STEP,
+        count=COUNT,
+        fixed={"gravity_m_s2": GRAVITY},
+        until=load.until,
+        glyphs=glyphs,
+        contacts=contacts,
+        sampler=draw if load.pulse is not None else None,
+    )
+
+
+def _begun(rest: Mesh, load: Load, parameters: Parameters) -> Mesh:
+    """About where a body that rests at points (N, 3) m begins: what it gives way under its weight aside."""
+    if load.pulse is not None or (flight := load.situation(rest, parameters).flight) is None:
+        return rest
+    turned = (rest.points - rest.points.mean(axis=0)) @ flight.rotation.T
+    return Mesh((turned + np.array([0.0, 0.0, flight.height - turned[:, 2].min()])).astype(np.float32), rest.faces)
+
+
+def _rest_mesh(name: str) -> Mesh:
+    return get_object(name).rest_mesh()
