@@ -13,6 +13,7 @@ from safetensors.numpy import load, save
 from odeform.budget import read_limited
 from odeform.errors import InputError
 from odeform.io import atomic_write, bundled, parse_json, safetensors_metadata
+from odeform.loads.registry import split_load
 from odeform.schema import Schema
 from odeform.types import Arrays
 
@@ -127,11 +128,12 @@ def bundled_checkpoints() -> dict[str, Path]:
 
 
 def resolve_checkpoint(name: str) -> Path:
-    """The bundled checkpoint of the name SCENE or SCENE/MODEL, or else the path; `InputError` if there is neither."""
-    known = bundled_checkpoints()
-    for key in (name, f"{name}/odeform"):
+    """The bundled checkpoint of the name SCENE or SCENE/MODEL, or else the path, in both cases also with a load
+    (`split_load`); `InputError` if there is neither."""
+    known, (file, _) = bundled_checkpoints(), split_load(name)
+    for key in (file, f"{file}/odeform"):
         if key in known:
             return known[key]
-    if not Path(name).exists():
+    if not Path(file).exists():
         raise InputError(f"checkpoint {name!r}: expected a file or one of the bundled {', '.join(known) or 'none'}")
-    return Path(name)
+    return Path(file)

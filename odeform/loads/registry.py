@@ -1,11 +1,12 @@
 """All loads by name."""
 
 from importlib import import_module
+from pathlib import Path
 
 from odeform.errors import InputError
 from odeform.loads.load import SCENES_OF_LOADS, Load
 
-__all__ = ["LOADS", "PUSH", "get_load", "known_loads", "load_of_scene", "register_load"]
+__all__ = ["LOADS", "PUSH", "get_load", "known_loads", "load_of_scene", "register_load", "split_load"]
 
 PUSH = "push"
 """What happens in the scene `contact-force`, for which models are trained: a sphere pushes."""
@@ -40,6 +41,12 @@ def get_load(name: str) -> Load:
         raise InputError(f"unknown load {name!r}: expected one of {', '.join(known_loads())}")
     module, _, attribute = LOADS[name].partition(":")
     return getattr(import_module(module), attribute)
+
+
+def split_load(name: str) -> tuple[str, str]:
+    """The checkpoint and the load of a name such as "contact-force:drop"; the push where it names none."""
+    start, separator, end = name.rpartition(":")
+    return (start, end) if separator and end in known_loads() and not Path(name).exists() else (name, PUSH)
 
 
 def load_of_scene(scene: str) -> Load | None:

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
-from odeform.loads.registry import PUSH, get_load, known_loads
+from odeform.loads.registry import PUSH, get_load, split_load
 from odeform.models.authors.file import ENDING, read_authors_checkpoint
 from odeform.models.base import Predictor
 from odeform.models.names import ALIASES, MODELS, TRAINABLE
@@ -52,18 +52,11 @@ def open_checkpoint(name: str | Path) -> Checkpoint:
     """Opens a checkpoint file of ODeform, a `.pth` of the paper's authors, or a bundled checkpoint by its name SCENE
     or SCENE/MODEL; of a mechanical model also NAME:LOAD, its bodies under another load. `InputError` for anything
     else."""
-    file, load = _split(str(name))
-    path = resolve_checkpoint(file)
+    path, (_, load) = resolve_checkpoint(str(name)), split_load(str(name))
     if path.suffix.lower() == ENDING:
         return read_authors_checkpoint(path)
     checkpoint = read_checkpoint(path)
     return checkpoint if load == PUSH else model_class(checkpoint.model).under_load(checkpoint, get_load(load))
-
-
-def _split(name: str) -> tuple[str, str]:
-    """The checkpoint and the load of a name as "contact-force:drop"."""
-    start, separator, end = name.rpartition(":")
-    return (start, end) if separator and end in known_loads() and not Path(name).exists() else (name, PUSH)
 
 
 def load(name: str | Path) -> Predictor:

@@ -24,6 +24,7 @@ __all__ = ["ParameterPanel", "presets", "slider_range"]
 
 NO_PRESET = "–"
 MARGIN = 0.2  # of the trained span, by which a slider reaches beyond it
+MOST_RESETS = 6  # parameters with a button each that resets them
 BINS = 160  # along a slider; training samples in one bin share a mark
 
 
@@ -116,7 +117,8 @@ class ParameterPanel(Panel):
             )
             self._handled_preset = self._preset.value
             self._preset.on_update(self._choose)
-            reset = self._gui.add_button_group("reset", ("all", *(p.name for p in self._schema.parameters)))
+            names = [p.name for p in self._schema.parameters]
+            reset = self._gui.add_button_group("reset", ("all", *(names if len(names) <= MOST_RESETS else ())))
             reset.on_click(self._reset)
         page.controls.parameters, page.controls.set_parameters = self.parameters, self.set
         if self._body is not None:
@@ -131,20 +133,18 @@ class ParameterPanel(Panel):
 
     def _add_slider(self, parameter: Parameter) -> None:
         low, high = slider_range(parameter)
-        trained = f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
-        name = LABELS.get(parameter.name, parameter.name)
+        name, hint, marks = LABELS.get(parameter.name, parameter.name), parameter.description, None
+        if parameter.role != "body":
+            hint += f"; trained range {parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
+            marks = tuple((end, f"{end:.3g}") for end in (parameter.low, parameter.high))
         slider = self._gui.add_slider(
             f"{name} ({parameter.unit})" if parameter.unit else name,
             min=round(low, 4),
             max=round(high, 4),
             step=slider_step(low, high),
             initial_value=parameter.default,
-            marks=((parameter.low, f"{parameter.low:.3g}"), (parameter.high, f"{parameter.high:.3g}"))
-            if parameter.role != "body"
-            else None,
-            hint=f"{parameter.description}; trained range {trained}"
-            if parameter.role != "body"
-            else parameter.description,
+            marks=marks,
+            hint=hint,
         )
         slider.on_update(lambda _: self._wake())
         self._sliders[parameter.name] = slider
