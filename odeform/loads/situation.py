@@ -58,4 +58,4 @@ class Situation:
 def pulse_strength(time: float | Floats, duration: float) -> Floats:
     """The fraction of its peak, sin^2(pi t / duration), of a pulse that lasts from 0 to `duration`, at `time` s."""
     inside = np.clip(np.asarray(time, dtype=float), 0.0, duration)
-    return np.sin(np.pi * inside / duration) ** 2
+    return np.asarray(np.sin(np.pi * inside / duration) ** 2)

@@ -6,7 +6,6 @@ from collections.abc import Callable
 import numpy as np
 
 from odeform_viz.page import Page, Panel
-from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import MAPPED, Job, stability_image
 
 __all__ = ["StabilityPanel"]
@@ -22,8 +21,8 @@ class StabilityPanel(Panel):
 
     @classmethod
     def needed(cls, page: Page) -> bool:
-        if contacts_of(page.schema) is not None:
-            return False  # contacts lie on surfaces, so the trained range has no corners to map
+        if page.schema.objects:
+            return False  # each has ranges of its own, and contacts lie on surfaces: there are no corners to map
         return bool(page.model.origin)  # the other process loads the checkpoint by its name
 
     def __init__(self, page: Page) -> None:

@@ -13,7 +13,9 @@ def contact(gap: float, axes: Floats | None = None) -> Contacts:
     """A point that moves in three directions, along the normal and across it."""
     jacobian = np.eye(3) if axes is None else axes
     one = np.ones((1, 1))
-    return Contacts(jacobian[None, None], gap * one, STIFFNESS * one, DAMPING * one, FRICTION * one, GRIP * one, DAMPING * one)
+    return Contacts(
+        jacobian[None, None], gap * one, STIFFNESS * one, DAMPING * one, FRICTION * one, GRIP * one, DAMPING * one
+    )
 
 
 def drag(force: float, speed: float) -> float:

@@ -11,8 +11,8 @@ import pytest
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.geometry.primitives import octasphere
-from odeform.schema import Parameter, Parameters, Schema, Window
 from odeform.loads.arrow import Arrow
+from odeform.schema import Parameter, Parameters, Schema, Window
 from odeform.simulation.runner import simulate
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import SCENES, find_scene, get_scene

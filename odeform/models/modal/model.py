@@ -217,6 +217,14 @@ class ModalModel(Model):
             )
         return out
 
+    def with_contact_parameters(self, contact_parameters: ContactParameters) -> "ModalModel":
+        """The same bodies, which meet the floor in another way."""
+        out = copy(self)
+        out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
+        for name in ("_loaded", "_mechanics"):
+            vars(out).pop(name, None)
+        return out
+
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         found = self._at(parameters).settled_body
         return self.rest if found is None else found.rest
