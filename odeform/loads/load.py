@@ -45,8 +45,13 @@ class Load:
     arrows: Callable[[Mesh, Parameters], tuple[Arrow, ...]] = _no_arrows
     """`arrows(start, parameters)` are what a viewer draws at the body where its motion begins."""
     pulse: float | None = None
-    """s: how long a force acts at a contact that one chooses on the surface; None for a load without one. Its
-    parameters are then `contact_x` to `_z` and `force_x` to `_z`."""
+    """s: how long a force acts at a contact that one chooses on the surface of the body on the floor, with parameters
+    `contact_x` to `_z` and `force_x` to `_z`; None for a load under which it begins in the air."""
+
+    @property
+    def flies(self) -> bool:
+        """Whether the body begins in the air, and not where it rests on the floor."""
+        return self.pulse is None
 
     @property
     def scene(self) -> str:

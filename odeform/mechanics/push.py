@@ -15,6 +15,7 @@ __all__ = ["WIDTHS", "Patch", "Push", "kicked", "make_push", "no_push"]
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
 LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
+LONGEST = 0.25  # of a pulse, a step while it acts
 PARTS = ("modes", "eigenvalues", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
 
 
@@ -33,6 +34,11 @@ class Patch:
     """N at the peak, in axes of the scene."""
     duration: float
     """s"""
+
+    def followed(self, times: Floats, steps: Floats, errors: Floats) -> Floats:
+        """Errors (R,) of steps (R,) s from times (R,) s, without bound for those that are too long for the pulse: a
+        step that ends after it has not seen it."""
+        return np.where((times < self.duration) & (steps > LONGEST * self.duration), np.inf, errors)
 
     def some(self, rows: Ints) -> "Patch":
         """Those of the bodies `rows` (R,)."""

@@ -58,7 +58,8 @@ class PushedBodies:
         out = states, np.empty_like(states), np.zeros(len(rows))
         pushed = left > SHORTEST
         out = self._advanced(rows, out, pushed, True, times, left)
-        return self._advanced(rows, out, ~pushed | (steps - left > SHORTEST), False, times + left, steps - left)
+        out = self._advanced(rows, out, ~pushed | (steps - left > SHORTEST), False, times + left, steps - left)
+        return _followed(self._push, times, steps, out)
 
     def _advanced(
         self,
@@ -168,7 +169,13 @@ class CompiledBodies:
 
         out, slopes, errors = np.empty_like(states), np.empty_like(states), np.empty(len(rows))
         advance_all(self._constants, rows, times, states, steps, out, slopes, errors)
-        return out, slopes, errors
+        return _followed(self._push, times, steps, (out, slopes, errors))
+
+
+def _followed(push: Push, times: Each, steps: Each, out: tuple[States, States, Each]) -> tuple[States, States, Each]:
+    """What a step returns, with an error for those that pass over a pulse."""
+    states, slopes, errors = out
+    return states, slopes, errors if push.patch is None else push.patch.followed(times, steps, errors)
 
 
 def pushed_bodies(mechanics: Mechanics, push: Push, pulse: float) -> PushedBodies | CompiledBodies:

@@ -121,7 +121,7 @@ class Touching:
 
 
 def bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
-    """How much samples turn, and where they are, in m from the mass centre."""
+    """How much samples (B, 3, S) turn, and where they are, in m from the mass centre, for rows (B, 6, S, K)."""
     batch, _, samples, size = rows.shape
     motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)
     turning = Turning(motion[:, 3:])

@@ -185,3 +185,14 @@ def test_steps_are_of_second_order_under_a_pulse(block: Block) -> None:
     errors = [np.abs(one[:12] - ends[-1][:12]).max() for one in ends[:-1]]
     assert 3.0 < errors[0] / errors[1] < 5.5
     assert 3.0 < errors[1] / errors[2] < 5.5
+
+
+def test_a_step_does_not_pass_over_a_pulse(block: Block) -> None:
+    """From rest there is nothing that would tell a long step of it."""
+    body, end = flier(block), np.array([0.0, 0.05])
+    begun = body.begin([kick(block, np.array([0.0, 0.0, 30.0]))])
+    coarse, fine = (
+        solved(body, begun, end, SolverSettings("limex", tolerance=t, dtype="float64"))[-1, 2] for t in (1e-2, 1e-6)
+    )
+    assert fine > 0.005
+    assert coarse == pytest.approx(fine, rel=0.2)

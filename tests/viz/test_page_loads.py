@@ -1,0 +1,121 @@
+"""*What happens*: the page of one model under several loads."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browsing import Tab, needs_chromium, open_tab, until
+from conftest import Serve
+
+import odeform
+from odeform.errors import InputError
+from odeform.models.base import Predictor
+from odeform.schema import OBJECT
+from odeform_viz.app import App
+from odeform_viz.columns import Column, columns_under
+from odeform_viz.panels.load import LoadPanel
+from odeform_viz.panels.push import PushPanel
+from odeform_viz.panels.stability import StabilityPanel
+
+
+@pytest.fixture(scope="module")
+def pushed() -> Predictor:
+    return odeform.load("contact-force")
+
+
+@pytest.fixture
+def column(pushed: Predictor) -> Column:
+    return Column("modal", pushed, pushed.rest, origin="contact-force")
+
+
+def _shows(app: App, scene: str) -> bool:
+    frame = app.presenter.frame
+    return frame is not None and bool(frame.columns) and frame.columns[0].motion.schema.scene == scene
+
+
+def test_another_load_is_another_scene_with_its_own_sliders(serve: Serve, column: Column) -> None:
+    app, client = serve(column)
+    for load, control in (
+        ("drop", "height (m)"),
+        ("throw", "spin_y (rad/s)"),
+        ("kick", "force (N)"),
+        ("push", "force (N)"),
+    ):
+        app.show_load(load)
+        scene = "contact-force" if load == "push" else f"object-{load}"
+        assert app.session.schema.scene == scene
+        assert client.until(lambda scene=scene: _shows(app, scene))
+        assert client.until(lambda control=control: control in client.controls)
+        assert app.columns.all[0].origin == ("contact-force" if load == "push" else f"contact-force:{load}")
+        assert not any(isinstance(panel, StabilityPanel) for panel in app.page.panels)
+
+
+def test_sliders_of_the_body_follow_the_object(serve: Serve, column: Column, pushed: Predictor) -> None:
+    app, client = serve(column)
+    app.show_load("drop")
+    assert client.until(lambda: _shows(app, "object-drop"))
+    client.set("object", "donut")
+    own = pushed.complete({OBJECT: "donut"})
+    assert client.until(lambda: app.request().parameters[OBJECT] == "donut")
+    assert app.request().parameters["mass"] == pytest.approx(own["mass"], rel=5e-3)
+    assert client.until(lambda: client.controls["mass (kg)"].value == pytest.approx(own["mass"], rel=5e-3))
+    client.set("preset", "on its side")
+    assert client.until(lambda: app.request().parameters["turn_x"] == 90.0)
+    assert app.request().parameters[OBJECT] == "donut", "a preset is not of one object"
+    assert client.until(lambda: app.presenter.frame.columns[0].motion.parameters["turn_x"] == 90.0)
+
+
+def test_a_kick_has_no_sphere_and_needs_no_room_for_one(serve: Serve, column: Column) -> None:
+    app, client = serve(column)
+    app.show_load("kick")
+    assert client.until(lambda: _shows(app, "object-kick"))
+    panel, shown = app.panel(PushPanel), app.presenter.frame.columns[0]
+    surface = shown.motion.geometry
+    low = surface.points[surface.points[:, 2].argmin()].astype(float)
+    panel.pick(shown.column, low)  # on the floor, where no sphere fits
+    contact = [panel.parameters()[f"contact_{axis}"] for axis in "xyz"]
+    assert np.linalg.norm(np.array(contact) - low) < 1e-3
+
+
+def test_models_of_one_scene_are_left_out(column: Column) -> None:
+    other = odeform.load("mass-elastic/nearest")
+    columns = [column, Column("nearest", other, other.rest)]
+    assert [c.label for c in columns_under(columns, "drop")] == ["modal"]
+    with pytest.raises(InputError, match="no model of the page"):
+        columns_under(columns[1:], "drop")
+
+
+def test_a_recording_is_of_one_scene(serve: Serve, column: Column, tmp_path: Path) -> None:
+    app, client = serve(column)
+    app.recording.start(tmp_path / "one.rrd")
+    app.page.wake()
+    assert client.until(lambda: app.recording.active)
+    with pytest.raises(InputError, match="recording"):
+        app.show_load("drop")
+    assert app.session.schema.scene == "contact-force"
+
+
+def test_pages_of_other_models_do_not_ask(serve: Serve) -> None:
+    kick = odeform.load("kick")
+    app, _ = serve(Column("rolling", kick, kick.rest))
+    assert not any(isinstance(panel, LoadPanel) for panel in app.page.panels)
+
+
+@pytest.fixture
+def tab(column: Column) -> Iterator[Tab]:
+    yield from open_tab(column, control="what happens")
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_a_choice_in_the_browser_builds_the_page_anew(tab: Tab) -> None:
+    before = tab.settled()
+    tab.choose("what happens", "Throw it")
+    assert tab.says("spin_y")
+    assert until(lambda: _shows(tab.app, "object-throw"))
+    assert tab.changes(before)
+    tab.choose("what happens", "Push it with a sphere")
+    assert tab.says("tilt up")
+    assert until(lambda: _shows(tab.app, "contact-force"))
+    assert not tab.errors
