@@ -165,7 +165,7 @@ def torchdiffeq_comparison(model: Model, point: OperatingPoint) -> dict[str, Any
         return {"skipped": f"{error.name} is not installed: pip install 'odeform[dev]'"}
     quality, times = model.qualities["balanced"], model.schema.window.times
     theta, evaluated = model.schema.vector(point.parameters), model.evaluate_basis(model.rest, 0.0)
-    field, start, decode, _ = model.problem(theta, evaluated, np.float32)
+    field, start, decode, *_ = model.problem(theta, evaluated, np.float32)
     # its `rk4` is the 3/8 rule, of the same order and cost; without a step size it steps on the queries (its issue 137)
     options = {} if quality.step is None else {"options": {"step_size": quality.step}}
     tolerance = quality.tolerance or 0.0

@@ -56,7 +56,6 @@ class Situation:
 
 
 def pulse_strength(time: float | Floats, duration: float) -> Floats:
-    """Computes () or (T,) the fraction of its peak, sin^2(pi t / duration), of a pulse from 0 to `duration` s, at `time`
-    s."""
+    """Computes () or (T,) the fraction of its peak, sin^2(pi t / duration), of a pulse from 0 to `duration` s."""
     inside = np.clip(np.asarray(time, dtype=float), 0.0, duration)
     return np.asarray(np.sin(np.pi * inside / duration) ** 2)

@@ -25,9 +25,9 @@ class LoadPanel(Panel):
         self._names = _titles(predictor.loads)
         load = load_of_scene(page.schema.scene)
         self._shown = next(title for title, name in self._names.items() if name == (load.name if load else PUSH))
-        self._choice = page.server.gui.add_dropdown(
-            "what happens", tuple(self._names), initial_value=self._shown, hint="how the motion begins, and what acts on the body"
-        )
+        hint = "how the motion begins, and what acts on the body"
+        titles = tuple(self._names)
+        self._choice = page.server.gui.add_dropdown("what happens", titles, initial_value=self._shown, hint=hint)
         self._choice.on_update(self._chosen)
 
     @classmethod

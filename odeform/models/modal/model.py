@@ -123,7 +123,8 @@ class ModalModel(Model):
         config = checkpoint.config
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
         self.load = load_of_scene(checkpoint.schema.scene)
-        law = config["law"] if self.load is None else config.get("impact", config["law"])
+        self._flies = self.load is not None and self.load.flies
+        law = config.get("impact", config["law"]) if self._flies else config["law"]
         self.contact_parameters, self.pulse = ContactParameters.from_json(law), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
@@ -291,10 +292,9 @@ class ModalModel(Model):
         (mass, stiffness), settled = self._ratios, self.settled_body
         body = self.body.reduced(SIDES).changed(mass, stiffness)
         rest = None if settled is None else settled.mechanics.rest
-        free = None
-        if self.load is not None and self.load.pulse is None and self.body.free is not None:
-            free = np.sqrt(mass) * self.body.free
-        mechanics = Mechanics(body, self.contact_parameters, self.projectile, stiffness / mass, rest, free, lands=True)
+        free = None if self.body.free is None or not self._flies else np.sqrt(mass) * self.body.free
+        parameters, stress = self.contact_parameters, stiffness / mass
+        mechanics = Mechanics(body, parameters, self.projectile, stress, rest, free, lands=self._flies)
         turn = np.eye(3) if settled is None else settled.turn
         return LoadedBody(mechanics, self.body.dynamic, self.body.anchor, turn)
 

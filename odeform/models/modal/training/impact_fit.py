@@ -78,7 +78,7 @@ def impact_fit(model: ModalModel, impacts: Sequence[Impact]) -> ContactParameter
     evaluated = model.evaluate_basis(model.rest, 0.0)
     known = model.contact_parameters
     centre = np.log([getattr(known, name) for name in FITTED])
-    start = np.log([START.get(name, getattr(known, name)) for name in FITTED])
+    start = np.log([START[name] if name in START else getattr(known, name) for name in FITTED])
     firm = np.array(list(FITTED.values()))
 
     def parameters(x: Floats) -> ContactParameters:
