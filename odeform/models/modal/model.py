@@ -132,8 +132,7 @@ class ModalModel(Model):
         if self.load is not None:
             size = float(np.ptp(self.body.points, axis=0).max())
             self._largest = float("inf"), max(self._largest[1], ROOM * size)
-            floor = self.surroundings.floor if self.surroundings else None
-            self.flat_on = None if floor is None else floor - SKIN
+            self.flat_on = self._flat_below(self.rest)
         self._read_settings(config)
         self.qualities = self.qualities or QUALITIES
         if "correction" in config:
@@ -216,6 +215,8 @@ class ModalModel(Model):
             out.settled_body = settled_body(
                 self.body, self.contact_parameters, self.projectile, out._ratios, coordinates, basis
             )
+            if self.load is not None:
+                out.flat_on = self._flat_below(out.settled_body.rest)
         return out
 
     def with_contact_parameters(self, contact_parameters: ContactParameters) -> "ModalModel":
@@ -225,6 +226,11 @@ class ModalModel(Model):
         for name in ("_loaded", "_mechanics"):
             vars(out).pop(name, None)
         return out
+
+    def _flat_below(self, rest: Mesh) -> float | None:
+        """The height below which a body of this rest shape is flat: what rests there already stays as it is."""
+        floor = self.surroundings.floor if self.surroundings else None
+        return None if floor is None else min(floor - SKIN, float(rest.points[:, 2].min()))
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         found = self._at(parameters).settled_body
