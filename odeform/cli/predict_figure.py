@@ -37,7 +37,7 @@ def write_figure(
     fixed = {name: value for name, value in fixed.items() if name not in ranges}
     source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality)
     column = interpolated(predictor.model, source, times, column_bytes(1), _report)
-    page = figure_page([column], sweeps)
+    page = figure_page([column])
     atomic_write(Path(args.out), page)
     error = column.error
     print(

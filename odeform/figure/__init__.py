@@ -5,7 +5,8 @@ the body (`body`) into a page (`page`) that interpolates and draws them by itsel
 what it shows is from the model is measured on the arrays that the page holds.
 """
 
-from odeform.figure.grid import FigureColumn, FigureError, interpolated
+from odeform.figure.error import FigureError
+from odeform.figure.grid import FigureColumn, interpolated
 from odeform.figure.page import MOST_COLUMNS, column_bytes, figure_page
 from odeform.figure.sampling import Source
 from odeform.figure.sweep import Sweep, parse_sweeps

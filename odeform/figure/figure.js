@@ -52,7 +52,7 @@ class Column {
     const { mean, scale, sizes, patterns, weights } = this.arrays, ranks = sizes.length;
     let nodes = [[0, 1]];
     this.counts.forEach((count, axis) => {
-      const next = cubicWeights(places[axis] * (count - 1), count);
+      const next = cubicWeights(places[this.axes[axis]] * (count - 1), count);
       nodes = nodes.flatMap(([i, w]) => next.map(([j, v]) => [i * count + j, w * v]));
     });
     const sum = new Float64Array(mean);

@@ -1,7 +1,6 @@
 """Refines the grid of parameters of a figure until what it shows is close to the model."""
 
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,18 +8,18 @@ from jaxtyping import Float
 
 from odeform.errors import InputError
 from odeform.figure.body import FigureBody
+from odeform.figure.error import FigureError, Probes, between, draw_probes
 from odeform.figure.sampling import Source
 from odeform.figure.table import Table, compressed, cubic_weights, product_weights
 from odeform.types import Floats, Frames, Times
 
-__all__ = ["BAND_FRACTION", "FigureColumn", "FigureError", "interpolated"]
+__all__ = ["BAND_FRACTION", "FigureColumn", "interpolated"]
 
 BAND_FRACTION = 0.2
 """Errors of a figure are at most this fraction of the model's own, if there is room for it: that which half of the
 motions stay within, and that which 90 % stay within."""
 FIRST = 5  # values of each parameter
 MOST_MOTIONS = 9000
-DRAWS, MOMENTS = 48, 48  # parameter sets, and times of each, at which the error is measured
 UNKNOWN = 2e-3, 6e-3  # of the size of the body: what errors may be where those of the model are not known
 RANKS = 64  # patterns that are reckoned with before they are counted
 MOST_PATTERNS = 320
@@ -34,24 +33,6 @@ EXPANDED = 4.0 / 3.0  # bytes of base64 of each byte
 
 Report = Callable[[int, int, float], None]
 """Called with the motions that are solved, the most there can be, and the RMSE so far in mm."""
-
-
-@dataclass(frozen=True)
-class FigureError:
-    """RMSE in mm over the coordinates of all points, at random times of random motions."""
-
-    rmse: float
-    """Of all motions together."""
-    half: float
-    """That half of the motions stay within."""
-    most: float
-    """That 90 % of the motions stay within."""
-    worst: float
-    """Of the worst motion."""
-
-    def relative(self, tolerance: tuple[float, float]) -> float:
-        """How much `half` and `most` are of what they may be, in mm; the larger one."""
-        return max(self.half / tolerance[0], self.most / tolerance[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +59,7 @@ class FigureColumn:
 
     def points(self, places: Float[np.ndarray, " sweeps"], times: Times) -> Frames:
         """Computes (M, N, 3) metres as the page draws them, at places (A,) on the sliders and times (M,) s."""
-        return self.body.points(_between(self.table.at(places), self.times, times))
+        return self.body.points(between(self.table.at(places), self.times, times))
 
 
 def interpolated(
@@ -98,59 +79,44 @@ def interpolated(
     """
     if len(times) < 4 or not np.allclose(np.diff(times), times[1] - times[0]):
         raise InputError(f"times: expected at least four, evenly spaced, got {len(times)}")
-    body, rng = source.body, np.random.default_rng(0)
-    places = rng.random((DRAWS if source.sweeps else 1, len(source.sweeps)))
-    moments = np.sort(rng.uniform(times[0], times[-1], MOMENTS))
-    truth = source.vertices(places, moments)
-    band = _band(source, places, times)
+    body, probes = source.body, draw_probes(source, times)
+    band = _band(source, probes.places, times)
     size = float(np.ptp(body.rest, axis=0).max())
     own = [1e3 * size * part / BAND_FRACTION for part in UNKNOWN] if band is None else band
     tolerance = BAND_FRACTION * own[0], BAND_FRACTION * own[1]
     room = most_bytes / EXPANDED - sum(array.nbytes for array in body.arrays().values())
     if room < 2 * FEWEST * len(times) * len(body.scale):
         raise InputError(f"a shape of {len(body.rest)} points does not fit into a figure of {most_bytes / 1e6:.1f} MB")
-    times = _fine_times(source, times, moments, places, truth, tolerance)
-    row = len(times) * len(body.scale)
+    fine = _fine_times(source, times, probes, tolerance)
+    row = len(fine) * len(body.scale)
     most = int(min(MOST_MOTIONS, (room - 2 * RANKS * row) / (2 * RANKS)))
-    grid = _refined(
-        source, times, most, report, tolerance, lambda grid: _error(body, map(grid.at, places), times, moments, truth)
-    )
+    grid = _refined(source, fine, probes, tolerance, most, report)
     ranks = int(min(MOST_PATTERNS, (room - 4 * row) / (2 * (row + len(grid.motions)) + 4)))
     table = compressed(grid.motions, grid.counts, body.scale, 1e-3 * LEFT_OUT * tolerance[0], ranks)
-    error = _error(body, map(table.at, places), times, moments, truth)
-    return FigureColumn(label, source, body, table, times, error, band, tolerance)
+    error = probes.error(body, map(table.at, probes.places), fine)
+    return FigureColumn(label, source, body, table, fine, error, band, tolerance)
 
 
 def _fine_times(
-    source: Source,
-    times: Times,
-    moments: Times,
-    places: Float[np.ndarray, "sets sweeps"],
-    truth: list[Frames],
-    tolerance: tuple[float, float],
-) -> Times:
+    source: Source, times: Times, probes: Probes, tolerance: tuple[float, float]
+) -> Float[np.ndarray, " fine"]:
     """Divides the time between frames until interpolation between them has only a part of the `tolerance`."""
     fine = times
     for parts in SUBDIVIDED:
         fine = times[0] + np.arange(parts * (len(times) - 1) + 1) * (times[1] - times[0]) / parts
-        error = _error(source.body, source.coordinates(places, fine), fine, moments, truth)
+        error = probes.error(source.body, source.coordinates(probes.places, fine), fine)
         if error.relative(tolerance) <= IN_TIME:
             break
     return fine
 
 
 def _refined(
-    source: Source,
-    times: Times,
-    most: int,
-    report: Report,
-    tolerance: tuple[float, float],
-    error_of: "Callable[[_Grid], FigureError]",
+    source: Source, times: Times, probes: Probes, tolerance: tuple[float, float], most: int, report: Report
 ) -> "_Grid":
     """The grid of at most `most` motions with an error within `tolerance`, or else with the smallest error."""
     grid, known = _Grid(source, times), []
     while True:
-        error = error_of(grid)
+        error = probes.error(source.body, map(grid.at, probes.places), times)
         known.append((error.relative(tolerance), grid.counts))
         report(len(grid.motions), most, error.rmse)
         helped = len(known) < 4 or min(known[-3:])[0] < GAIN * min(known[:-3])[0]
@@ -219,25 +185,6 @@ class _Grid:
         scale = self._source.body.scale.astype(np.float32)
         missed = np.tensordot(weights.astype(np.float32), along[::2], axes=1) - along[1::2]
         return float(np.square(missed * scale).mean())
-
-
-def _between(y: Floats, times: Times, moments: Times) -> Floats:
-    """Interpolates y (T, D) at `times` (T,) s to (M, D) at `moments` (M,) s."""
-    frames = (np.clip(moments, times[0], times[-1]) - times[0]) / (times[1] - times[0])
-    return np.stack([cubic_weights(frame, len(times)) for frame in frames]) @ y
-
-
-def _error(
-    body: FigureBody, coordinates: Iterable[Floats], times: Times, moments: Times, truth: list[Frames]
-) -> FigureError:
-    """The error of motions y (T, D) each at `moments` (M,) s, against `truth`."""
-    squares = []
-    for y, vertices in zip(coordinates, truth, strict=True):
-        shown = body.points(_between(y, times, moments))
-        squares.append(np.square(shown - vertices, dtype=float).mean())
-    each = 1e3 * np.sqrt(squares)
-    half, most = np.quantile(each, [0.5, 0.9])
-    return FigureError(1e3 * math.sqrt(np.mean(squares)), float(half), float(most), float(each.max()))
 
 
 def _band(source: Source, places: Float[np.ndarray, "sets sweeps"], times: Times) -> tuple[float, float] | None:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.figure.grid import FigureColumn
 from odeform.figure.sweep import Sweep
 from odeform.schema import OBJECT
@@ -28,20 +29,30 @@ def column_bytes(columns: int) -> int:
     return (MOST_BYTES - BESIDE) // columns
 
 
-def figure_page(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> bytes:
-    """The page of one to four columns of one scene, with a slider for each of `sweeps`."""
+def figure_page(columns: Sequence[FigureColumn]) -> bytes:
+    """The page of one to four columns of one scene, with a slider for each parameter that any of them sweeps.
+
+    Raises `InputError` where there is none.
+    """
+    sweeps = list({sweep.name: sweep for column in columns for sweep in column.source.sweeps}.values())
+    if not sweeps:
+        raise InputError("figure: expected a model that is not pinned at parameters of its own")
     schema = columns[0].source.predictor.schema
     title = f"{columns[0].label} · {schema.scene}" if len(columns) == 1 else schema.scene
     page = (files("odeform.figure") / "figure.html").read_text(encoding="utf-8")
     script = (files("odeform.figure") / "figure.js").read_text(encoding="utf-8")
     data = json.dumps(_data(columns, sweeps), ensure_ascii=True).replace("<", "\\u003c")
-    subtitle, notes = escape(_subtitle(columns, sweeps)), "".join(f"<p>{escape(note)}</p>" for note in _notes(columns))
+    subtitle, notes = (
+        escape(_subtitle(columns, sweeps)),
+        "".join(f"<p>{escape(note)}</p>" for note in _notes(columns, sweeps)),
+    )
     filled = Template(page).substitute(title=escape(title), subtitle=subtitle, notes=notes, data=data, script=script)
     return filled.encode()
 
 
 def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> dict[str, Any]:
     first, around = columns[0], columns[0].source.predictor.surroundings
+    names = [sweep.name for sweep in sweeps]
     return {
         "sweeps": [_slider(sweep) for sweep in sweeps],
         "start": float(first.times[0]),
@@ -55,6 +66,7 @@ def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> dict[str,
             {
                 "label": column.label,
                 "counts": column.table.counts,
+                "axes": [names.index(sweep.name) for sweep in column.source.sweeps],
                 "azimuth": column.body.azimuth,
                 "arrays": _encoded({**column.body.arrays(), **column.table.arrays()}),
             }
@@ -71,7 +83,7 @@ def _slider(sweep: Sweep) -> dict[str, Any]:
         "low": sweep.low,
         "high": sweep.high,
         "log": sweep.logarithmic,
-        "place": 0.5,
+        "place": sweep.place(parameter.default),
         "trained": [parameter.low, parameter.high],
     }
 
@@ -122,16 +134,15 @@ def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
     return ", ".join([*([str(body)] if body else []), *given, grid])
 
 
-def _notes(columns: Sequence[FigureColumn]) -> list[str]:
-    notes = [note for column in columns for note in _column_notes(column, len(columns) > 1)]
-    shown = columns[0].source.sweeps
-    outside = [s.name for s in shown if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
+def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str]:
+    notes = [_column_note(column, len(columns) > 1) for column in columns]
+    outside = [s.name for s in sweeps if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
     if outside:
         notes.append(f"* {', '.join(outside)}: partly outside of what was trained.")
     return notes
 
 
-def _column_notes(column: FigureColumn, several: bool) -> list[str]:
+def _column_note(column: FigureColumn, several: bool) -> str:
     """How far the figure is from its model, and the model from what it was trained on."""
     start = f"{column.label}: interpolated" if several else "Interpolated"
     grid = " × ".join(str(count) for count in column.table.counts) or "1"
@@ -148,4 +159,4 @@ def _column_notes(column: FigureColumn, several: bool) -> list[str]:
             f"Of unseen motions, half are within {half:.2g} mm of what the model says, and 90 % within {most:.2g} mm."
         )
     aim = f" This is more than the {tolerance[0]:.2g} and {tolerance[1]:.2g} mm aimed at, as fine as it gets."
-    return [f"{shown}{'' if column.fine else aim} {band}"]
+    return f"{shown}{'' if column.fine else aim} {band}"

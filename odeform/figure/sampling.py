@@ -16,6 +16,7 @@ from odeform.figure.sweep import Sweep
 from odeform.models.base import Predictor
 from odeform.motion.reduced_batch import ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
+from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, Geometry, Times
 
 __all__ = ["Source"]
@@ -33,7 +34,7 @@ class Source:
     fixed: Mapping[str, Any]
     geometry: Geometry | None = None
     """The shape that moves; None for the trained body, where it rests under each set of parameters."""
-    quality: str = "balanced"
+    quality: str | SolverSettings = "balanced"
 
     def values(self, places: Float[np.ndarray, "sets sweeps"]) -> dict[str, Floats]:
         """Maps places on the sliders (S, A), from 0 to 1, to values (S,) by name."""
@@ -98,7 +99,7 @@ class Source:
     def _solve_into(self, out: Floats, places: Float[np.ndarray, "sets sweeps"], times: Times) -> None:
         """Fills `out` (S, T, 6 + K)."""
         until = float(times[-1])
-        if self.sags:
+        if self.sags or not self.sweeps:
             motions = (self._solved(place, until) for place in places)
         else:
             motions = self.predictor.solve_batch(

@@ -40,6 +40,13 @@ class Sweep:
             return np.exp(math.log(self.low) + places * math.log(self.high / self.low))
         return self.low + places * (self.high - self.low)
 
+    def place(self, value: float) -> float:
+        """The place from 0 to 1 of a value, or of the nearest one on the slider."""
+        value = min(max(value, self.low), self.high)
+        if self.logarithmic:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
 
 def parse_sweeps(schema: Schema, ranges: Mapping[str, str], fixed: Sequence[str] = ()) -> tuple[Sweep, ...]:
     """Reads LOW:HIGH by name as one to three sweeps of parameters of `schema`; `fixed` are names that have a value.
