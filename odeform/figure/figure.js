@@ -99,11 +99,15 @@ class Column {
       const ux = points[b] - points[a], uy = points[b + 1] - points[a + 1], uz = points[b + 2] - points[a + 2];
       const vx = points[c] - points[a], vy = points[c + 1] - points[a + 1], vz = points[c + 2] - points[a + 2];
       const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
-      for (const i of [a, b, c]) {
-        normals[i] += x;
-        normals[i + 1] += y;
-        normals[i + 2] += z;
-      }
+      normals[a] += x;
+      normals[a + 1] += y;
+      normals[a + 2] += z;
+      normals[b] += x;
+      normals[b + 1] += y;
+      normals[b + 2] += z;
+      normals[c] += x;
+      normals[c + 1] += y;
+      normals[c + 2] += z;
     }
   }
 }
@@ -150,8 +154,8 @@ const BLUR_PIXEL = HEAD + `
 in vec2 at; uniform sampler2D image; uniform vec2 along; out vec4 color;
 void main() {
   float sum = 0.0, total = 0.0;
-  for (int i = -6; i <= 6; i++) {
-    float w = exp(-float(i * i) / 14.0);
+  for (int i = -4; i <= 4; i++) {
+    float w = exp(-float(i * i) / 8.0);
     sum += w * texture(image, at + float(i) * along).r;
     total += w;
   }
@@ -175,8 +179,18 @@ void main() {
   color = vec4(mix(mix(paper, line, grid), shade, 0.62 * dark), 1.0);
 }`;
 
-const canvas = $("canvas"), gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
-const SHADOW = 256; // pixels of a shadow, each way
+// whether there is no graphics card: smooth edges then cost more than all else
+function drawnInSoftware() {
+  const probe = document.createElement("canvas").getContext("webgl2");
+  const info = probe?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? probe.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+const canvas = $("canvas");
+const gl = canvas.getContext("webgl2", { antialias: !drawnInSoftware(), alpha: false });
+const SHADOW = 128; // pixels of a shadow, each way
 
 function program(vertex, pixel) {
   const made = gl.createProgram();
@@ -276,7 +290,7 @@ class Drawing {
     for (const [from, to, along] of [[0, 1, [1, 0]], [1, 0, [0, 1]]]) {
       gl.bindFramebuffer(gl.FRAMEBUFFER, this.targets[to].frame);
       gl.bindTexture(gl.TEXTURE_2D, this.targets[from].texture);
-      this.blur({ along: along.map((x) => (1.2 * x) / SHADOW) });
+      this.blur({ along: along.map((x) => (0.8 * x) / SHADOW) });
       this.square();
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -502,13 +516,18 @@ function main() {
       if (state.chosen) columns.forEach((column) => column.choose(places));
       state.chosen = false;
       const all = boxes(width, height);
+      if (String(all) !== state.placed) {
+        state.placed = String(all);
+        all.forEach(([x, y, w, h], i) => {
+          const place = { left: x, width: w, top: height - y - h };
+          for (const [side, at] of Object.entries(place)) $("labels").children[i].style[side] = `${at / ratio}px`;
+        });
+      }
       columns.forEach((column, i) => {
         column.move(state.time);
         const lift = column.middle[2] - figure.low; // followed for the most part: that it flies is to be seen
         camera.target = [column.middle[0], column.middle[1], figure.low + 0.85 * lift].map((x, d) => x + camera.pan[d]);
         drawing.column(i, column, all[i], camera, colors);
-        const [x, y, w, h] = all[i].map((value) => value / ratio);
-        Object.assign($("labels").children[i].style, { left: `${x}px`, width: `${w}px`, top: `${canvas.clientHeight - y - h}px` });
       });
       state.shown = false;
       state.frames += 1;

@@ -118,6 +118,7 @@ def test_little_room_is_kept_to_and_said(kick: Predictor) -> None:
     assert "* force: partly outside of what was trained." in page.decode()
 
 
+@pytest.mark.slow
 def test_columns_follow_the_sliders_that_they_have(kick: Predictor) -> None:
     times = kick.schema.window.times[:12]
     both = made(Source(kick, (sweep(kick, "mass", 0.6, 0.9), sweep(kick, "force", 100.0, 130.0)), {}), times)
@@ -134,6 +135,7 @@ def test_columns_follow_the_sliders_that_they_have(kick: Predictor) -> None:
         figure_page([pinned])
 
 
+@pytest.mark.slow
 def test_a_body_that_rests_elsewhere_under_each_mass() -> None:
     predictor = load("contact-force")
     column = made(Source(predictor, (sweep(predictor, "mass", 0.5, 1.2),), {}))
