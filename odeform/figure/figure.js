@@ -519,10 +519,14 @@ function main() {
       if (String(all) !== state.placed) {
         state.placed = String(all);
         all.forEach(([x, y, w, h], i) => {
-          const place = { left: x, width: w, top: height - y - h };
-          for (const [side, at] of Object.entries(place)) $("labels").children[i].style[side] = `${at / ratio}px`;
+          for (const [side, at] of Object.entries({ left: x, width: w, bottom: y }))
+            $("labels").children[i].style[side] = `${at / ratio}px`;
         });
       }
+      gl.viewport(0, 0, width, height);
+      gl.scissor(0, 0, width, height);
+      gl.clearColor(...colors.paper, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT); // beside the columns as well
       columns.forEach((column, i) => {
         column.move(state.time);
         const lift = column.middle[2] - figure.low; // followed for the most part: that it flies is to be seen

@@ -87,9 +87,11 @@ def interpolated(
     room = most_bytes / EXPANDED - sum(array.nbytes for array in body.arrays().values())
     if room < 2 * FEWEST * len(times) * len(body.scale):
         raise InputError(f"a shape of {len(body.rest)} points does not fit into a figure of {most_bytes / 1e6:.1f} MB")
-    fine = _fine_times(source, times, probes, tolerance)
+    longest = int(room / (4 * FEWEST * len(body.scale)))
+    fine = _fine_times(source, times, probes, tolerance, longest)
     row = len(fine) * len(body.scale)
-    most = int(min(MOST_MOTIONS, (room - 2 * RANKS * row) / (2 * RANKS)))
+    expected = min(max(room / (4 * row), FEWEST), RANKS)
+    most = int(min(MOST_MOTIONS, room / (2 * expected) - row))
     grid = _refined(source, fine, probes, tolerance, most, report)
     ranks = int(min(MOST_PATTERNS, (room - 4 * row) / (2 * (row + len(grid.motions)) + 4)))
     table = compressed(grid.motions, grid.counts, body.scale, 1e-3 * LEFT_OUT * tolerance[0], ranks)
@@ -98,14 +100,15 @@ def interpolated(
 
 
 def _fine_times(
-    source: Source, times: Times, probes: Probes, tolerance: tuple[float, float]
+    source: Source, times: Times, probes: Probes, tolerance: tuple[float, float], longest: int
 ) -> Float[np.ndarray, " fine"]:
-    """Divides the time between frames until interpolation between them has only a part of the `tolerance`."""
+    """Divides the time between frames until interpolation between them has only a part of the `tolerance`, or there
+    would be more than `longest` times."""
     fine = times
     for parts in SUBDIVIDED:
         fine = times[0] + np.arange(parts * (len(times) - 1) + 1) * (times[1] - times[0]) / parts
         error = probes.error(source.body, source.coordinates(probes.places, fine), fine)
-        if error.relative(tolerance) <= IN_TIME:
+        if error.relative(tolerance) <= IN_TIME or 2 * len(fine) > longest:
             break
     return fine
 

@@ -83,7 +83,7 @@ def _slider(sweep: Sweep) -> dict[str, Any]:
         "low": sweep.low,
         "high": sweep.high,
         "log": sweep.logarithmic,
-        "place": sweep.place(parameter.default),
+        "place": sweep.place(parameter.default) if sweep.low < parameter.default < sweep.high else 0.5,
         "trained": [parameter.low, parameter.high],
     }
 
@@ -144,13 +144,16 @@ def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str
 
 def _column_note(column: FigureColumn, several: bool) -> str:
     """How far the figure is from its model, and the model from what it was trained on."""
-    start = f"{column.label}: interpolated" if several else "Interpolated"
-    grid = " × ".join(str(count) for count in column.table.counts) or "1"
-    error, tolerance = column.error, column.tolerance_mm
-    shown = (
-        f"{start} between {grid} motions. At other parameters and times, half of the motions are within "
-        f"{error.half:.2g} mm of the model and 90 % within {error.most:.2g} mm; {error.rmse:.2g} mm together (RMSE)."
-    )
+    who, error, tolerance = f"{column.label}: " if several else "", column.error, column.tolerance_mm
+    if column.table.counts:
+        grid = " × ".join(str(count) for count in column.table.counts)
+        shown = (
+            f"{who}{'i' if several else 'I'}nterpolated between {grid} motions. At other parameters and times, half of "
+            f"the motions are within {error.half:.2g} mm of the model and 90 % within {error.most:.2g} mm; "
+            f"{error.rmse:.2g} mm together (RMSE)."
+        )
+    else:
+        shown = f"{who}one motion, at any time within {error.rmse:.2g} mm of the model (RMSE)."
     if column.band_mm is None:
         band = "The error of the model itself is not known."
     else:

@@ -43,7 +43,13 @@ class Source:
     def complete(self, place: Float[np.ndarray, " sweeps"]) -> dict[str, Any]:
         """Returns all parameters at a place (A,) on the sliders."""
         values = self.values(place[None])
-        return self.predictor.complete({**self.fixed, **{name: float(value[0]) for name, value in values.items()}})
+        return self.predictor.complete({**self._others, **{name: float(value[0]) for name, value in values.items()}})
+
+    @cached_property
+    def _others(self) -> dict[str, Any]:
+        """All parameters without a slider: a contact is where the body has it, whatever component of a force varies."""
+        swept = {sweep.name for sweep in self.sweeps}
+        return {name: value for name, value in self.predictor.complete(self.fixed).items() if name not in swept}
 
     @cached_property
     def middle(self) -> ReducedMotion:

@@ -41,8 +41,7 @@ class Sweep:
         return self.low + places * (self.high - self.low)
 
     def place(self, value: float) -> float:
-        """The place from 0 to 1 of a value, or of the nearest one on the slider."""
-        value = min(max(value, self.low), self.high)
+        """The place of a value: from 0 to 1 on the slider."""
         if self.logarithmic:
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
