@@ -12,6 +12,7 @@ from odeform.figure import Source, column_bytes, figure_page, interpolated, pars
 from odeform.geometry.shape import FittedShape
 from odeform.io import atomic_write
 from odeform.models.base import Predictor
+from odeform.motion.caveats import caveats
 from odeform.types import Times
 
 __all__ = ["write_figure"]
@@ -44,6 +45,8 @@ def write_figure(
         f"{counted(len(column.table.weights), 'motion')} in {len(page) / 1e6:.2f} MB to {args.out}; from the model: "
         f"{error.rmse:.2g} mm RMSE, half within {error.half:.2g}, 90 % within {error.most:.2g} mm"
     )
+    for caveat in caveats(source.middle, times):
+        print(f"note: {caveat}", file=sys.stderr)
     if not column.fine:
         half, most = column.tolerance_mm
         print(f"note: expected at most {half:.2g} and {most:.2g} mm", file=sys.stderr)

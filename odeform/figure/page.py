@@ -14,6 +14,7 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.figure.grid import FigureColumn
 from odeform.figure.sweep import Sweep
+from odeform.motion.caveats import caveats
 from odeform.schema import OBJECT
 from odeform.types import Arrays
 
@@ -139,6 +140,8 @@ def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str
     outside = [s.name for s in sweeps if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
     if outside:
         notes.append(f"* {', '.join(outside)}: partly outside of what was trained.")
+    # of a shape that was not trained, and of times after the window
+    notes += dict.fromkeys(f"{note}." for c in columns for note in caveats(c.source.middle, c.times))
     return notes
 
 

@@ -15,7 +15,7 @@ from odeform.figure.grid import BAND_FRACTION
 from odeform.figure.page import MOST_BYTES
 from odeform.models.base import Predictor
 from odeform.models.registry import load
-from odeform.types import Floats, Times
+from odeform.types import Floats, Mesh, Times
 
 
 def sweep(predictor: Predictor, name: str, low: float, high: float) -> Sweep:
@@ -110,9 +110,9 @@ def test_the_page_is_one_small_file_and_says_what_it_is(pushed: FigureColumn) ->
 
 def test_little_room_is_kept_to_and_said(kick: Predictor) -> None:
     sweeps = (sweep(kick, "force", 5.0, 160.0),)
-    column = made(Source(kick, sweeps, {}), kick.schema.window.times, 1_700_000)
+    column = made(Source(kick, sweeps, {}), kick.schema.window.times, 1_560_000)
     page = figure_page([column])
-    assert len(page) < 1_760_000
+    assert len(page) < 1_620_000
     assert not column.fine
     assert "mm aimed at" in page.decode()
     assert "* force: partly outside of what was trained." in page.decode()
@@ -146,6 +146,19 @@ def test_a_body_that_rests_elsewhere_under_each_mass() -> None:
         assert 1e3 * np.sqrt(np.square(apart).mean()) < 2.0 * column.error.worst
     assert column.band_mm is None
     assert "The error of the model itself is not known." in figure_page([column]).decode()
+
+
+def test_a_shape_that_was_not_trained_is_said(kick: Predictor) -> None:
+    flat = Mesh(kick.rest.points * np.array([1.0, 1.0, 0.8], dtype=np.float32), kick.rest.faces)
+    source = Source(kick, (sweep(kick, "force", 100.0, 130.0),), {}, flat)
+    column = made(source, kick.schema.window.times[:12])
+    text = figure_page([column]).decode()
+    assert "not trained" in text
+    assert "The error of the model itself is not known." in text
+    motion = kick.solve(flat, {"force": 110.0})
+    data, (arrays,) = embedded(figure_page([column]))
+    apart = drawn(data, arrays, 0, [1.0 / 3.0], 0.05) - motion.vertices(0.05)
+    assert 1e3 * np.sqrt(np.square(apart).mean()) < 2.0 * column.error.worst
 
 
 def test_what_a_figure_cannot_show(kick: Predictor) -> None:
