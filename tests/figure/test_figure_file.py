@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -110,11 +111,13 @@ def test_the_page_is_one_small_file_and_says_what_it_is(pushed: FigureColumn) ->
 
 def test_little_room_is_kept_to_and_said(kick: Predictor) -> None:
     sweeps = (sweep(kick, "force", 5.0, 160.0),)
-    column = made(Source(kick, sweeps, {}), kick.schema.window.times, 1_560_000)
+    column = made(Source(kick, sweeps, {}), kick.schema.window.times, 1_700_000)
     page = figure_page([column])
-    assert len(page) < 1_620_000
-    assert not column.fine
-    assert "mm aimed at" in page.decode()
+    assert len(page) < 1_760_000
+    assert ("mm aimed at" in page.decode()) != column.fine
+    short = replace(column, tolerance_mm=(1e-3, 2e-3))
+    assert not short.fine
+    assert "more than the 0.001 and 0.002 mm aimed at" in figure_page([short]).decode()
     assert "* force: partly outside of what was trained." in page.decode()
 
 
