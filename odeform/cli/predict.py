@@ -11,6 +11,7 @@ from odeform.errors import InputError, counted
 from odeform.io import require_writable
 
 if TYPE_CHECKING:
+    from odeform.geometry.shape import FittedShape
     from odeform.models.base import Predictor
     from odeform.motion.recorded import RecordedMotion
 
@@ -50,6 +51,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="stored or simulated sequence: predict its motion, and write errors against it (.csv)",
     )
     parser.add_argument(
+        "--sweep",
+        nargs="*",
+        action="extend",
+        default=[],
+        metavar="NAME=LOW:HIGH",
+        help="one to three parameters: write a figure (.html) with a slider for each, and for the time",
+    )
+    parser.add_argument(
         "--times", metavar="START:STOP:STEP", help="times in seconds, STOP excluded (default: the trained frames)"
     )
     parser.add_argument("--force", action="store_true", help="overwrite files that exist")
@@ -57,21 +66,44 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> None:
-    from odeform.formats.bundled import read_shape
+    from odeform.cli.predict_figure import write_figure
     from odeform.formats.times import parse_times
     from odeform.formats.writing import motion_files, write_motion
-    from odeform.geometry.shape import fit_to
-    from odeform.geometry.similarity import UPRIGHT, Similarity
-    from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
     from odeform.models.registry import load, observations
     from odeform.motion.caveats import caveats
-    from odeform.simulation.objects.materials import material_of
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
     _require_new(motion_files(args.out, len(times), args.truth is not None), args.force)
-    fit, settings = None, parse_settings(args.set)
+    settings = parse_settings(args.set)
+    if args.sweep:
+        write_figure(args, predictor, settings, times, _shape)
+        return
     truth, settings = _read_truth(args, predictor, settings) if args.truth else (None, settings)
+    predictor, fit, settings = _shape(args, predictor, settings)
+    geometry = fit.geometry if fit else truth and predictor.to_body_frame(truth.geometry, settings)
+    observed = truth and observations(predictor.schema, truth.sequence)
+    motion = predictor.solve(geometry, settings, args.quality, until=float(times[-1]), observed=observed)
+    write_motion(motion, times, args.out, fit, truth)
+    for caveat in caveats(motion, times):
+        _note(caveat)
+    stop = motion.first_stop(float(times.max()))
+    status = motion.stats.status if stop is None else str(stop)
+    written = f"{counted(len(times), 'frame')} of {counted(len(motion.geometry.points), 'point')}"
+    print(f"{written} to {args.out}; status {status}")
+
+
+def _shape(
+    args: argparse.Namespace, predictor: "Predictor", settings: dict[str, Any]
+) -> "tuple[Predictor, FittedShape | None, dict[str, Any]]":
+    """The shape of `--geometry` as `predictor` moves it, with the predictor and the settings for it; None without."""
+    from odeform.formats.bundled import read_shape
+    from odeform.geometry.shape import fit_to
+    from odeform.geometry.similarity import UPRIGHT, Similarity
+    from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
+    from odeform.simulation.objects.materials import material_of
+
+    fit = None
     if args.geometry is None and not predictor.rescales_input:
         _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
     elif args.geometry is not None and takes_user_bodies(predictor):
@@ -86,18 +118,9 @@ def run(args: argparse.Namespace) -> None:
         fit = fit_to(shape, predictor.rest, region, transform=as_it_is)
         if fit.upright:
             _note(f"{args.geometry}: {fit.upright.replace('*', '')}")
-    geometry = fit.geometry if fit else truth and predictor.to_body_frame(truth.geometry, settings)
     for note in fit.source.notes if fit else ():
         _note(f"{args.geometry}: {note}")
-    observed = truth and observations(predictor.schema, truth.sequence)
-    motion = predictor.solve(geometry, settings, args.quality, until=float(times[-1]), observed=observed)
-    write_motion(motion, times, args.out, fit, truth)
-    for caveat in caveats(motion, times):
-        _note(caveat)
-    stop = motion.first_stop(float(times.max()))
-    status = motion.stats.status if stop is None else str(stop)
-    written = f"{counted(len(times), 'frame')} of {counted(len(motion.geometry.points), 'point')}"
-    print(f"{written} to {args.out}; status {status}")
+    return predictor, fit, settings
 
 
 def _read_truth(

@@ -14,7 +14,8 @@ from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.limits import Limits
 from odeform.motion.motion_batch import BatchPoses, BatchVertices, MotionBatch
 from odeform.motion.plausibility import Sample
-from odeform.motion.reduced_motion import moved_points, placements, poses_of
+from odeform.motion.reduced_motion import as_reduced, moved_points, placements, poses_of
+from odeform.motion.reduced_space import POSE
 from odeform.schema import Parameters, Window
 from odeform.types import Floats, Ints, Times
 
@@ -100,6 +101,15 @@ class ReducedBatch(MotionBatch):
 
         return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
 
+    def coordinates(self, times: Times) -> Coordinates:
+        """Computes (B, T, 6 + K) in metres and radians at (T,) seconds, as of `ReducedMotion.coordinates`."""
+
+        def take(_: float, y: Coordinates, out: Floats, rows: Ints) -> None:
+            out[rows] = y
+
+        size = POSE + self._basis(float(self._parts[0].azimuths[0])).space.basis.modes
+        return self._filled(times, (size,), float, take, lambda motion, at: as_reduced(motion).coordinates(at))
+
     def pose(self, t: float | Times) -> BatchPoses:
         """Returns the rigid parts, as of `Motion.pose`: (B, 4, 4), or (B, T, 4, 4) for (T,) seconds."""
 
@@ -112,7 +122,7 @@ class ReducedBatch(MotionBatch):
     def _filled(
         self,
         t: float | Times,
-        shape: tuple[int, int],
+        shape: tuple[int, ...],
         dtype: type,
         together: Callable[[float, Coordinates, Floats, Ints], None],
         alone: Callable[[Motion, Times], Floats],

@@ -8,12 +8,13 @@ import viser
 from odeform.errors import InputError
 from odeform_viz.export import export, export_formats, export_notes
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.figure_button import FigureButton
 
 __all__ = ["ExportPanel"]
 
 
 class ExportPanel(Panel):
-    """A choice of format, and a button."""
+    """A choice of format, and a button; and a figure with sliders."""
 
     def __init__(self, page: Page) -> None:
         self._page, gui, self._formats = page, page.server.gui, export_formats()
@@ -23,6 +24,10 @@ class ExportPanel(Panel):
                 "Download", color="gray", hint="the first visible model, in the units of the shape's file"
             )
             download.on_click(lambda event: self._download(event.client))
+            self._figure = FigureButton(page)
+
+    def close(self) -> None:
+        self._figure.close()
 
     def _download(self, client: viser.ClientHandle | None) -> None:
         if client is None:

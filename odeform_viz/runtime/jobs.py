@@ -5,10 +5,10 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,13 +18,17 @@ from odeform.identification.identify import Identification
 from odeform.identification.observation import Observation
 from odeform.loads.registry import load_of_scene
 from odeform.models.base import Predictor
-from odeform.types import Geometry, MotionSequence
+from odeform.types import Geometry, MotionSequence, Times
+
+if TYPE_CHECKING:
+    from odeform.figure import Source
 
 __all__ = [
     "JOB",
     "Job",
     "Report",
     "fit_parameters",
+    "make_figure",
     "make_user_body",
     "simulate_motion",
     "simulate_user_body",
@@ -189,3 +193,18 @@ def stability_image(report: Report, checkpoint: str) -> np.ndarray:
 
     plot = stability_map(load_continuous(checkpoint), count=MAPPED, moments=(0.5, 1.0, 3.0), report=report)
     return np.asarray(map_image(plot))
+
+
+def make_figure(report: Report, sources: "Sequence[tuple[str, Source]]", times: Times) -> bytes:
+    """Makes a figure with sliders of labelled models: a page of HTML."""
+    from odeform.figure import column_bytes, figure_page, interpolated
+
+    columns = []
+    for label, source in sources:
+
+        def tell(motions: int, most: int, _: float, before: int = len(columns)) -> None:
+            # each refinement doubles the motions, and the last one takes as long as all before
+            report((before + motions / most) / len(sources))
+
+        columns.append(interpolated(label, source, times, column_bytes(len(sources)), tell))
+    return figure_page(columns)

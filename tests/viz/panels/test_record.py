@@ -2,6 +2,7 @@
 
 import io
 import json
+import threading
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,13 +13,17 @@ import trimesh
 import viser
 
 from odeform.dataset.store import open_dataset
+from odeform.errors import InputError
+from odeform.figure import Source
 from odeform.formats.writing import shape_at, write_shape
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import Column, truth_column
+from odeform_viz.panels.export import ExportPanel
 from odeform_viz.panels.parameters import ParameterPanel
+from odeform_viz.runtime.jobs import Report
 
 View = tuple[App, LoopbackClient]
 STATE = "odeform-mass-elastic.json"
@@ -157,3 +162,58 @@ def test_a_state_opens_no_file_outside_of_the_workspace(dropped: View, tmp_path:
         assert client.until(lambda origin=origin: any(origin in said for said in client.notifications))
     assert all("which confines the page" in said for said in client.notifications)
     assert app.columns.all == before
+
+
+def tiny(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+    """The names and sliders of what would be made."""
+    report(0.5)
+    return json.dumps([(label, [sweep.name for sweep in source.sweeps]) for label, source in sources]).encode()
+
+
+def refused(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+    raise InputError("a figure shows a mesh with faces")
+
+
+def endless(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+    report(0.25)
+    threading.Event().wait()
+    raise AssertionError
+
+
+def test_a_figure_of_the_visible_models(serve: Callable[..., View], drop: Predictor) -> None:
+    rival = load("mass-elastic/pod-rbf")
+    pinned = Column("pinned", drop, drop.rest, pinned={"mass": 0.9, "bending": 1.0})
+    app, client = serve(
+        Column("odeform", drop, drop.rest), Column("pod-rbf", rival, rival.rest, visible=False), pinned, moment=0.3
+    )
+    button = app.panel(ExportPanel)._figure
+    button._work = tiny
+    client.click("Figure (.html)")
+    assert client.until(lambda: "figure.html" in client.downloads)
+    assert json.loads(client.downloads["figure.html"]) == [["odeform", ["mass", "bending"]], ["pinned", []]]
+    button._work = refused
+    client.click("Figure (.html)")
+    assert client.until(lambda: "a figure shows a mesh with faces" in client.notifications)
+    assert client.until(lambda: client.controls["Figure (.html)"].visible)
+    button._work = endless
+    client.click("Figure (.html)")
+    assert client.until(lambda: button._bar.visible and button._bar.value == 25.0)
+    client.click("Cancel the figure")
+    assert client.until(lambda: button._button.visible and not button._bar.visible)
+
+
+def test_a_figure_needs_a_model(dropped: View) -> None:
+    app, client = dropped
+    client.set("odeform", False)
+    assert client.until(lambda: not app.columns.all[0].visible)
+    client.click("Figure (.html)")
+    assert client.until(lambda: "figure: expected one to 4 visible models, got 0" in client.notifications)
+
+
+@pytest.mark.slow
+def test_a_figure_from_the_page(dropped: View) -> None:
+    _, client = dropped
+    client.set("sliders", "bending")
+    client.click("Figure (.html)")
+    assert client.until(lambda: client.downloads.get("figure.html", b"").startswith(b"<!doctype html>"))
+    assert b"Interpolated between" in client.downloads["figure.html"]

@@ -1,0 +1,56 @@
+"""`odeform predict --sweep`."""
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from odeform.cli.options import parse_settings
+from odeform.errors import InputError, counted
+from odeform.figure import Source, column_bytes, figure_page, interpolated, parse_sweeps
+from odeform.geometry.shape import FittedShape
+from odeform.io import atomic_write
+from odeform.models.base import Predictor
+from odeform.motion.caveats import caveats
+from odeform.types import Times
+
+__all__ = ["write_figure"]
+
+Shape = Callable[[argparse.Namespace, Predictor, dict[str, Any]], tuple[Predictor, FittedShape | None, dict[str, Any]]]
+
+
+def write_figure(
+    args: argparse.Namespace, predictor: Predictor, settings: dict[str, Any], times: Times, shape_of: Shape
+) -> None:
+    """Writes the figure of `args`, whose shape `shape_of` reads, and says how far it is from the model.
+
+    Raises `InputError` for a name that does not end in .html, a truth, and what a figure does not take.
+    """
+    if Path(args.out).suffix.lower() != ".html":
+        raise InputError(f"--sweep: expected --out FILE.html, got {args.out}")
+    if args.truth:
+        raise InputError("--sweep: has no truth to compare with at most parameters; leave out --truth")
+    ranges: Mapping[str, str] = parse_settings(args.sweep, "--sweep")
+    fixed = predictor.schema.expanded(settings)
+    sweeps = parse_sweeps(predictor.schema, ranges, tuple(fixed))
+    predictor, fit, fixed = shape_of(args, predictor, fixed)
+    fixed = {name: value for name, value in fixed.items() if name not in ranges}
+    source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality)
+    column = interpolated(predictor.model, source, times, column_bytes(1), _report)
+    page = figure_page([column])
+    atomic_write(Path(args.out), page)
+    error = column.error
+    print(
+        f"{counted(len(column.table.weights), 'motion')} in {len(page) / 1e6:.2f} MB to {args.out}; from the model: "
+        f"{error.rmse:.2g} mm RMSE, half within {error.half:.2g}, 90 % within {error.most:.2g} mm"
+    )
+    for caveat in caveats(source.middle, times):
+        print(f"note: {caveat}", file=sys.stderr)
+    if not column.fine:
+        half, most = column.tolerance_mm
+        print(f"note: expected at most {half:.2g} and {most:.2g} mm", file=sys.stderr)
+
+
+def _report(motions: int, most: int, error: float) -> None:
+    print(f"{counted(motions, 'motion')} of at most {most}: {error:.3g} mm RMSE", file=sys.stderr, flush=True)

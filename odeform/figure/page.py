@@ -1,0 +1,168 @@
+"""Writes columns as one page of HTML, which needs nothing else."""
+
+import base64
+import json
+import math
+from collections.abc import Sequence
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.figure.grid import FigureColumn
+from odeform.figure.sweep import Sweep
+from odeform.motion.caveats import caveats
+from odeform.schema import OBJECT
+from odeform.types import Arrays
+
+__all__ = ["MOST_BYTES", "MOST_COLUMNS", "column_bytes", "figure_page"]
+
+MOST_BYTES = 5_000_000
+MOST_COLUMNS = 4
+BESIDE = 60_000  # bytes of the page without its arrays
+
+
+def column_bytes(columns: int) -> int:
+    """How many bytes each of so many columns may take in a page of at most `MOST_BYTES`."""
+    return (MOST_BYTES - BESIDE) // columns
+
+
+def figure_page(columns: Sequence[FigureColumn]) -> bytes:
+    """The page of one to four columns of one scene, with a slider for each parameter that any of them sweeps.
+
+    Raises `InputError` where there is none.
+    """
+    sweeps = list({sweep.name: sweep for column in columns for sweep in column.source.sweeps}.values())
+    if not sweeps:
+        raise InputError("figure: expected a model that is not pinned at parameters of its own")
+    schema = columns[0].source.predictor.schema
+    title = f"{columns[0].label} · {schema.scene}" if len(columns) == 1 else schema.scene
+    page = (files("odeform.figure") / "figure.html").read_text(encoding="utf-8")
+    script = (files("odeform.figure") / "figure.js").read_text(encoding="utf-8")
+    data = json.dumps(_data(columns, sweeps), ensure_ascii=True).replace("<", "\\u003c")
+    subtitle, notes = (
+        escape(_subtitle(columns, sweeps)),
+        "".join(f"<p>{escape(note)}</p>" for note in _notes(columns, sweeps)),
+    )
+    filled = Template(page).substitute(title=escape(title), subtitle=subtitle, notes=notes, data=data, script=script)
+    return filled.encode()
+
+
+def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> dict[str, Any]:
+    first, around = columns[0], columns[0].source.predictor.surroundings
+    names = [sweep.name for sweep in sweeps]
+    return {
+        "sweeps": [_slider(sweep) for sweep in sweeps],
+        "start": float(first.times[0]),
+        "step": float(first.times[1] - first.times[0]),
+        "frames": len(first.times),
+        "size": max(_size(column) for column in columns),
+        "floor": None if around is None else around.floor,
+        "low": _low(first),
+        "cell": _cell(columns),
+        "columns": [
+            {
+                "label": column.label,
+                "counts": column.table.counts,
+                "axes": [names.index(sweep.name) for sweep in column.source.sweeps],
+                "azimuth": column.body.azimuth,
+                "arrays": _encoded({**column.body.arrays(), **column.table.arrays()}),
+            }
+            for column in columns
+        ],
+    }
+
+
+def _slider(sweep: Sweep) -> dict[str, Any]:
+    parameter = sweep.parameter
+    return {
+        "name": sweep.name,
+        "unit": parameter.unit,
+        "low": sweep.low,
+        "high": sweep.high,
+        "log": sweep.logarithmic,
+        "place": sweep.place(parameter.default) if sweep.low < parameter.default < sweep.high else 0.5,
+        "trained": [parameter.low, parameter.high],
+    }
+
+
+def _encoded(arrays: Arrays) -> dict[str, dict[str, Any]]:
+    """Little-endian bytes in base64, with their type and shape."""
+    return {
+        name: {
+            "dtype": array.dtype.name,
+            "shape": array.shape,
+            "data": base64.b64encode(
+                np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<")).tobytes()
+            ).decode(),
+        }
+        for name, array in arrays.items()
+    }
+
+
+def _size(column: FigureColumn) -> float:
+    return float(np.ptp(column.body.rest, axis=0).max())
+
+
+def _low(column: FigureColumn) -> float:
+    """Height in metres of the middle of the body when it touches the floor; where it rests, without one."""
+    around, heights = column.source.predictor.surroundings, column.body.rest[:, 2]
+    if around is None or around.floor is None:
+        return float(column.body.anchor[2])
+    return around.floor - float(heights.min())
+
+
+def _cell(columns: Sequence[FigureColumn]) -> float:
+    """The spacing of the floor's grid in metres: a power of ten."""
+    return 10.0 ** round(math.log10(0.4 * max(_size(column) for column in columns)))
+
+
+def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
+    """What does not move: the body, and parameters without a slider that were given."""
+    first, swept = columns[0].source, {sweep.name for sweep in sweeps}
+    body = first.complete(np.full(len(first.sweeps), 0.5)).get(OBJECT)
+    units = {p.name: p.unit for p in first.predictor.schema.parameters}
+    given = [
+        f"{name} {float(value):.4g} {units[name]}".strip()
+        for name, value in first.predictor.schema.expanded(first.fixed).items()
+        if name in units and name not in swept
+    ]
+    cell = _cell(columns)
+    grid = f"grid {100 * cell:g} cm" if cell < 1.0 else f"grid {cell:g} m"
+    return ", ".join([*([str(body)] if body else []), *given, grid])
+
+
+def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str]:
+    notes = [_column_note(column, len(columns) > 1) for column in columns]
+    outside = [s.name for s in sweeps if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
+    if outside:
+        notes.append(f"* {', '.join(outside)}: partly outside of what was trained.")
+    # of a shape that was not trained, and of times after the window
+    notes += dict.fromkeys(f"{note}." for c in columns for note in caveats(c.source.middle, c.times))
+    return notes
+
+
+def _column_note(column: FigureColumn, several: bool) -> str:
+    """How far the figure is from its model, and the model from what it was trained on."""
+    who, error, tolerance = f"{column.label}: " if several else "", column.error, column.tolerance_mm
+    if column.table.counts:
+        grid = " × ".join(str(count) for count in column.table.counts)
+        shown = (
+            f"{who}{'i' if several else 'I'}nterpolated between {grid} motions. At other parameters and times, half of "
+            f"the motions are within {error.half:.2g} mm of the model and 90 % within {error.most:.2g} mm; "
+            f"{error.rmse:.2g} mm together (RMSE)."
+        )
+    else:
+        shown = f"{who}one motion, at any time within {error.rmse:.2g} mm of the model (RMSE)."
+    if column.band_mm is None:
+        band = "The error of the model itself is not known."
+    else:
+        half, most = column.band_mm
+        band = (
+            f"Of unseen motions, half are within {half:.2g} mm of what the model says, and 90 % within {most:.2g} mm."
+        )
+    aim = f" This is more than the {tolerance[0]:.2g} and {tolerance[1]:.2g} mm aimed at, as fine as it gets."
+    return f"{shown}{'' if column.fine else aim} {band}"
