@@ -29,6 +29,8 @@ class DisplacementBasis:
     centers: Float[np.ndarray, "centers 3"]
     weights: Floats
     scale: float
+    steps: Float[np.ndarray, " modes"] | None = None
+    """(K,) m per m: the precision of each mode that is worth keeping in a file; None for full precision."""
 
     @property
     def modes(self) -> int:
@@ -37,7 +39,8 @@ class DisplacementBasis:
 
     def first(self, count: int) -> "DisplacementBasis":
         """Returns the basis of the first `count` modes."""
-        return replace(self, weights=self.weights[:, : 3 * count])
+        steps = None if self.steps is None else self.steps[:count]
+        return replace(self, weights=self.weights[:, : 3 * count], steps=steps)
 
     @cached_property
     def _far(self) -> float:

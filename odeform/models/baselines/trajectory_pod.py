@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from odeform.dataset.training_data import TrainingData
+from odeform.arrays import in_steps, row_steps
+from odeform.dataset.training_data import ROUNDING, TrainingData
 from odeform.motion.reduced_space import POSE
 from odeform.types import Arrays, Floats
 
@@ -36,11 +37,15 @@ class TrajectoryPod:
         return float(np.sqrt(((self.mean + coefficients @ self.modes - target) ** 2).sum(axis=1).mean()))
 
     def arrays(self) -> Arrays:
-        """Returns the mean and modes in the units of the coordinates, for a checkpoint."""
+        """Returns the mean and modes, in the units of the coordinates, and the coefficients, for a checkpoint."""
         unweight = np.tile(1.0 / self.weight, len(self.mean) // len(self.weight))
+        sizes = np.sqrt((self.coefficients**2).mean(axis=0))
+        # a displacement is the sum of all coordinates of a frame, over three axes
+        steps = row_steps(sizes, ROUNDING * np.sqrt(3.0 / len(self.weight)))
         return {
             "pod.mean": (self.mean * unweight).astype(np.float64),
-            "pod.modes": (self.modes * unweight).astype(np.float32),
+            **in_steps("pod.modes", self.modes * unweight, steps),
+            **in_steps("pod.coefficients", self.coefficients, np.full(len(self.coefficients), ROUNDING)),
         }
 
 
