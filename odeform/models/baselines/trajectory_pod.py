@@ -7,10 +7,10 @@ from jaxtyping import Float
 
 from odeform.arrays import in_steps, row_steps
 from odeform.dataset.training_data import ROUNDING, TrainingData
-from odeform.motion.reduced_space import POSE
+from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.types import Arrays, Floats
 
-__all__ = ["TrajectoryPod", "fit_trajectory_pod"]
+__all__ = ["TrajectoryPod", "fit_trajectory_pod", "trajectory_weight"]
 
 ENERGY = 0.999999999  # less limits the best fits: at 0.999999 the deformation error of `gp` on the drop is 10 %, not 4
 
@@ -49,11 +49,17 @@ class TrajectoryPod:
         }
 
 
+def trajectory_weight(space: ReducedSpace) -> Float[np.ndarray, " y"]:
+    """Returns (6 + K,) metres of displacement per unit of each coordinate."""
+    weight = np.ones(space.coordinates)
+    weight[3:POSE] = space.gyration_radius * np.sqrt(2.0 / 3.0)
+    return weight
+
+
 def fit_trajectory_pod(data: TrainingData) -> TrajectoryPod:
     """The leading modes of the training motions, which hold `ENERGY` of their variance."""
     train = data.reduced["train"]
-    weight = np.ones(train.shape[-1])
-    weight[3:POSE] = data.space.gyration_radius * np.sqrt(2.0 / 3.0)  # radians to metres
+    weight = trajectory_weight(data.space)
     flat = (train * weight).reshape(len(train), -1)
     mean = flat.mean(axis=0)
     u, s, vt = np.linalg.svd(flat - mean, full_matrices=False)
