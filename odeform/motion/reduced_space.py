@@ -10,6 +10,7 @@ roll, they predict amplitudes of patterns in place of c (`odeform.motion.rolling
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
@@ -127,9 +128,13 @@ def _basis(arrays: Arrays, scale: float) -> DisplacementBasis:
     """Reads the basis: its weights, or its values at the centers, which are solved for the weights."""
     centers, steps = arrays["basis.centers"], arrays.get(f"basis.values{STEP}")
     if steps is None:
-        return DisplacementBasis(centers, arrays["basis.weights"], scale)
+        weights = arrays["basis.weights"]
+        return DisplacementBasis(centers, weights.shape[1] // 3, scale, partial(np.asarray, weights))
     require_memory("basis", f"{len(centers):,} centers", SYSTEM_BYTES * len(centers) ** 2)
-    values = arrays["basis.values"].transpose(1, 2, 0)
+    values = arrays["basis.values"]
+    if values.shape != (len(steps), *centers.shape) or not np.isfinite(values).all():
+        raise ValueError(f"basis.values: expected finite values of {len(steps)} modes at {len(centers)} centers")
+    values = values.transpose(1, 2, 0)
     return replace(fit_basis(centers * scale, values, scale), steps=steps)
 
 
