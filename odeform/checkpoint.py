@@ -1,7 +1,12 @@
-"""Checkpoints: one safetensors file of arrays, with everything else as JSON in its metadata. Nothing is unpickled."""
+"""Checkpoints: one safetensors file of arrays, with everything else as JSON in its metadata. Nothing is unpickled.
+
+Arrays in steps (`odeform.arrays`) are packed in the file, and plain numbers to whoever reads it.
+"""
 
 import hashlib
 import json
+import math
+import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +15,7 @@ import numpy as np
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
+from odeform.arrays import STEP, packed, unpacked
 from odeform.budget import read_limited
 from odeform.errors import InputError
 from odeform.io import atomic_write, bundled, parse_json, safetensors_metadata
@@ -28,7 +34,8 @@ __all__ = [
 ]
 
 FORMAT = 1
-LIMIT = 1 << 29  # bytes; no checkpoint is larger
+LIMIT = 1 << 29  # bytes; no checkpoint is larger, and no array of one
+PACKED_BYTES = 4  # of an entry of an array that was packed
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +67,8 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
 
     All but the arrays are plain JSON values; numpy scalars become such.
     """
+    arrays = {name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}
+    in_steps = {name: list(arrays[name].shape) for name in sorted(arrays) if f"{name}{STEP}" in arrays}
     meta = {
         "format": FORMAT,
         "model": checkpoint.model,
@@ -67,10 +76,11 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
         "config": checkpoint.config,
         "provenance": checkpoint.provenance,
         "scores": checkpoint.scores,
+        **({"packed": in_steps} if in_steps else {}),
     }
     metadata = {"odeform": json.dumps(meta, default=_plain)}  # one key: safetensors writes several in no fixed order
-    data = save({name: np.asarray(array, order="C") for name, array in checkpoint.arrays.items()}, metadata)
-    atomic_write(Path(path), data)
+    arrays |= {name: packed(arrays[name], arrays[f"{name}{STEP}"]) for name in in_steps}
+    atomic_write(Path(path), save(arrays, metadata))
 
 
 def _plain(value: Any) -> Any:
@@ -106,6 +116,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
         meta = parse_json(metadata["odeform"], f"checkpoint {path}: metadata")
         if meta["format"] != FORMAT:
             raise InputError(f"checkpoint {path}: expected format {FORMAT}, got {meta['format']!r}")
+        _unpack(arrays, meta.get("packed", {}), str(path))
         return Checkpoint(
             model=str(meta["model"]),
             schema=Schema.from_json(meta["schema"]),
@@ -118,8 +129,19 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
         )
     except InputError:
         raise
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise InputError(f"checkpoint {path}: damaged metadata: {error}") from None
+
+
+def _unpack(arrays: Arrays, shapes: dict[str, Any], path: str) -> None:
+    """Replace the packed ones of the arrays by what they hold. `InputError` where one is damaged or too large."""
+    for name, shape in shapes.items():
+        if min(shape, default=0) < 0 or math.prod(shape) * PACKED_BYTES > LIMIT:
+            raise InputError(f"checkpoint {path}: {name}: expected at most {LIMIT >> 20} MiB, got shape {shape}")
+        try:
+            arrays[name] = unpacked(arrays[name], shape, arrays[f"{name}{STEP}"])
+        except (zlib.error, ValueError, TypeError) as error:
+            raise InputError(f"checkpoint {path}: {name}: damaged: {error}") from None
 
 
 def bundled_checkpoints() -> dict[str, Path]:

@@ -12,6 +12,7 @@ import safetensors.numpy
 import safetensors.torch
 import torch
 
+from odeform.arrays import STEP, in_steps
 from odeform.checkpoint import Checkpoint, read_checkpoint, resolve_checkpoint, write_checkpoint
 from odeform.errors import InputError
 from odeform.models.base import Predictor
@@ -146,11 +147,63 @@ def test_damaged_metadata(trained: dict[str, Path], tmp_path: Path, damage: str)
 @pytest.mark.parametrize("model", MODELS)
 def test_missing_space(trained: dict[str, Path], tmp_path: Path, model: str) -> None:
     whole = read_checkpoint(trained[model])
-    for missing in ("basis.weights", "rest.points"):
+    for missing in ("basis.values", "rest.points"):
         arrays = {name: array for name, array in whole.arrays.items() if name != missing}
         write_checkpoint(tmp_path / "a.safetensors", replace(whole, arrays=arrays))
         with pytest.raises(InputError, match=missing):
             load(tmp_path / "a.safetensors")
+
+
+def in_file(path: Path) -> dict[str, np.ndarray]:
+    """The arrays as the file itself has them."""
+    return safetensors.numpy.load(path.read_bytes())
+
+
+def test_arrays_in_steps_are_packed_in_the_file_alone(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).normal(size=(5, 40, 3))
+    whole = replace(small(), arrays={**small().arrays, **in_steps("a", values, np.full(5, 1e-2))})
+    write_checkpoint(tmp_path / "a.safetensors", whole)
+    assert in_file(tmp_path / "a.safetensors")["a"].dtype == np.uint8
+    again = read_checkpoint(tmp_path / "a.safetensors")
+    assert again.arrays.keys() == whole.arrays.keys()
+    assert np.array_equal(again.arrays["a"], whole.arrays["a"])
+    write_checkpoint(tmp_path / "b.safetensors", again)
+    assert (tmp_path / "a.safetensors").read_bytes() == (tmp_path / "b.safetensors").read_bytes()
+
+
+PACKED_DAMAGE: dict[str, dict[str, Any]] = {
+    "too large": {"a": [5, 1 << 40]},
+    "of negative size": {"a": [-5, 120]},
+    "of another shape": {"a": [5, 119]},
+    "of words": {"a": ["five", 120]},
+    "without dimensions": {"a": []},
+    "of no array": {"z": [5, 120]},
+    "without a step": {"b": [2]},
+    "no table": [1],  # pyright: ignore[reportAssignmentType]
+}
+
+
+@pytest.mark.parametrize("damage", PACKED_DAMAGE)
+def test_damaged_packed_arrays_are_refused(tmp_path: Path, damage: str) -> None:
+    values = np.random.default_rng(0).normal(size=(5, 120))
+    whole = replace(small(), arrays={**small().arrays, **in_steps("a", values, np.full(5, 1e-2))})
+    write_checkpoint(tmp_path / "a.safetensors", whole)
+    path = rewritten(tmp_path / "a.safetensors", tmp_path / "b.safetensors", meta(packed=PACKED_DAMAGE[damage]))
+    with pytest.raises(InputError, match=r"checkpoint .*b\.safetensors"):
+        read_checkpoint(path)
+
+
+def test_files_of_before_arrays_were_packed_still_load(trained: dict[str, Path], tmp_path: Path) -> None:
+    """They hold the weights of the basis in place of its values, and no steps."""
+    whole = read_checkpoint(trained["nearest"])
+    new = load(trained["nearest"])
+    weights = new.space.basis.weights  # pyright: ignore[reportAttributeAccessIssue]
+    kept = {k: v for k, v in whole.arrays.items() if not k.endswith(STEP) and k != "basis.values"}
+    old = {**kept, "basis.weights": weights, "local": kept["local"].astype(np.float16)}
+    write_checkpoint(tmp_path / "old.safetensors", replace(whole, arrays=old))
+    assert all(array.dtype != np.uint8 for array in in_file(tmp_path / "old.safetensors").values())
+    again = load(tmp_path / "old.safetensors").solve().vertices(np.linspace(0.0, 1.0, 5))
+    assert np.abs(again - new.solve().vertices(np.linspace(0.0, 1.0, 5))).max() < 2e-5
 
 
 def test_names(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from odeform.arrays import row_steps
 from odeform.dataset.index import Dataset
 from odeform.dataset.patterns import fit_rolling
 from odeform.dataset.subsampling import FrameSubsampling
@@ -15,11 +16,13 @@ from odeform.motion.reduced_space import ReducedSpace, decompose, fit_modes, mak
 from odeform.schema import Schema, Window
 from odeform.types import Basis, Bools, Floats, Mesh, MotionSequence, Perpoint, Times, Vector
 
-__all__ = ["FILLED_WEIGHT", "TrainingData", "inputs_identity", "prepare"]
+__all__ = ["FILLED_WEIGHT", "ROUNDING", "TrainingData", "inputs_identity", "prepare"]
 
 SPLITS = ("train", "val")
 TRUNCATION = 5e-3  # fraction of the RMS deformation that may be left out
 MOST_MODES = 64
+ROUNDING = 1e-6
+"""Metres, or radians: what checkpoints may change predictions by, as they keep arrays in steps (`odeform.arrays`)."""
 PULSE = "pulse_s"  # of a scene's fixed values: how long a force drives the body
 FILLED_WEIGHT = 1e-3
 """Weight in training of a frame that a spline fills in: it constrains what no observed frame does."""
@@ -110,7 +113,8 @@ def prepare(
     shift = _largest([pose[:, :3] for pose in motions["train"].poses])
     deformation = _largest([c[:, :kept] for c in coefficients["train"]])
     space = make_space(body.rest, basis[..., :kept], body.weights, body.anchor)
-    space = replace(space, largest=(shift, deformation))
+    steps = row_steps(np.sqrt(by_mode["train"][:kept]), ROUNDING)
+    space = replace(space, largest=(shift, deformation), basis=replace(space.basis, steps=steps))
     reduced = {}
     for split in SPLITS:
         pairs = zip(motions[split].poses, coefficients[split], strict=True)

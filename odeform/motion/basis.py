@@ -7,8 +7,9 @@ the trained body are pulled in along their ray, to at most nine times: far away,
 """
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -24,20 +25,25 @@ CHUNK = 512  # points evaluated at once: as many as stay in the cache with their
 
 @dataclass(frozen=True, eq=False)
 class DisplacementBasis:
-    """`centers` (M, 3) in units of `scale` metres about the anchor; `weights` (M + 4, K * 3)."""
+    """`centers` (M, 3) in units of `scale` metres about the anchor, and the number of modes K."""
 
     centers: Float[np.ndarray, "centers 3"]
-    weights: Floats
+    modes: int
     scale: float
+    solve: Callable[[], Floats]
+    """Returns `weights`. It is called when they are first needed: a file may hold more bodies than are shown."""
+    steps: Float[np.ndarray, " modes"] | None = None
+    """(K,) m per m: the precision of each mode that is worth keeping in a file; None for full precision."""
 
-    @property
-    def modes(self) -> int:
-        """Number of modes K."""
-        return self.weights.shape[1] // 3
+    @cached_property
+    def weights(self) -> Floats:
+        """Solves for (M + 4, K * 3)."""
+        return self.solve()
 
     def first(self, count: int) -> "DisplacementBasis":
         """Returns the basis of the first `count` modes."""
-        return replace(self, weights=self.weights[:, : 3 * count])
+        steps = None if self.steps is None else self.steps[:count]
+        return replace(self, modes=count, solve=partial(_first_weights, self, count), steps=steps)
 
     @cached_property
     def _far(self) -> float:
@@ -104,8 +110,17 @@ def _squares(points: Points, centers: Float[np.ndarray, "centers 3"]) -> Pairs:
 
 
 def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
-    """Fits the basis with the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
+    """Returns the basis with the values `modes` (N, 3, K) metres at the distinct `points` (N, 3) metres."""
     centers = np.asarray(points, dtype=float) / scale
+    return DisplacementBasis(centers, modes.shape[2], scale, partial(_fitted_weights, centers, modes))
+
+
+def _first_weights(basis: DisplacementBasis, count: int) -> Floats:
+    return basis.weights[:, : 3 * count]
+
+
+def _fitted_weights(centers: Float[np.ndarray, "centers 3"], modes: Float[np.ndarray, "centers 3 modes"]) -> Floats:
+    """Solves for the weights of the basis with these values at its centers."""
     tail = np.concatenate([np.ones((len(centers), 1)), centers], axis=1)
     system = np.block([[_squares(centers, centers) ** 1.5, tail], [tail.T, np.zeros((4, 4))]])
     values = np.asarray(modes, dtype=float).swapaxes(1, 2).reshape(len(centers), -1)
@@ -113,8 +128,7 @@ def fit_basis(points: Points, modes: Basis, scale: float) -> DisplacementBasis:
     with warnings.catch_warnings():
         warnings.simplefilter("error", LinAlgWarning)
         try:
-            weights = solve(system, right)
+            return solve(system, right)
         except (LinAlgError, LinAlgWarning):
             # coplanar points leave part of the linear tail undetermined
-            weights = np.linalg.lstsq(system, right, rcond=None)[0]
-    return DisplacementBasis(centers, weights, scale)
+            return np.linalg.lstsq(system, right, rcond=None)[0]

@@ -9,11 +9,14 @@ models of this package predict the vector y = [p, w, c]; y(0) = 0 makes P(0) = P
 roll, they predict amplitudes of patterns in place of c (`odeform.motion.rolling`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float
 
+from odeform.arrays import STEP, in_steps
+from odeform.budget import require_memory
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, rotation_z, unwrapped_vectors
 from odeform.motion.basis import DisplacementBasis, fit_basis
 from odeform.motion.rolling import Rolling
@@ -33,6 +36,7 @@ __all__ = [
 ]
 
 POSE = 6  # size of the rigid part of y
+SYSTEM_BYTES = 32  # of memory for a pair of centers while the weights of a basis are solved for
 MARGIN = 1.15  # times the largest trained shift or deformation, up to which predictions are unchanged
 
 
@@ -99,13 +103,17 @@ class ReducedSpace:
 
     def arrays(self) -> Arrays:
         """The arrays of a checkpoint, by name; `from_parts` reads them."""
-        patterns = {} if self.rolling is None else self.rolling.arrays()
-        return {"basis.centers": self.basis.centers, "basis.weights": self.basis.weights, **patterns}
+        basis, patterns = self.basis, {} if self.rolling is None else self.rolling.arrays()
+        if basis.steps is None:
+            return {"basis.centers": basis.centers, "basis.weights": basis.weights, **patterns}
+        # a fifth of the bytes of the weights, which follow from them
+        values = basis.values(basis.centers * basis.scale).transpose(2, 0, 1)
+        return {"basis.centers": basis.centers, **in_steps("basis.values", values, basis.steps), **patterns}
 
     @classmethod
     def from_parts(cls, data: dict[str, object], arrays: Arrays, rest: Mesh) -> "ReducedSpace":
         """From `to_json` and `arrays` of a checkpoint; `rest` is the trained body at rest in the scene."""
-        basis = DisplacementBasis(arrays["basis.centers"], arrays["basis.weights"], float(data["basis_scale"]))  # pyright: ignore
+        basis = _basis(arrays, float(data["basis_scale"]))  # pyright: ignore
         anchor = np.array(data["anchor"], dtype=float)
         if anchor.shape != (3,):
             raise ValueError(f"anchor: expected three numbers, got {data['anchor']!r}")
@@ -114,6 +122,20 @@ class ReducedSpace:
         shift, deformation = data.get("largest", ("inf", "inf"))  # pyright: ignore
         largest = float(shift), float(deformation)  # pyright: ignore
         return cls(anchor, float(data["arm"]), basis, surface, largest, Rolling.from_arrays(arrays, basis.modes))  # pyright: ignore
+
+
+def _basis(arrays: Arrays, scale: float) -> DisplacementBasis:
+    """Reads the basis: its weights, or its values at the centers, which are solved for the weights."""
+    centers, steps = arrays["basis.centers"], arrays.get(f"basis.values{STEP}")
+    if steps is None:
+        weights = arrays["basis.weights"]
+        return DisplacementBasis(centers, weights.shape[1] // 3, scale, partial(np.asarray, weights))
+    require_memory("basis", f"{len(centers):,} centers", SYSTEM_BYTES * len(centers) ** 2)
+    values = arrays["basis.values"]
+    if values.shape != (len(steps), *centers.shape) or not np.isfinite(values).all():
+        raise ValueError(f"basis.values: expected finite values of {len(steps)} modes at {len(centers)} centers")
+    values = values.transpose(1, 2, 0)
+    return replace(fit_basis(centers * scale, values, scale), steps=steps)
 
 
 def to_canonical(points: Vectors, anchor: Vector, azimuth: float) -> Vectors:

@@ -9,6 +9,15 @@ from odeform.models.registry import load
 from odeform.types import PointCloud
 
 
+def test_every_scene_has_its_rivals_in_few_bytes() -> None:
+    """So that the page compares without a training, and an install stays small."""
+    sizes = {name: path.stat().st_size for name, path in bundled_checkpoints().items()}
+    for scene in ("contact-force", "kick", "mass-elastic"):
+        assert {f"{scene}/{model}" for model in ("gp", "nearest", "odeform", "pod-rbf")} <= sizes.keys()
+    assert sum(size for name, size in sizes.items() if name.startswith("contact-force/")) < 40e6
+    assert sum(sizes.values()) < 60e6
+
+
 @pytest.mark.parametrize("name", bundled_checkpoints())
 def test_it_opens_and_predicts(name: str):
     predictor = load(name)

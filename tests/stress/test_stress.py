@@ -197,8 +197,8 @@ def test_results_that_depend_on_the_query_are_found(model: LatentModel, monkeypa
 def test_exaggerated_deformations_are_found(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(physics, "SAMPLES", 1)
     arrays = model.checkpoint.arrays
-    weights = {"basis.weights": 50.0 * arrays["basis.weights"]}
-    wild = LatentModel(replace(model.checkpoint, arrays={**arrays, **weights}))
+    values = {"basis.values": 50.0 * arrays["basis.values"]}
+    wild = LatentModel(replace(model.checkpoint, arrays={**arrays, **values}))
     failed = [{n for n, c in physics.check_physics(m).items() if not c.holds} for m in (model, wild)]
     assert failed[1] - failed[0] >= {"inverted_faces", "edge_strain", "volume_drift"}
 

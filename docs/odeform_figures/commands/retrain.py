@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["HELP", "add_options", "run"]
 
 HELP = "Train bundled checkpoints again by their recorded commands, and compare the scores"
-AGAIN = ("continuation", "qualities")  # what `--only` makes again
+AGAIN = ("continuation", "qualities", "storage")  # what `--only` makes again
 SCORES = ("rmse_pooled_mm", "deformation_relative")
 
 
@@ -33,8 +33,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only",
         choices=AGAIN,
-        help="keep the models, and fit again what continues their motions beyond the trained window, or measure again "
-        "the solver settings of pushed objects",
+        help="keep the models, and fit again what continues their motions beyond the trained window, measure again "
+        "the solver settings of pushed objects, or store classical baselines as a training does today",
     )
     add_json(parser)
 
@@ -93,7 +93,10 @@ def _command(name: str, provenance: dict[str, Any], out: Path, steps: int | None
 def _has(what: str, model: "Predictor") -> bool:
     """Whether a bundled model has what `--only` makes again."""
     from odeform.models.training.continuation import is_continued
+    from odeform_figures.storage import is_stored_in_full
 
+    if what == "storage":
+        return is_stored_in_full(model.checkpoint)
     return is_continued(model) if what == "continuation" else model.model == "modal"
 
 
@@ -101,15 +104,20 @@ def _make_again(what: str, name: str, recorded: "Checkpoint", out: Path, command
     """Write the bundled checkpoint of this name with another of `AGAIN`."""
     from odeform.checkpoint import write_checkpoint
     from odeform.dataset.store import open_dataset
+    from odeform.evaluation.metrics import evaluate
     from odeform.models.modal.training.fit import with_measured_qualities
     from odeform.models.registry import load_model
     from odeform.training.train import scored
     from odeform_figures.continuation import refitted
+    from odeform_figures.storage import stored_in_steps
 
     known = {**recorded.provenance, what: {"command": command, "versions": {"odeform": version("odeform")}}}
     checkpoint, dataset = replace(recorded, provenance=known), open_dataset(name.split("/")[0])
     if what == "continuation":
         write_checkpoint(out, refitted(checkpoint, dataset))
+    elif what == "storage":
+        stored = stored_in_steps(checkpoint)
+        write_checkpoint(out, replace(stored, scores=evaluate(load_model(stored), dataset, "test")))
     else:
         # other steps make other errors
         write_checkpoint(out, scored(with_measured_qualities(load_model(checkpoint), dataset), dataset))

@@ -47,7 +47,7 @@ class GaussianProcess(FittedModel):
         if order not in ORDERS:
             raise ValueError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {order!r}")
         self._check_inputs(arrays["theta"])
-        self._regression = KernelRegression(Kernel(scales, order), arrays["theta"], arrays["gp.weights"])
+        self._regression = _regression(checkpoint, Kernel(scales, order))
 
     @staticmethod
     def fit(data: TrainingData) -> tuple[Arrays, dict[str, Any]]:
@@ -58,8 +58,7 @@ class GaussianProcess(FittedModel):
         pod, theta = fit_trajectory_pod(data), data.theta
         val = (theta["val"], pod.project(data.reduced["val"]))
         found = search_ridge(theta["train"], pod.coefficients, val, orders=ORDERS)
-        weights = found[0].fit(theta["train"], pod.coefficients).weights
-        arrays = {"times": data.times, "theta": theta["train"], "gp.weights": weights, **pod.arrays()}
+        arrays = {"times": data.times, "theta": theta["train"], **pod.arrays()}
         trials = [{**_named(trial), "error": trial.error} for trial in found]
         return arrays, {**_named(found[0]), "modes": len(pod.modes), "trials": trials}
 
@@ -72,6 +71,15 @@ class GaussianProcess(FittedModel):
             return (self._mean + self._regression(theta[None])[0] @ self._modes).reshape(len(self._times), -1)
 
         return FrameTrajectory("kernel ridge regression", self._times, predict)
+
+
+def _regression(checkpoint: Checkpoint, kernel: Kernel) -> KernelRegression:
+    """The regression of the coefficients, whose weights are solved for; older checkpoints hold them."""
+    arrays = checkpoint.arrays
+    if "gp.weights" in arrays:
+        return KernelRegression(kernel, arrays["theta"], arrays["gp.weights"])
+    ridge = Ridge(kernel, float(checkpoint.config["ridge"]))
+    return ridge.fit(arrays["theta"], arrays["pod.coefficients"].astype(float))
 
 
 def _named(ridge: Ridge) -> dict[str, Any]:

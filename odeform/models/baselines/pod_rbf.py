@@ -64,12 +64,7 @@ class PodRbf(FittedModel):
         if not np.isfinite(min(errors)):
             raise InputError(f"pod-rbf: {len(data.theta['train'])} training sequences are too few for any kernel")
         kernel, smoothing = candidates[int(np.argmin(errors))]
-        arrays = {
-            "times": data.times,
-            "theta": data.theta["train"],
-            "pod.coefficients": pod.coefficients.astype(np.float64),
-            **pod.arrays(),
-        }
+        arrays = {"times": data.times, "theta": data.theta["train"], **pod.arrays()}
         trials = [{"kernel": k, "smoothing": g, "val": e} for (k, g), e in zip(candidates, errors, strict=True)]
         return arrays, {"kernel": kernel, "smoothing": smoothing, "modes": len(pod.modes), "trials": trials}
 

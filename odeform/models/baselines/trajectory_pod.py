@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from odeform.dataset.training_data import TrainingData
-from odeform.motion.reduced_space import POSE
+from odeform.arrays import in_steps, row_steps
+from odeform.dataset.training_data import ROUNDING, TrainingData
+from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.types import Arrays, Floats
 
-__all__ = ["TrajectoryPod", "fit_trajectory_pod"]
+__all__ = ["TrajectoryPod", "fit_trajectory_pod", "trajectory_weight"]
 
 ENERGY = 0.999999999  # less limits the best fits: at 0.999999 the deformation error of `gp` on the drop is 10 %, not 4
 
@@ -36,19 +37,29 @@ class TrajectoryPod:
         return float(np.sqrt(((self.mean + coefficients @ self.modes - target) ** 2).sum(axis=1).mean()))
 
     def arrays(self) -> Arrays:
-        """Returns the mean and modes in the units of the coordinates, for a checkpoint."""
+        """Returns the mean and modes, in the units of the coordinates, and the coefficients, for a checkpoint."""
         unweight = np.tile(1.0 / self.weight, len(self.mean) // len(self.weight))
+        sizes = np.sqrt((self.coefficients**2).mean(axis=0))
+        # a displacement is the sum of all coordinates of a frame, over three axes
+        steps = row_steps(sizes, ROUNDING * np.sqrt(3.0 / len(self.weight)))
         return {
             "pod.mean": (self.mean * unweight).astype(np.float64),
-            "pod.modes": (self.modes * unweight).astype(np.float32),
+            **in_steps("pod.modes", self.modes * unweight, steps),
+            **in_steps("pod.coefficients", self.coefficients, np.full(len(self.coefficients), ROUNDING)),
         }
+
+
+def trajectory_weight(space: ReducedSpace) -> Float[np.ndarray, " y"]:
+    """Returns (6 + K,) metres of displacement per unit of each coordinate."""
+    weight = np.ones(space.coordinates)
+    weight[3:POSE] = space.gyration_radius * np.sqrt(2.0 / 3.0)
+    return weight
 
 
 def fit_trajectory_pod(data: TrainingData) -> TrajectoryPod:
     """The leading modes of the training motions, which hold `ENERGY` of their variance."""
     train = data.reduced["train"]
-    weight = np.ones(train.shape[-1])
-    weight[3:POSE] = data.space.gyration_radius * np.sqrt(2.0 / 3.0)  # radians to metres
+    weight = trajectory_weight(data.space)
     flat = (train * weight).reshape(len(train), -1)
     mean = flat.mean(axis=0)
     u, s, vt = np.linalg.svd(flat - mean, full_matrices=False)

@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
+from odeform.arrays import in_steps, row_steps
+from odeform.dataset.training_data import ROUNDING
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.kernels.likelihood import fit_kernel, ridge_of
 from odeform.models.kernels.regression import KernelRegression
@@ -115,11 +117,18 @@ class ContactRegression:
         }
 
     def _expert(self, arrays: Arrays, part: str, index: int) -> _Expert:
+        """Reads the kernel of an expert and solves for its weights; older checkpoints hold them."""
         (frame, linear), name = EXPERTS[index], f"gp.{part}.{index}"
         scaling, logs = _Scaling.of(self._known, frame), arrays[f"{name}.logs"].astype(float)
-        kernel = ridge_of(logs, len(scaling.scale), scaling.places if linear else 0).kernel
-        regression = KernelRegression(kernel, scaling(self._known), arrays[f"{name}.weights"].astype(float))
-        return _Expert(scaling, logs, regression, arrays[f"{name}.mean"].astype(float))
+        ridge, x = ridge_of(logs, len(scaling.scale), scaling.places if linear else 0), scaling(self._known)
+        if f"{name}.weights" in arrays:
+            regression = KernelRegression(ridge.kernel, x, arrays[f"{name}.weights"].astype(float))
+            return _Expert(scaling, logs, regression, arrays[f"{name}.mean"].astype(float))
+        given = arrays[f"gp.{part}.outputs"].astype(float)
+        if part != "deformation":
+            given = _turned_back(given, self._known.frames(frame).swapaxes(1, 2))
+        mean = given.mean(axis=0)
+        return _Expert(scaling, logs, ridge.fit(x, given - mean), mean)
 
     def predict(self, inputs: ContactInputs) -> Float[np.ndarray, "sequences times y"]:
         """Predicts the motions of S contacts."""
@@ -149,8 +158,14 @@ def fit_contact_regression(
     modes = _modes(flat["train"]["deformation"], energy)
     for split in flat:
         flat[split]["deformation"] = flat[split]["deformation"] @ modes.T
-    arrays: Arrays = {"times": times, "gp.modes": modes.astype(np.float16)}
+    sizes = np.sqrt((flat["train"]["deformation"] ** 2).mean(axis=0))
+    # a displacement is the sum of all coefficients of a frame, over three axes
+    steps = row_steps(sizes, ROUNDING * np.sqrt(3.0 * len(times) / modes.shape[1]))
+    arrays: Arrays = {"times": times, **in_steps("gp.modes", modes, steps)}
     arrays |= {f"gp.{name}": getattr(known, name) for name in INPUTS}
+    even = np.full(len(train), ROUNDING)
+    for part, outputs in flat["train"].items():
+        arrays |= in_steps(f"gp.{part}.outputs", outputs, even)
     blend, left, trials = {}, {}, []
     for part in PARTS:
         turned = part != "deformation"
@@ -164,7 +179,7 @@ def fit_contact_regression(
         for index, (expert, _) in enumerate(fitted):
             trials.append({"part": part, "expert": EXPERTS[index], "val": errors[index]})
             if blend[part][index]:
-                arrays |= _expert_arrays(f"gp.{part}.{index}", expert)
+                arrays[f"gp.{part}.{index}.logs"] = expert.logs
     return arrays, {"blend": blend, "errors": left, "trials": trials}
 
 
@@ -173,11 +188,6 @@ def _blend(predicted: list[Floats], truth: Floats, errors: list[float]) -> list[
     weights = nnls(np.stack([p.ravel() for p in predicted], axis=1), truth.ravel())[0]
     best = int(np.argmin(errors))
     return weights.tolist() if weights.any() else [float(index == best) for index in range(len(errors))]
-
-
-def _expert_arrays(name: str, expert: _Expert) -> Arrays:
-    arrays = {"logs": expert.logs, "mean": expert.mean, "weights": expert.regression.weights.astype(np.float32)}
-    return {f"{name}.{key}": array for key, array in arrays.items()}
 
 
 def _parts(reduced: Floats) -> dict[str, Floats]:

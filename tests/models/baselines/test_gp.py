@@ -6,6 +6,7 @@ import pytest
 from odeform.dataset.index import Dataset
 from odeform.dataset.training_data import TrainingData, prepare
 from odeform.models.baselines.gp import GaussianProcess
+from odeform.models.registry import open_checkpoint
 
 
 @pytest.fixture(scope="module")
@@ -31,3 +32,13 @@ def test_a_parameter_without_effect_gets_a_long_length_scale(data: TrainingData)
     _, settings = GaussianProcess.fit(replace(data, theta=theta, reduced=reduced))
     first, second = settings["length_scales"]
     assert second > 5.0 * first
+
+
+def test_files_with_weights_still_load() -> None:
+    """Older ones hold what is solved for now from the coefficients."""
+    checkpoint = open_checkpoint("kick/gp")
+    new = GaussianProcess(checkpoint)
+    kept = {name: array for name, array in checkpoint.arrays.items() if not name.startswith("pod.coefficients")}
+    old = GaussianProcess(replace(checkpoint, arrays={**kept, "gp.weights": new._regression.weights}))
+    times = np.linspace(0.0, 1.0, 5)
+    assert np.array_equal(old.solve().vertices(times), new.solve().vertices(times))

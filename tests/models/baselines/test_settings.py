@@ -38,10 +38,10 @@ def test_wrong_settings_are_refused_when_read(model: str, settings: dict[str, An
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-@pytest.mark.parametrize(("model", "name"), [("gp", "gp.weights"), ("pod-rbf", "pod.modes")])
-def test_predictions_that_are_not_finite_are_refused(model: str, name: str, value: float) -> None:
+@pytest.mark.parametrize("model", ["gp", "pod-rbf"])
+def test_predictions_that_are_not_finite_are_refused(model: str, value: float) -> None:
     checkpoint = open_checkpoint(f"mass-elastic/{model}")
-    arrays = {**checkpoint.arrays, name: np.full_like(checkpoint.arrays[name], value)}
+    arrays = {**checkpoint.arrays, "pod.modes": np.full_like(checkpoint.arrays["pod.modes"], value)}
     predictor = model_class(model)(replace(checkpoint, arrays=arrays))
     with pytest.raises(InputError, match="the checkpoint predicts numbers that are not finite"):
         predictor.solve()

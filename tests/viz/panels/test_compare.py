@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
@@ -37,6 +38,23 @@ def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
     client.click("Add model")
     assert client.until(lambda: any("model: expected one of" in said for said in client.notifications))
     assert _labels(app) == ["odeform", "pod-rbf"]
+
+
+@pytest.mark.slow
+def test_a_pushed_object_is_compared_with_the_bundled_rivals(serve: Serve) -> None:
+    """They know neither another mass nor another stiffness, and predict the object's own."""
+    predictor, rivals = load("contact-force"), ("gp", "nearest", "pod-rbf")
+    app, client = serve(Column("odeform", predictor, predictor.rest, origin="contact-force/odeform"), moment=0.1)
+    for count, model in enumerate(rivals, 2):
+        client.set("model", f"contact-force/{model}")
+        client.click("Add model")
+        assert client.until(lambda count=count: app.presenter.settled and len(_frame(app).columns) == count)
+    shown = _frame(app)
+    known = {k: v for k, v in shown.request.parameters.items() if k not in ("mass", "young")}
+    for column, model in zip(shown.columns[1:], rivals, strict=True):
+        rival = load(f"contact-force/{model}")
+        np.testing.assert_array_equal(column.points, rival.solve(rival.rest, known).deformed(0.1))
+        assert 0.0 < np.abs(column.points - shown.columns[0].points).max() < 0.05
 
 
 def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Predictor) -> None:
