@@ -62,7 +62,7 @@ def packed(values: Floats, steps: Steps) -> UInt8[np.ndarray, " bytes"]:
 
 
 def unpacked(data: UInt8[np.ndarray, " bytes"], shape: Sequence[int], steps: Steps) -> Floats:
-    """Unpacks an array of that shape, in single precision; the inverse of `packed`.
+    """Unpacks an array of that shape, (R, ...), in single precision; the inverse of `packed`.
 
     `zlib.error` or `ValueError` for damaged bytes, or another shape. The shape is trusted: the caller limits it.
     """

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from browsing import Tab, needs_chromium, open_tab, until
-from conftest import Serve
 
 import odeform
 from odeform.errors import InputError
@@ -34,7 +34,7 @@ def _shows(app: App, scene: str) -> bool:
     return frame is not None and bool(frame.columns) and frame.columns[0].motion.schema.scene == scene
 
 
-def test_another_load_is_another_scene_with_its_own_sliders(serve: Serve, column: Column) -> None:
+def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: Column) -> None:
     app, client = serve(column)
     for load, control in (
         ("drop", "height (m)"),
@@ -51,7 +51,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Serve, column
         assert not any(isinstance(panel, StabilityPanel) for panel in app.page.panels)
 
 
-def test_sliders_of_the_body_follow_the_object(serve: Serve, column: Column, pushed: Predictor) -> None:
+def test_sliders_of_the_body_follow_the_object(serve: Any, column: Column, pushed: Predictor) -> None:
     app, client = serve(column)
     app.show_load("drop")
     assert client.until(lambda: _shows(app, "object-drop"))
@@ -66,7 +66,7 @@ def test_sliders_of_the_body_follow_the_object(serve: Serve, column: Column, pus
     assert client.until(lambda: app.presenter.frame.columns[0].motion.parameters["turn_x"] == 90.0)
 
 
-def test_a_kick_has_no_sphere_and_needs_no_room_for_one(serve: Serve, column: Column) -> None:
+def test_a_kick_has_no_sphere_and_needs_no_room_for_one(serve: Any, column: Column) -> None:
     app, client = serve(column)
     app.show_load("kick")
     assert client.until(lambda: _shows(app, "object-kick"))
@@ -86,7 +86,7 @@ def test_models_of_one_scene_are_left_out(column: Column) -> None:
         columns_under(columns[1:], "drop")
 
 
-def test_a_recording_is_of_one_scene(serve: Serve, column: Column, tmp_path: Path) -> None:
+def test_a_recording_is_of_one_scene(serve: Any, column: Column, tmp_path: Path) -> None:
     app, client = serve(column)
     app.recording.start(tmp_path / "one.rrd")
     app.page.wake()
@@ -96,7 +96,7 @@ def test_a_recording_is_of_one_scene(serve: Serve, column: Column, tmp_path: Pat
     assert app.session.schema.scene == "contact-force"
 
 
-def test_pages_of_other_models_do_not_ask(serve: Serve) -> None:
+def test_pages_of_other_models_do_not_ask(serve: Any) -> None:
     kick = odeform.load("kick")
     app, _ = serve(Column("rolling", kick, kick.rest))
     assert not any(isinstance(panel, LoadPanel) for panel in app.page.panels)

@@ -227,6 +227,12 @@ class ModalModel(Model):
             vars(out).pop(name, None)
         return out
 
+    def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
+        # a motion that begins in the air is that of the body where it would rest
+        rest = self.settled(parameters)
+        same = isinstance(geometry, Mesh) and np.array_equal(geometry.faces, rest.faces)
+        return rest if self._flies and same else geometry
+
     def _flat_below(self, rest: Mesh) -> float | None:
         """The height below which a body of this rest shape is flat: what rests there already stays as it is."""
         floor = self.surroundings.floor if self.surroundings else None
