@@ -276,7 +276,8 @@ class Session:
         poses = motion.pose(times)
         centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
-        rotation = np.degrees(np.linalg.norm(unwrapped_vectors(poses[:, :3, :3]), axis=1))
+        turned = poses[:, :3, :3] @ poses[0, :3, :3].T  # since it began: a dropped body may begin turned
+        rotation = np.degrees(np.linalg.norm(unwrapped_vectors(turned), axis=1))
         error = band = None
         if (both := shown.error_band(times)) is not None:
             band = both[:, 1]

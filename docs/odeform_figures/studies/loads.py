@@ -2,13 +2,15 @@
 
 Run `odeform simulate object-throw --out THROWS` for the data, and so on; then
 `python -m odeform_figures.studies.loads fit THROWS --checkpoint FILE`, which writes what it fits into the checkpoint,
-and `python -m odeform_figures.studies.loads measure THROWS DROPS KICKS --out FILE.json`.
+`python -m odeform_figures.studies.loads measure THROWS --out FILE.json`, and `measure DROPS KICKS --split all`: nothing
+is fitted to these.
 """
 
 import argparse
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -60,15 +62,15 @@ def fit(data: str, checkpoint: str) -> None:
     write_checkpoint(checkpoint, replace(known, config=config))
 
 
-def measured(data: str, checkpoint: str) -> dict[str, Any]:
-    """Errors of each object on the test motions of a data set, relative to the displacement since the first contact."""
+def measured(data: str, checkpoint: str, split: str = "test") -> dict[str, Any]:
+    """Errors of each object on the motions of a data set, relative to the displacement since the first contact."""
     dataset = open_dataset(data)
     found = load_of_scene(dataset.schema.scene)
     assert found is not None
     predictor = load(checkpoint).under(found.name)
     out = {}
     for name in dataset.schema.objects:
-        if impacts := _impacts(dataset, name, ("test",)):
+        if impacts := _impacts(dataset, name, ("train", "val", "test") if split == "all" else (split,)):
             out[name] = _errors(_part(predictor, name), impacts)
     return out
 
@@ -117,12 +119,13 @@ def main() -> None:
     other = commands.add_parser("measure")
     other.add_argument("data", nargs="+")
     other.add_argument("--checkpoint", default="contact-force")
+    other.add_argument("--split", default="test", choices=("test", "all"))
     other.add_argument("--out")
     args = parser.parse_args()
     if args.command == "fit":
         fit(args.data, args.checkpoint)
     else:
-        write_or_print({data: measured(data, args.checkpoint) for data in args.data}, args.out)
+        write_or_print({Path(d).name: measured(d, args.checkpoint, args.split) for d in args.data}, args.out)
 
 
 if __name__ == "__main__":
