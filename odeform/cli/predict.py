@@ -105,7 +105,8 @@ def _shape(
 
     fit = None
     if args.geometry is None and not predictor.rescales_input:
-        _note(f"{args.checkpoint}: {predictor.schema.notes[-1]}")
+        for note in predictor.schema.notes[-1:]:
+            _note(f"{args.checkpoint}: {note}")
     elif args.geometry is not None and takes_user_bodies(predictor):
         material = None if args.material is None else material_of(args.material)
         own = user_body(read_shape(args.geometry)[0], Path(args.geometry).name, material=material)
