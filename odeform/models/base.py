@@ -270,10 +270,10 @@ class Predictor(ABC):
         Raises `InputError` for unknown names, and values that are not acceptable.
         """
         given = self.schema.expanded(parameters)
-        if self.surroundings is not None and self.surroundings.contacts is not None:
-            name = self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))
-            body = {OBJECT: name}
-            given = complete_push({**body, **given}, self.rest_of(body), self.force_range(body))
+        if self.schema.objects:
+            body = {OBJECT: self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))}
+            if self.surroundings is not None and self.surroundings.contacts is not None:
+                given = complete_push({**body, **given}, self.rest_of(body), self.force_range(body))
             given = {**self.model_of(body).own_values, **given}
         return self.schema.complete(given)
 

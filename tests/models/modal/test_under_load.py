@@ -33,6 +33,17 @@ def test_a_model_of_mechanics_takes_all_loads_and_leads_back(pushed: Predictor, 
     assert odeform.load("contact-force:kick").schema.scene == "object-kick"
 
 
+@pytest.mark.parametrize("load", ["drop", "kick"])
+def test_each_object_has_its_own_mass_and_stiffness_unless_told(pushed: Predictor, load: str) -> None:
+    model = pushed.under(load)
+    for name in ("bottle", "donut"):
+        item, complete = get_object(name), model.complete({"object": name})
+        assert complete["mass"] == pytest.approx(item.mass, rel=1e-6)
+        assert complete["young"] == pytest.approx(1e-3 * item.material.young, rel=1e-6)
+        assert not model.model_of(complete).is_changed(complete)
+    assert model.complete({"object": "donut", "mass": 0.25})["mass"] == 0.25
+
+
 def test_other_models_refuse_in_words() -> None:
     kick = odeform.load("kick")
     assert kick.loads == ()
