@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from odeform.loads.registry import load_of_scene
 from odeform.motion.base import Motion
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
@@ -53,6 +54,8 @@ def badge_of(frame: Frame) -> Badge:
         known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
         text = "; ".join(filter(None, ("shape not trained", where)))
         return Badge("outside" if known else "unknown", text, expected)
+    if load_of_scene(models[0].motion.schema.scene) is not None:
+        return Badge("unknown", "; ".join(filter(None, ("mechanics alone, not corrected by data", where))), expected)
     if any(c.changed for c in models):
         where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
         return Badge("unknown", where, expected)

@@ -17,6 +17,7 @@ from odeform_viz.columns import Column, columns_under
 from odeform_viz.panels.load import LoadPanel
 from odeform_viz.panels.push import PushPanel
 from odeform_viz.panels.stability import StabilityPanel
+from odeform_viz.panels.summary import badge_of
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,16 @@ def test_a_kick_has_no_sphere_and_needs_no_room_for_one(serve: Any, column: Colu
     panel.pick(shown.column, low)  # on the floor, where no sphere fits
     contact = [panel.parameters()[f"contact_{axis}"] for axis in "xyz"]
     assert np.linalg.norm(np.array(contact) - low) < 1e-3
+
+
+def test_nothing_is_claimed_of_a_load_that_was_not_measured(serve: Any, column: Column) -> None:
+    app, client = serve(column)
+    app.show_load("drop")
+    assert client.until(lambda: _shows(app, "object-drop"))
+    badge = badge_of(app.presenter.frame)
+    assert badge.level == "unknown"
+    assert "not corrected by data" in badge.text
+    assert badge.expected == "error not known"
 
 
 def test_models_of_one_scene_are_left_out(column: Column) -> None:

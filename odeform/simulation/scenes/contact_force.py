@@ -21,7 +21,7 @@ from odeform.simulation.stepping import Rest, run
 from odeform.surroundings import Contacts
 from odeform.types import Mesh, MotionSequence, Points, Vector
 
-__all__ = ["PULSE", "SCENE", "contact_and_force", "glyphs", "simulate", "simulate_object"]
+__all__ = ["PULSE", "SCENE", "contact_and_force", "drawn_on", "glyphs", "simulate", "simulate_object"]
 
 PULSE = 0.040  # s
 STEP = 5e-4  # s, until the projectile has been gone for a while; twice that afterwards
@@ -142,8 +142,12 @@ def _check_orientation(item: SoftObject, nodes: Points) -> None:
 
 def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
     """`count` parameter sets of the object `name`; see `contact_draws`."""
-    item = get_object(name)
-    drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed, zlib.crc32(name.encode())])
+    return drawn_on(name, get_object(name).forces, count, seed)
+
+
+def drawn_on(name: str, forces: tuple[float, float], count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` contacts and forces on the object `name`, from the weakest to the strongest of `forces` in newton."""
+    drawn = contact_draws(get_object(name).rest_mesh(), forces, count, [seed, zlib.crc32(name.encode())])
     return [
         {
             f"{key}_{axis}": float(x)

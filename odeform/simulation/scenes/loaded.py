@@ -1,6 +1,5 @@
 """Scenes in which a load of `odeform.loads` acts on one of the seven objects: `object-drop`, `object-throw`, ..."""
 
-import zlib
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
@@ -11,13 +10,12 @@ from odeform.loads.arrow import Arrow
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
 from odeform.schema import OBJECT, Parameters, Schema
-from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.loaded import STEP, released, simulate_situation
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
-from odeform.simulation.scenes.contact_force import changed_object
+from odeform.simulation.scenes.contact_force import changed_object, drawn_on
 from odeform.surroundings import Contacts
 from odeform.types import Mesh, MotionSequence, Points
 
@@ -70,16 +68,7 @@ def scene_of(load: Load) -> Scene:
         return simulate_load(load, get_object(parameters[OBJECT]), parameters, **options)
 
     def draw(name: str, count: int, seed: int) -> list[dict[str, Any]]:
-        item = get_object(name)
-        drawn = contact_draws(item.rest_mesh(), forces_of(item), count, [seed, zlib.crc32(name.encode())])
-        return [
-            {
-                f"{key}_{axis}": float(x)
-                for key, row in (("contact", c), ("force", f))
-                for axis, x in zip("xyz", row, strict=True)
-            }
-            for c, f in drawn
-        ]
+        return drawn_on(name, forces_of(get_object(name)), count, seed)
 
     def glyphs(parameters: Parameters, points: Points) -> tuple[Arrow, ...]:
         if not {p.name for p in load.parameters} <= set(parameters):
