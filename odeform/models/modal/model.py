@@ -186,7 +186,7 @@ class ModalModel(Model):
         known = {MASS: self.body.solid.mass, YOUNG: self._young}
         return {p.name: known[p.name] for p in self.schema.parameters if p.name in known}
 
-    def _at(self, parameters: Mapping[str, Any]) -> "ModalModel":
+    def changed(self, parameters: Mapping[str, Any]) -> "ModalModel":
         """The model of this body with the mass and the stiffness that parameters give it."""
         own = self.own_values
         ratios = tuple(float(parameters.get(name, own[name])) / own[name] for name in own)
@@ -239,7 +239,7 @@ class ModalModel(Model):
         return None if floor is None else min(floor - SKIN, float(rest.points[:, 2].min()))
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
-        found = self._at(parameters).settled_body
+        found = self.changed(parameters).settled_body
         return self.rest if found is None else found.rest
 
     def _solve(
@@ -250,13 +250,13 @@ class ModalModel(Model):
         until: float,
         observed: MotionSequence | None,
     ) -> ReducedMotion:
-        return super(ModalModel, self._at(parameters))._solve(geometry, parameters, settings, until, observed)
+        return super(ModalModel, self.changed(parameters))._solve(geometry, parameters, settings, until, observed)
 
     def _solve_batch(
         self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
     ) -> MotionBatch:
-        first = self._at(sets[0])
-        if any(self._at(each) is not first for each in sets):
+        first = self.changed(sets[0])
+        if any(self.changed(each) is not first for each in sets):
             return Predictor._solve_batch(self, geometry, sets, settings, until)
         return super(ModalModel, first)._solve_batch(geometry, sets, settings, until)
 

@@ -63,7 +63,7 @@ def impacts_of(sequences: Iterable[MotionSequence], rate: float) -> list[Impact]
 def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, frames: int) -> Frames:
     """(T, S, 3) m: what a model under a load says of an impact, that many frames after the first contact, and one."""
     times = impact.times[impact.first : impact.first + frames + 1]
-    body = model._at(impact.parameters)
+    body = model.changed(impact.parameters)
     solved = body.integrate(body.inputs(impact.parameters), evaluated, QUALITIES["balanced"], float(times[-1]))
     y = solved.reduced(times)
     out = moved_points(evaluated, y, *placements(body.space, y, 0.0)).astype(float)
