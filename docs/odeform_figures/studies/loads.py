@@ -1,14 +1,15 @@
 """Drops, throws and kicks of the seven objects: how they meet the floor is fitted, and their error is measured.
 
 Run `odeform simulate object-throw --out THROWS` for the data, and so on; then
-`python -m odeform_figures.studies.loads fit THROWS --checkpoint FILE`, which writes what it fits into the checkpoint,
+`python -m odeform_figures.studies.loads fit THROWS DROPS --checkpoint FILE`, which writes what it fits into the
+checkpoint,
 `python -m odeform_figures.studies.loads measure THROWS --out FILE.json`, and `measure DROPS KICKS --split all`: nothing
 is fitted to these.
 """
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,21 +46,29 @@ def _impacts(dataset: Dataset, name: str, splits: Sequence[str]) -> list[Impact]
     return impacts_of(found, dataset.schema.window.rate)
 
 
-def fit(data: str, checkpoint: str) -> None:
-    """Fits each object to the training and validation motions of a data set, and writes that into a checkpoint."""
-    dataset, known = open_dataset(data), read_checkpoint(checkpoint)
-    found = load_of_scene(dataset.schema.scene)
-    assert found is not None
-    config = {**known.config, "objects": dict(known.config["objects"])}
-    for name in config["objects"]:
-        without = {key: value for key, value in config["objects"][name].items() if key != "impact"}
-        config["objects"][name] = without
-        predictor = load_model(replace(known, config=config)).under(found.name)
-        begin, impacts = time.perf_counter(), _impacts(dataset, name, ("train", "val"))
-        parameters = impact_fit(_part(predictor, name), impacts)
-        config["objects"][name] = {**without, "impact": parameters.to_json()}
-        print(f"{name}: {len(impacts)} motions, {time.perf_counter() - begin:.0f} s, {parameters}", flush=True)
-    write_checkpoint(checkpoint, replace(known, config=config))
+def fit(data: Sequence[str], checkpoint: str, names: Sequence[str] | None = None) -> None:
+    """Fits each object to the training and validation motions of data sets in which it flies, and writes that into a
+    checkpoint."""
+    sets = [open_dataset(one) for one in data]
+    for name in names or read_checkpoint(checkpoint).config["objects"]:
+        known, begin = read_checkpoint(checkpoint), time.perf_counter()
+        part = {key: value for key, value in known.config["objects"][name].items() if key != "impact"}
+        plain = replace(known, config=_with_part(known.config, name, part))
+        flights = []
+        for dataset in sets:
+            load = load_of_scene(dataset.schema.scene)
+            assert load is not None
+            if impacts := _impacts(dataset, name, ("train", "val")):
+                flights.append((_part(load_model(plain).under(load.name), name), impacts))
+        parameters = impact_fit(flights)
+        config = _with_part(known.config, name, {**part, "impact": parameters.to_json()})
+        write_checkpoint(checkpoint, replace(known, config=config))
+        count = sum(len(impacts) for _, impacts in flights)
+        print(f"{name}: {count} motions, {time.perf_counter() - begin:.0f} s, {parameters}", flush=True)
+
+
+def _with_part(config: Mapping[str, Any], name: str, part: Mapping[str, Any]) -> dict[str, Any]:
+    return {**config, "objects": {**config["objects"], name: part}}
 
 
 def measured(data: str, checkpoint: str, split: str = "test") -> dict[str, Any]:
@@ -114,7 +123,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     one = commands.add_parser("fit")
-    one.add_argument("data")
+    one.add_argument("data", nargs="+")
+    one.add_argument("--object", nargs="+", help="objects to fit (default: all)")
     one.add_argument("--checkpoint", required=True)
     other = commands.add_parser("measure")
     other.add_argument("data", nargs="+")
@@ -123,7 +133,7 @@ def main() -> None:
     other.add_argument("--out")
     args = parser.parse_args()
     if args.command == "fit":
-        fit(args.data, args.checkpoint)
+        fit(args.data, args.checkpoint, args.object)
     else:
         write_or_print({Path(d).name: measured(d, args.checkpoint, args.split) for d in args.data}, args.out)
 

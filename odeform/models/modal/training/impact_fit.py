@@ -72,21 +72,22 @@ def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, fram
     return out
 
 
-def impact_fit(model: ModalModel, impacts: Sequence[Impact]) -> ContactParameters:
-    """The contact parameters under which a model, which is under the load of these impacts, follows them best over the
-    first 120 ms after contact; each counts by its error relative to its size."""
-    evaluated = model.evaluate_basis(model.rest, 0.0)
-    known = model.contact_parameters
-    centre = np.log([getattr(known, name) for name in FITTED])
-    start = np.log([START[name] if name in START else getattr(known, name) for name in FITTED])
+def impact_fit(known: Sequence[tuple[ModalModel, Sequence[Impact]]]) -> ContactParameters:
+    """The contact parameters under which models of one body, each under the load of its impacts, follow these best over
+    the first 120 ms after contact; each counts by its error relative to its size."""
+    model = known[0][0]
+    evaluated, given = model.evaluate_basis(model.rest, 0.0), model.contact_parameters
+    centre = np.log([getattr(given, name) for name in FITTED])
+    start = np.log([START[name] if name in START else getattr(given, name) for name in FITTED])
     firm = np.array(list(FITTED.values()))
 
     def parameters(x: Floats) -> ContactParameters:
-        return replace(known, **dict(zip(FITTED, np.exp(x).tolist(), strict=True)))
+        return replace(given, **dict(zip(FITTED, np.exp(x).tolist(), strict=True)))
 
     def residuals(x: Floats) -> Floats:
-        trial = model.with_contact_parameters(parameters(x))
-        return np.concatenate([firm * (x - centre), *(_residual(trial, impact, evaluated) for impact in impacts)])
+        trials = [(one.with_contact_parameters(parameters(x)), impacts) for one, impacts in known]
+        found = [_residual(trial, impact, evaluated) for trial, impacts in trials for impact in impacts]
+        return np.concatenate([firm * (x - centre), *found])
 
     found = least_squares(residuals, start, diff_step=STEP, max_nfev=EVALUATIONS, x_scale=np.full(len(start), 0.5))
     return parameters(found.x)
