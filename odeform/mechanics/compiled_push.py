@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numpy import ndarray
 
-__all__ = ["Constants", "advance_all", "slope_of"]
+__all__ = ["Constants", "advance_all", "follow", "slope_of"]
 
 MARGIN = 1e-3
 SLIP = 1e-4
@@ -19,6 +19,7 @@ AHEAD = 0.02
 PUSH = 64
 SHORTEST = 1e-9
 SMALL = 1e-18
+LONGEST = 0.25
 
 # sums may be reordered, so that they use all lanes of a vector; what is not finite stays so
 compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
@@ -521,20 +522,67 @@ def advance_all(c, rows, times, states, steps, out, slopes, errors):
 
     The end of the pulse ends a step.
     """
-    size = c.eigenvalues.shape[1]
     work, middle = _work(c), np.empty(states.shape[1])
     for row in range(len(rows)):
-        step, error, after = steps[row], 0.0, out[row]
-        left = min(max(c.pulse - times[row], 0.0), step)
-        _copy(states[row], after)
-        for pushed in (True, False):
-            length = left if pushed else step - left
-            if length > SHORTEST or not (pushed or left > SHORTEST):
-                _copy(after, middle)
-                begin = times[row] if pushed else times[row] + left
-                error += _step(c, rows[row], middle, pushed, begin, length, after, work)
-                _slope(middle, after, size, pushed, length, slopes[row])
-        errors[row] = error
+        errors[row] = _advance(c, rows[row], times[row], states[row], steps[row], out[row], slopes[row], middle, work)
+
+
+@compiled
+@no_type_check
+def _advance(c, b, time, state, step, after, slope, middle, work):
+    """The state after a step, and the slope there; returns the error in m."""
+    error, size = 0.0, c.eigenvalues.shape[1]
+    left = min(max(c.pulse - time, 0.0), step)
+    _copy(state, after)
+    for pushed in (True, False):
+        length = left if pushed else step - left
+        if length > SHORTEST or not (pushed or left > SHORTEST):
+            _copy(after, middle)
+            begin = time if pushed else time + left
+            error += _step(c, b, middle, pushed, begin, length, after, work)
+            _slope(middle, after, size, pushed, length, slope)
+    return error
+
+
+@compiled
+@no_type_check
+def follow(c, b, control, times, states, slopes, rates, tried):
+    """Take steps of one motion from node 0 on, under the control of `odeform.solver.integrate`: how many nodes (N,)
+    there are then, up to as many as there is room for.
+
+    `control` has the end in s, the tolerance in m, how many steps may be tried in all, the smallest and the largest
+    factor on a step, the safety, and three exponents; `rates` the length of the next step and the last ratio of error
+    and tolerance; `tried` how many steps were taken and rejected.
+    """
+    until, tolerance, most, shrink, grow, safety, retried, first, second = control
+    size = states.shape[1]
+    work, middle, after, slope = _work(c), np.empty(size), np.empty(size), np.empty(size)
+    count, longest = 1, grow
+    while times[count - 1] < until and count < len(times) and tried[0] + tried[1] < most:
+        time, step = times[count - 1], rates[0]
+        if time + step <= time:
+            break
+        error = _advance(c, b, time, states[count - 1], step, after, slope, middle, work)
+        if time < c.patch_pulse and step > LONGEST * c.patch_pulse:
+            error = np.inf
+        ratio = abs(error) / tolerance
+        if not ratio <= 1.0:
+            if not np.isfinite(ratio):
+                ratio = 1e6
+            rates[0] = step * max(shrink, safety * ratio**retried)
+            tried[1] += 1
+            longest = 1.0
+            continue
+        ratio = max(ratio, 1e-10)
+        factor = safety * ratio**first * rates[1] ** second
+        rates[0] = step * min(longest, max(shrink, factor))
+        rates[1], longest = max(ratio, 1e-4), grow
+        _copy(after, states[count])
+        _copy(slope, slopes[count])
+        times[count] = time + step
+        tried[0] += 1
+        count += 1
+    return count
 
 
 @compiled

@@ -1,7 +1,8 @@
 """One pushed body as an initial value problem dz/dt = f(t, z) with a flat state."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
@@ -56,6 +57,12 @@ class PushedBody:
         """
         after, slopes, errors = self._bodies.advance(FIRST, np.array([time]), state[None], np.array([step]))
         return after[0], slopes[0], float(errors[0])
+
+    @property
+    def follow(self) -> Callable[..., int] | None:
+        """Takes many steps at once; None where steps are not compiled."""
+        bodies = self._bodies
+        return partial(bodies.follow, 0) if isinstance(bodies, CompiledBodies) else None
 
     def body_motion(self, states: Float[np.ndarray, "rows state"]) -> tuple[Vectors, Rotations, Floats, Vectors]:
         """Returns `body_motion` of states (T, 20 + 2 K), and the centres of the projectile (T, 3) m."""

@@ -171,6 +171,12 @@ class CompiledBodies:
         advance_all(self._constants, rows, times, states, steps, out, slopes, errors)
         return _followed(self._push, times, steps, (out, slopes, errors))
 
+    def follow(self, row: int, control: tuple[float, ...], *nodes: np.ndarray) -> int:
+        """Many steps of the push `row`, see `odeform.mechanics.compiled_push.follow`."""
+        from odeform.mechanics.compiled_push import follow
+
+        return follow(self._constants, row, control, *nodes)
+
 
 def _followed(push: Push, times: Each, steps: Each, out: tuple[States, States, Each]) -> tuple[States, States, Each]:
     """What a step returns, with an error for those that pass over a pulse."""

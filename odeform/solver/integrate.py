@@ -15,11 +15,13 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.solver.compiled import CompiledField, Rule
+from odeform.solver.linearly_implicit import LinearlyImplicit
 from odeform.solver.method import Field, Method, Stepper
 from odeform.solver.registry import get_method
 from odeform.solver.runge_kutta import ExplicitRungeKutta
 from odeform.solver.solution import Solution, Status
 from odeform.solver.step_control import GAINS, GROW, MAX_STEPS, SAFETY, SHRINK
+from odeform.solver.stiff_steps import FollowedField, follow
 
 __all__ = ["SolverSettings", "integrate"]
 
@@ -158,6 +160,9 @@ def _controlled(
         begin, state, slope = solution.end, solution.states[0], solution.slopes[0]
         solution.next_step = _first_step(method.order, field, begin, state, slope, tolerance)
         solution.evaluations += 1
+    if isinstance(method, LinearlyImplicit) and isinstance(field, FollowedField) and (steps := field.follow):
+        follow(steps, method, tolerance, solution, until, before_step)
+        return
     longest = GROW
     while solution.end < until:
         if solution.steps + solution.rejected >= MAX_STEPS:

@@ -8,8 +8,11 @@ from odeform.compiling import compiles
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import parts_of
 from odeform.mechanics.push import make_push
+from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
 from odeform.mechanics.step import Mechanics, Projectile
+from odeform.solver.integrate import SolverSettings, integrate
+from odeform.types import Floats
 
 pytestmark = pytest.mark.skipif(not compiles(), reason="needs Numba")
 
@@ -76,3 +79,30 @@ def test_what_is_not_finite_stays_so(block: Block) -> None:
     assert not np.isfinite(errors[0])
     assert np.isfinite(after[1:]).all()
     assert np.isfinite(slopes[1:]).all()
+
+
+@pytest.mark.parametrize("force", [0, 2], ids=["pushed", "at rest"])
+def test_many_steps_at_once_are_single_steps_to_the_bit(block: Block, force: int) -> None:
+    """With the end of the pulse, and more nodes than one call has room for."""
+    mechanics = Mechanics(block.body, ContactParameters(), Projectile(0.012, 0.020))
+    some = slice(force, force + 1)
+    push = make_push(block.body, 5, CONTACTS[some], CONTACTS[some] + np.array([0.012, 0.0, 0.0]), FORCES[some])
+    settings = SolverSettings("limex", tolerance=2e-6, dtype="float64")
+    body = PushedBody(mechanics, push, PULSE)
+    found = integrate(body, body.start, settings, 0.1)
+    integrate(body, body.start, settings, 0.2, found)
+
+    class Single:
+        """The same field, of which only single steps are asked for."""
+
+        def __call__(self, time: float, state: Floats) -> Floats:
+            return body(time, state)
+
+        def advance(self, time: float, state: Floats, step: float) -> tuple[Floats, Floats, float]:
+            return body.advance(time, state, step)
+
+    known = integrate(Single(), body.start, settings, 0.2)
+    assert found.steps > 100 or force == 2
+    assert (found.times, found.rejected, found.evaluations) == (known.times, known.rejected, known.evaluations)
+    np.testing.assert_array_equal(np.stack(found.states), np.stack(known.states))
+    np.testing.assert_array_equal(np.stack(found.slopes), np.stack(known.slopes))
