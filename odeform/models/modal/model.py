@@ -124,7 +124,9 @@ class ModalModel(Model):
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
         self.load = load_of_scene(checkpoint.schema.scene)
         self._flies = self.load is not None and self.load.flies
-        law = config.get("impact", config["law"]) if self._flies else config["law"]
+        # a kicked body stands on its floor as one that is pushed, or lands on it as one that falls: training chose
+        falls = self._flies or (self.load is not None and config.get("kicked_as") == "impact")
+        law = config.get("impact", config["law"]) if falls else config["law"]
         self.contact_parameters, self.pulse = ContactParameters.from_json(law), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]

@@ -1,15 +1,19 @@
 """Objects that are dropped, thrown and kicked by a model that was trained on pushes."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import odeform
+from odeform.checkpoint import read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.loads.registry import known_loads
 from odeform.models.base import Predictor
+from odeform.models.modal.model import ModalModel
 from odeform.models.modal.user_body import UserBodyPredictor, resting_body
+from odeform.models.registry import load_model
 from odeform.simulation.objects.catalog import get_object
 from odeform.types import PointCloud
 
@@ -42,6 +46,21 @@ def test_each_object_has_its_own_mass_and_stiffness_unless_told(pushed: Predicto
         assert complete["young"] == pytest.approx(1e-3 * item.material.young, rel=1e-6)
         assert not model.model_of(complete).is_changed(complete)
     assert model.complete({"object": "donut", "mass": 0.25})["mass"] == 0.25
+
+
+def test_a_kicked_body_meets_the_floor_as_training_chose() -> None:
+    known = read_checkpoint(resolve_checkpoint("contact-force"))
+    laws = {}
+    for option in (None, "impact"):
+        part = {key: value for key, value in known.config["objects"]["donut"].items() if key != "kicked_as"}
+        objects = {**known.config["objects"], "donut": part if option is None else {**part, "kicked_as": option}}
+        model = load_model(replace(known, config={**known.config, "objects": objects}))
+        for scene in (model, model.under("kick"), model.under("drop")):
+            parts = scene.model_of({"object": "donut"})
+            assert isinstance(parts, ModalModel)
+            laws[option, scene.schema.scene] = parts.contact_parameters
+    assert laws[None, "object-kick"] == laws[None, "contact-force"] == laws["impact", "contact-force"]
+    assert laws["impact", "object-kick"] == laws["impact", "object-drop"] != laws[None, "object-kick"]
 
 
 def test_other_models_refuse_in_words() -> None:
