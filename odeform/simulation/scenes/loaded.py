@@ -94,11 +94,10 @@ def scene_of(load: Load) -> Scene:
 
 
 def _begun(rest: Mesh, load: Load, parameters: Parameters) -> Mesh:
-    """About where a body that rests at points (N, 3) m begins: what it gives way under its weight aside."""
+    """About where a body begins that rests there, as of `Flight.placed`."""
     if not load.flies or (flight := load.situation(rest, parameters).flight) is None:
         return rest
-    turned = (rest.points - rest.points.mean(axis=0)) @ flight.rotation.T
-    return Mesh((turned + np.array([0.0, 0.0, flight.height - turned[:, 2].min()])).astype(np.float32), rest.faces)
+    return Mesh(flight.placed(rest.points).astype(np.float32), rest.faces)
 
 
 def _rest_mesh(name: str) -> Mesh:
