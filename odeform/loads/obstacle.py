@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from odeform.types import Floats, Mesh, Points, Rotations, Vector
+from odeform.types import Floats, Mesh, Rotations, Vector
 
 __all__ = ["Obstacle", "half_space"]
 
@@ -60,10 +60,11 @@ class Obstacle:
         normal = np.where(free, outside / np.where(free, away[..., None], 1.0), np.eye(3)[nearest]) * side
         return np.where(free[..., 0], away, deepest), normal @ self.turn.T
 
-    def moved_out(self, points: Points) -> Points:
-        """Points (N, 3) m, of which those inside are moved to the nearest place on its surface."""
+    def keep_out(self, points: Float[np.ndarray, "*points 3"]) -> None:
+        """Move those of the points (..., 3) m that are inside to the nearest place on its surface."""
         gap, normal = self.met(points)
-        return points - np.minimum(gap, 0.0)[..., None] * normal
+        inside = gap < 0.0
+        points[inside] -= (gap[inside, None] * normal[inside]).astype(points.dtype)
 
     @property
     def mesh(self) -> Mesh:

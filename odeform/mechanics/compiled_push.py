@@ -218,7 +218,8 @@ def _near(c, b, z, size, pushed, step, chosen, gaps, what):
             floor = _keep(chosen, 0, floor, c.most, gaps, i)
     for j in range(floor):
         what[j] = -1
-    floor = _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what)
+    if c.obstacles.shape[1]:
+        floor = _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what)
     if not pushed:
         return floor, floor
     _centre(c, b, z, size, centre)

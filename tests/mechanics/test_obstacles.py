@@ -50,8 +50,10 @@ def test_distances_and_normals_of_a_box() -> None:
     np.testing.assert_allclose(gap, [0.1, 0.2, 0.05, -0.003, -0.01], atol=1e-12)
     sides = [[-1, 0, 0], [0, 0, 1], [-0.6, 0, 0.8], [-1, 0, 0], [0, 0, 1]]
     np.testing.assert_allclose(normal, sides, atol=1e-12)
-    np.testing.assert_allclose(box.moved_out(points)[3:], [[0.5, 0.0, 0.05], [0.7, 0.0, 0.1]], atol=1e-12)
-    np.testing.assert_array_equal(box.moved_out(points)[:3], points[:3])
+    kept = points.copy()
+    box.keep_out(kept)
+    np.testing.assert_allclose(kept[3:], [[0.5, 0.0, 0.05], [0.7, 0.0, 0.1]], atol=1e-12)
+    np.testing.assert_array_equal(kept[:3], points[:3])
 
 
 @pytest.mark.parametrize("obstacle", [wall(0.3), step(0.3, 0.1), slope(0.3, 0.5)], ids=["wall", "step", "slope"])

@@ -67,8 +67,8 @@ def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, fram
     solved = body.integrate(body.inputs(impact.parameters), evaluated, QUALITIES["balanced"], float(times[-1]))
     y = solved.reduced(times)
     out = moved_points(evaluated, y, *placements(body.space, y, 0.0)).astype(float)
-    if body.flat_on is not None:
-        np.maximum(out[..., 2], body.flat_on, out=out[..., 2])
+    if (ground := body.ground_of(impact.parameters)) is not None:
+        ground.keep_out(out)
     return out
 
 
