@@ -67,12 +67,13 @@ class Situation:
     """What the body meets besides the floor. All situations of a load have as many."""
 
 
-def beginning_outside(rest: Mesh, flight: Flight, obstacle: Obstacle, name: str) -> Situation:
-    """A flight towards an obstacle; `InputError` for a body that would begin inside it."""
-    inside = -float(obstacle.met(flight.placed(rest.points))[0].min())
+def beginning_outside(rest: Mesh, flight: Flight, obstacles: tuple[Obstacle, ...], name: str) -> Situation:
+    """A flight towards obstacles; `InputError` for a body that would begin inside one of them."""
+    points = flight.placed(rest.points)
+    inside = max(-float(obstacle.met(points)[0].min()) for obstacle in obstacles)
     if inside > TOUCH:
-        raise InputError(f"the body begins {inside:.2f} m inside the {name}: expected a larger distance to it")
-    return Situation(flight, obstacles=(obstacle,))
+        raise InputError(f"distance: expected a body that begins outside the {name}, got {inside:.2g} m inside it")
+    return Situation(flight, obstacles=obstacles)
 
 
 def pulse_strength(time: float | Floats, duration: float) -> Floats:

@@ -1,4 +1,4 @@
-"""Load `slope`: a body is let down on a slope, which it stays on, slides down or rolls down, to the floor at its foot."""
+"""Load `slope`: a body is let down on a slope, on which it stays, slides or rolls, to the floor at its foot."""
 
 import math
 
@@ -49,6 +49,11 @@ def flight_over(rest: Points, parameters: Parameters) -> Flight:
     return Flight(centre + float(turned[:, 2].min()), rotation, thrown.velocity, thrown.spin)
 
 
+def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
+    """The slope."""
+    return (slope(distance_of(parameters), angle_of(parameters)),)
+
+
 def situation(rest: Mesh, parameters: Parameters) -> Situation:
     """The body above the slope."""
     flight = flight_over(rest.points, parameters)
@@ -56,7 +61,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
         raise InputError(f"distance: expected a body above the floor, got one {-flight.height:.2g} m below it")
     if flight.height > HIGHEST:
         raise InputError(f"distance: expected at most {HIGHEST:g} m above the floor, got {flight.height:.3g}")
-    return beginning_outside(rest, flight, slope(distance_of(parameters), angle_of(parameters)), "slope")
+    return beginning_outside(rest, flight, obstacles(parameters), "slope")
 
 
 def velocities(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
@@ -87,4 +92,5 @@ LOAD = Load(
     },
     notes=("The body begins just above the slope, without stress, turned from how it would lie there.",),
     arrows=velocities,
+    obstacles=obstacles,
 )

@@ -6,7 +6,7 @@ from odeform.errors import InputError
 from odeform.loads.drop import PARAMETERS, WINDOW
 from odeform.loads.load import Load
 from odeform.loads.obstacle import Obstacle
-from odeform.loads.situation import Flight, Situation, beginning_outside
+from odeform.loads.situation import Situation, beginning_outside
 from odeform.loads.throw import SPINS, arrows, flight_of, velocity
 from odeform.loads.wall import DISTANCE, distance_of
 from odeform.schema import Parameter, Parameters
@@ -25,9 +25,9 @@ def step(distance: float, rise: float) -> Obstacle:
     return Obstacle(np.array([distance, 0.0, 0.0]), low, high, (np.array([0.0, -WIDE, 0.0]), high))
 
 
-def rise_of(parameters: Parameters, flight: Flight) -> float:
+def rise_of(parameters: Parameters) -> float:
     """Metres; `InputError` for a step that is none, or that the throw does not reach."""
-    rise = float(parameters["rise"])
+    rise, flight = float(parameters["rise"]), flight_of(parameters)
     highest = flight.height + max(float(flight.velocity[2]), 0.0) ** 2 / (2.0 * GRAVITY)
     if not 0.0 < rise <= highest:
         raise InputError(
@@ -37,10 +37,14 @@ def rise_of(parameters: Parameters, flight: Flight) -> float:
     return rise
 
 
+def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
+    """The step."""
+    return (step(distance_of(parameters), rise_of(parameters)),)
+
+
 def situation(rest: Mesh, parameters: Parameters) -> Situation:
     """The body in the air, on its way to the step."""
-    flight = flight_of(parameters)
-    return beginning_outside(rest, flight, step(distance_of(parameters), rise_of(parameters, flight)), "step")
+    return beginning_outside(rest, flight_of(parameters), obstacles(parameters), "step")
 
 
 LOAD = Load(
@@ -67,4 +71,5 @@ LOAD = Load(
     },
     notes=("The body begins in the air, without stress. The step is as rough and stiff as the floor.",),
     arrows=arrows,
+    obstacles=obstacles,
 )

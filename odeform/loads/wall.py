@@ -15,7 +15,7 @@ __all__ = ["DISTANCE", "LOAD", "distance_of"]
 
 FARTHEST = 100.0  # m
 WIDE, HIGH = 0.7, 0.8  # m, of what is drawn, to each side and above the floor
-DISTANCE = Parameter("distance", "m", 0.25, 0.5, 0.35, description="of the obstacle from the middle of the body, along x")
+DISTANCE = Parameter("distance", "m", 0.25, 0.5, 0.35, description="of the obstacle from the middle of the body")
 
 
 def distance_of(parameters: Parameters) -> float:
@@ -31,9 +31,14 @@ def wall(distance: float) -> Obstacle:
     return half_space(np.array([distance, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]), (-WIDE, WIDE), (0.0, HIGH))
 
 
+def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
+    """The wall."""
+    return (wall(distance_of(parameters)),)
+
+
 def situation(rest: Mesh, parameters: Parameters) -> Situation:
     """The body in the air, on its way to the wall."""
-    return beginning_outside(rest, flight_of(parameters), wall(distance_of(parameters)), "wall")
+    return beginning_outside(rest, flight_of(parameters), obstacles(parameters), "wall")
 
 
 LOAD = Load(
@@ -57,6 +62,9 @@ LOAD = Load(
         "a lob": {"velocity_x": 1.5, "velocity_z": 1.5, "spin_y": -6.0},
         "flat along the floor": {"height": 0.05, "velocity_x": 3.0, "velocity_z": 0.0, "spin_y": 0.0},
     },
-    notes=("The body begins in the air, without stress, and is thrown against a wall as rough and stiff as the floor.",),
+    notes=(
+        "The body begins in the air, without stress, and is thrown against a wall as rough and stiff as the floor.",
+    ),
     arrows=arrows,
+    obstacles=obstacles,
 )

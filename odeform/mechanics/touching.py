@@ -180,10 +180,10 @@ def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
 
 
 def _nearest(
-    gap: Float[np.ndarray, "batch samples"], margin: Float[np.ndarray, "batch #samples"], most: int
+    gap: Float[np.ndarray, "batch samples"], margin: Floats, most: int
 ) -> tuple[Ints, Bool[np.ndarray, "batch contacts"]]:
     """(B, C) the samples with the smallest gaps, as many as the motion with the most below its `margin` has, or `most`;
-    and which of them are below it."""
+    and which of them are below it; it is (B, 1), or (B, S) for each sample."""
     below = gap < margin
     count = min(int(np.count_nonzero(below, axis=1).max()), most)
     chosen = np.argpartition(gap, max(count, 1) - 1, axis=1)[:, :count]

@@ -137,7 +137,8 @@ def test_a_body_slides_where_the_slope_is_steeper_than_friction(block: Block, st
 )
 def test_compiled_steps_are_those_of_numpy(block: Block, obstacles: tuple[tuple[Obstacle, ...], ...]) -> None:
     body = flier(block)
-    flights = [Flight(height, TILTED, np.array([2.0, 0.0, -1.5]), np.array([5.0, 12.0, 3.0])) for height in (0.03, 0.04)]
+    speed, spin = np.array([2.0, 0.0, -1.5]), np.array([5.0, 12.0, 3.0])
+    flights = [Flight(height, TILTED, speed, spin) for height in (0.03, 0.04)]
     begun = body.begin([Situation(f, obstacles=some) for f, some in zip(flights, obstacles, strict=True)])
     free = replace(begun.push, obstacles=None)
     reference, compiled = (kind(body.mechanics, begun.push, 0.0) for kind in (PushedBodies, CompiledBodies))

@@ -42,7 +42,9 @@ def _part(predictor: Any, name: str) -> ModalModel:
 
 def _impacts(dataset: Dataset, name: str, splits: Sequence[str]) -> list[Impact]:
     found = [s for split in splits for s in dataset.sequences(split) if s.parameters[OBJECT] == name]
-    return impacts_of(found, dataset.schema.window.rate)
+    acting = load_of_scene(dataset.schema.scene)
+    assert acting is not None
+    return impacts_of(found, dataset.schema.window.rate, acting)
 
 
 def fit(data: str, checkpoint: str) -> None:
@@ -81,8 +83,9 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     models = {"model": model, "rigid": model.with_contact_parameters(stiff)}
     rows: dict[str, Any] = {"motions": len(impacts)}
     for key, one in models.items():
-        each = [_relative(impact, predicted(one, impact, evaluated, len(impact.times))) for impact in impacts]
+        each = [_relative(one, impact, predicted(one, impact, evaluated, len(impact.times))) for impact in impacts]
         rows[key] = {k: round(float(np.mean([row[k] for row in each])), 4) for k in each[0]}
+        rows[key]["inside_mm"] = max(row["inside_mm"] for row in each)
         rows[key]["median_whole"] = round(float(np.median([row["whole"] for row in each])), 4)
     begin = time.perf_counter()
     for impact in impacts:
@@ -91,7 +94,7 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     return rows
 
 
-def _relative(impact: Impact, points: Frames) -> dict[str, float]:
+def _relative(model: ModalModel, impact: Impact, points: Frames) -> dict[str, float]:
     truth = impact.vertices[impact.first :]
     square = ((points - truth) ** 2).sum(axis=2) @ impact.weights
     moved = ((truth - truth[0]) ** 2).sum(axis=2) @ impact.weights
@@ -102,7 +105,15 @@ def _relative(impact: Impact, points: Frames) -> dict[str, float]:
         "whole": float(np.sqrt(square.mean() / moved.mean())),
         "place_mm": 1e3 * float(np.linalg.norm(shift)),
         "turn_deg": float(np.degrees(np.linalg.norm(_vector(turn)))),
+        "inside_mm": 1e3 * _inside(model, impact, points),
     }
+
+
+def _inside(model: ModalModel, impact: Impact, points: Frames) -> float:
+    """m by which points (T, N, 3) m are below the floor or inside an obstacle, at most."""
+    assert model.load is not None
+    gaps = [points[..., 2], *(one.met(points)[0] for one in model.load.obstacles(impact.parameters))]
+    return max(-float(np.min(gaps)), 0.0)
 
 
 def _vector(turn: Floats) -> Floats:

@@ -242,7 +242,7 @@ class ModalModel(Model):
     def ground_of(self, parameters: Parameters) -> Ground | None:
         if self.load is None or self._flat_on is None:
             return None
-        return Ground(self._flat_on, self.load.situation(self.rest, parameters).obstacles)
+        return Ground(self._flat_on, self.load.obstacles(parameters))
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         found = self.changed(parameters).settled_body

@@ -9,6 +9,7 @@ import numpy as np
 from odeform.loads.arrow import Arrow
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
+from odeform.loads.obstacle import Obstacle
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.loaded import STEP, released, simulate_situation
 from odeform.simulation.objects.catalog import OBJECTS, get_object
@@ -76,6 +77,9 @@ def scene_of(load: Load) -> Scene:
         rest = Mesh(points, np.zeros((0, 3), np.int32))
         return load.arrows(_begun(rest, load, parameters), parameters)
 
+    def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
+        return load.obstacles(parameters) if {p.name for p in load.parameters} <= set(parameters) else ()
+
     contacts = None
     if load.pulse is not None:
         contacts = Contacts({name: forces_of(get_object(name)) for name in OBJECTS}, load.pulse, 0.0)
@@ -88,6 +92,7 @@ def scene_of(load: Load) -> Scene:
         fixed={"gravity_m_s2": GRAVITY},
         until=load.until,
         glyphs=glyphs,
+        obstacles=obstacles,
         contacts=contacts,
         sampler=draw if load.pulse is not None else None,
     )
