@@ -1,9 +1,9 @@
-"""Drops, throws and kicks of the seven objects: how they meet the floor is fitted, and their error is measured.
+"""Loads of the seven objects: how they meet the floor is fitted, and their error and time are measured.
 
 Run `odeform simulate object-throw --out THROWS` for the data, and so on; then
 `python -m odeform_figures.studies.loads fit THROWS --checkpoint FILE`, which writes what it fits into the checkpoint,
 `python -m odeform_figures.studies.loads measure THROWS --out FILE.json`, and `measure DROPS KICKS --split all`: nothing
-is fitted to these.
+is fitted to these. `time` compares how long motions with obstacles take with throws.
 """
 
 import argparse
@@ -25,11 +25,13 @@ from odeform.models.modal.training.impact_fit import FRAMES, Impact, impact_fit,
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load, load_model
 from odeform.schema import OBJECT
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames
 from odeform_figures.output import write_or_print
 
-__all__ = ["fit", "measured"]
+__all__ = ["fit", "measured", "timed"]
 
+TIMED = ("throw", "wall", "step", "slope")
 RIGID = 1e6  # times its stiffness: a body that does not deform
 
 
@@ -120,6 +122,27 @@ def _vector(turn: Floats) -> Floats:
     return vector_from_rotation(turn[None])[0]
 
 
+def timed(checkpoint: str, objects: Sequence[str], draws: int) -> dict[str, Any]:
+    """How long a new motion under each load takes with a frame at its end, in medians over draws of its data, relative
+    to that of a throw; one load after the other for each draw, so that all see the same machine."""
+    predictor, taken = load(checkpoint), {name: [] for name in TIMED}
+    for name in TIMED:
+        for parameters in get_scene(f"object-{name}").sample(draws + 1, 1, objects):
+            predictor.under(name).solve(parameters=parameters).vertices(0.8)  # compiles, and computes what is kept
+    for index in range(draws):
+        for item in objects:
+            for name in TIMED:
+                parameters = get_scene(f"object-{name}").sample(draws, 2, [item])[index]
+                model, begin = predictor.under(name), time.perf_counter()
+                model.solve(parameters=parameters).vertices(0.8)
+                taken[name].append(time.perf_counter() - begin)
+    medians = {name: float(np.median(times)) for name, times in taken.items()}
+    return {
+        name: {"ms": round(1e3 * value, 1), "of_a_throw": round(value / medians["throw"], 2)}
+        for name, value in medians.items()
+    }
+
+
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -132,9 +155,16 @@ def main() -> None:
     other.add_argument("--checkpoint", default="contact-force")
     other.add_argument("--split", default="test", choices=("test", "all"))
     other.add_argument("--out")
+    third = commands.add_parser("time")
+    third.add_argument("--checkpoint", default="contact-force")
+    third.add_argument("--object", nargs="+", default=["donut", "pillow", "dog"])
+    third.add_argument("--draws", type=int, default=8)
+    third.add_argument("--out")
     args = parser.parse_args()
     if args.command == "fit":
         fit(args.data, args.checkpoint)
+    elif args.command == "time":
+        write_or_print(timed(args.checkpoint, args.object, args.draws), args.out)
     else:
         write_or_print({Path(d).name: measured(d, args.checkpoint, args.split) for d in args.data}, args.out)
 
