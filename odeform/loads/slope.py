@@ -6,12 +6,11 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.geometry.rigid import rotation_from_vector
-from odeform.loads.arrow import Arrow
 from odeform.loads.drop import HIGHEST, PARAMETERS, WINDOW, height_of, turn_of
 from odeform.loads.load import Load
 from odeform.loads.obstacle import Obstacle, half_space
 from odeform.loads.situation import Flight, Situation, beginning_outside
-from odeform.loads.throw import SPINS, arrows, flight_of, velocity
+from odeform.loads.throw import SPINS, flight_of, velocity
 from odeform.loads.wall import DISTANCE, distance_of
 from odeform.schema import Parameter, Parameters
 from odeform.types import Mesh, Points
@@ -64,11 +63,6 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
     return beginning_outside(rest, flight, obstacles(parameters), "slope")
 
 
-def velocities(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
-    """The velocity, as that of a throw."""
-    return arrows(start, {**parameters, **STILL})
-
-
 LOAD = Load(
     name="slope",
     title="Let it slide down a slope",
@@ -91,6 +85,5 @@ LOAD = Load(
         "up the slope, and back": {"angle": 25.0, "velocity_x": -1.0, "spin_y": 0.0},
     },
     notes=("The body begins just above the slope, without stress, turned from how it would lie there.",),
-    arrows=velocities,
     obstacles=obstacles,
 )

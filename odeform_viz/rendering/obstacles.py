@@ -41,6 +41,7 @@ class ObstacleView:
                 np.arange(3 * len(mesh.faces), dtype=np.uint32).reshape(-1, 3),
                 color=BACKGROUND,
                 flat_shading=True,
+                cast_shadow=False,  # it would shade its own edges
             )
             for index, mesh in enumerate(meshes)
         ]
