@@ -18,7 +18,7 @@ from odeform.types import Mesh, Points
 __all__ = ["LOAD"]
 
 FLATTEST, STEEPEST = 1.0, 75.0  # degrees; one that is level is the floor, and a steep one is high where the body begins
-WIDE, UP = 0.5, 0.5  # m, of what is drawn: to each side, and beyond the body
+WIDE, UP = 0.35, 0.3  # m, of what is drawn: to each side, and beyond the body
 STILL = {"velocity_y": 0.0, "velocity_z": 0.0, "spin_x": 0.0, "spin_z": 0.0}  # of a throw, what no slider changes
 
 

@@ -14,7 +14,7 @@ from odeform.types import Mesh
 __all__ = ["DISTANCE", "LOAD", "distance_of"]
 
 FARTHEST = 100.0  # m
-WIDE, HIGH = 0.7, 0.8  # m, of what is drawn, to each side and above the floor
+WIDE, HIGH = 0.45, 0.6  # m, of what is drawn, to each side and above the floor
 DISTANCE = Parameter("distance", "m", 0.25, 0.5, 0.35, description="of the obstacle from the middle of the body")
 
 

@@ -10,6 +10,8 @@ from odeform_viz.obstacles import obstacles_of
 
 __all__ = ["ObstacleView"]
 
+OPACITY = 0.6  # a wall hides neither the body behind it nor the next column
+
 
 class ObstacleView:
     """Stands on the floor under a column, and changes with the parameters of its motion."""
@@ -41,6 +43,7 @@ class ObstacleView:
                 np.arange(3 * len(mesh.faces), dtype=np.uint32).reshape(-1, 3),
                 color=BACKGROUND,
                 flat_shading=True,
+                opacity=OPACITY,
                 cast_shadow=False,  # it would shade its own edges
             )
             for index, mesh in enumerate(meshes)
