@@ -164,14 +164,18 @@ def test_names_without_a_load_stay_as_they_are() -> None:
     assert split_load("contact-force:drop") == ("contact-force", "drop")
 
 
-@pytest.mark.parametrize("obstacle", [wall(0.1), step(0.1, 0.1), slope(0.1, 0.6)], ids=["wall", "step", "slope"])
-def test_a_simulated_body_does_not_pass_through_an_obstacle(obstacle: Obstacle) -> None:
-    item, flight = soft_block(), Flight(0.13, velocity=np.array([1.5, 0.0, -0.5]))
+@pytest.mark.parametrize(
+    ("obstacle", "speed"),
+    [(wall(0.1), 1.5), (step(0.1, 0.1), 1.5), (slope(0.12, 0.6), 0.0)],
+    ids=["wall", "step", "slope"],
+)
+def test_a_simulated_body_does_not_pass_through_an_obstacle(obstacle: Obstacle, speed: float) -> None:
+    item, flight = soft_block(), Flight(0.13, velocity=np.array([speed, 0.0, -0.5]))
     ends = {}
     for name, obstacles in (("met", (obstacle,)), ("free", ())):
         _, vertices = simulate_situation(item, Situation(flight, obstacles=obstacles), 200.0, 0.06)
         ends[name] = -float(obstacle.met(vertices)[0].min())
-    assert ends["met"] < 1e-3
+    assert ends["met"] < 3e-3, "as deep as it sinks into the floor"
     assert ends["free"] > 0.01, "without the obstacle it does, or this test shows nothing"
 
 
