@@ -79,7 +79,7 @@ LOAD = Load(
     situation=situation,
     presets={
         "it slides": {"spin_y": 0.0},
-        "it stays": {"angle": 12.0, "spin_y": 0.0},
+        "a gentle slope": {"angle": 12.0, "spin_y": 0.0},
         "on its side, it rolls": {"turn_x": 90.0, "angle": 20.0},
         "head over heels": {"angle": 40.0, "height": 0.1, "turn_y": 60.0, "spin_y": 10.0},
         "up the slope, and back": {"angle": 25.0, "velocity_x": -1.0, "spin_y": 0.0},
