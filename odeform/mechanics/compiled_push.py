@@ -112,13 +112,13 @@ def _centre(c, b, z, size, out):
 
 @compiled
 @no_type_check
-def _met(box, z, place, normal):
+def _met(box, z, place, local, normal):
     """The signed distance of a place in axes of the body from a box, whose outward normal is set in axes of the
-    body."""
+    body; `local` is room for three numbers."""
     p0 = z[3] * place[0] + z[4] * place[1] + z[5] * place[2] + z[0] - box[0, 0]
     p1 = z[6] * place[0] + z[7] * place[1] + z[8] * place[2] + z[1] - box[0, 1]
     p2 = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] - box[0, 2]
-    local, square, deepest, nearest = np.empty(3), 0.0, -np.inf, 0
+    square, deepest, nearest = 0.0, -np.inf, 0
     for axis in range(3):
         x = box[1 + axis, 0] * p0 + box[1 + axis, 1] * p1 + box[1 + axis, 2] * p2
         below, above = box[4, axis] - x, x - box[5, axis]
@@ -151,23 +151,31 @@ def _met(box, z, place, normal):
 def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what):
     """Choose the samples that may touch an obstacle in a step, after those of the floor: how many in all by now."""
     points, rows, v = c.points[b], c.rows[b], 13 + size
-    motion, place, normal = np.empty(6), np.empty(3), np.empty(3)
+    motion, place, local, normal = np.empty(6), np.empty(3), np.empty(3), np.empty(3)
     spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
     speed = np.sqrt(z[v] * z[v] + z[v + 1] * z[v + 1] + z[v + 2] * z[v + 2])
-    ahead, count = 2.0 * step + c.floor_damping, floor
+    ahead, count, extent = 2.0 * step + c.floor_damping, floor, 0.0
+    farthest = MARGIN + ahead * (speed + spin * c.reach)
+    for i in range(len(c.level)):
+        extent = max(extent, c.extents[b, i])
     v0 = z[3] * z[v] + z[6] * z[v + 1] + z[9] * z[v + 2]
     v1 = z[4] * z[v] + z[7] * z[v + 1] + z[10] * z[v + 2]
     v2 = z[5] * z[v] + z[8] * z[v + 1] + z[11] * z[v + 2]
     for number in range(c.obstacles.shape[1]):
         box, first = c.obstacles[b, number], count
+        for axis in range(3):
+            place[axis] = 0.0
+        # all of the body may be so far away that its samples need not be looked at
+        if _met(box, z, place, local, normal) - c.reach - most * extent >= farthest:
+            continue
         for i in range(len(c.level)):
             for axis in range(3):
                 place[axis] = points[axis, i]
-            if _met(box, z, place, normal) - most * c.extents[b, i] >= MARGIN + ahead * (speed + spin * c.reach):
+            if _met(box, z, place, local, normal) - most * c.extents[b, i] >= farthest:
                 continue
             _turn(rows, i, z, size, motion)
             _bent(points, i, motion, place)
-            gaps[i] = _met(box, z, place, normal)
+            gaps[i] = _met(box, z, place, local, normal)
             towards = min(normal[0] * v0 + normal[1] * v1 + normal[2] * v2 - c.reach * spin, 0.0)
             if gaps[i] < MARGIN - ahead * towards:
                 count = _keep(chosen, first, count, c.most, gaps, i)
@@ -247,7 +255,7 @@ def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
     """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
     points, rows = c.points[b], c.rows[b]
     motion, place, centre, axes, turned = np.empty(6), np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    guide, normal = np.zeros(3), np.empty(3)
+    guide, local, normal = np.zeros(3), np.empty(3), np.empty(3)
     if pushed:
         _centre(c, b, z, size, centre)
         for axis in range(3):
@@ -262,7 +270,7 @@ def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
                 axes[0, axis], axes[1, axis], axes[2, axis] = z[9 + axis], z[3 + axis], z[6 + axis]
         else:
             if j < floor:
-                gaps[j] = _met(c.obstacles[b, what[j]], z, place, normal)
+                gaps[j] = _met(c.obstacles[b, what[j]], z, place, local, normal)
                 n0, n1, n2 = normal[0], normal[1], normal[2]
             else:
                 n0, n1, n2 = place[0] - centre[0], place[1] - centre[1], place[2] - centre[2]
