@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from odeform.loads.arrow import Arrow
+from odeform.loads.obstacle import Obstacle
 from odeform.loads.situation import Situation
 from odeform.schema import Parameter, Parameters, Window
 from odeform.types import Mesh
@@ -15,6 +16,10 @@ SCENES_OF_LOADS = "object-"
 
 
 def _no_arrows(rest: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
+    return ()
+
+
+def _no_obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
     return ()
 
 
@@ -44,6 +49,8 @@ class Load:
     """Remarks for people."""
     arrows: Callable[[Mesh, Parameters], tuple[Arrow, ...]] = _no_arrows
     """`arrows(start, parameters)` are what a viewer draws at the body where its motion begins."""
+    obstacles: Callable[[Parameters], tuple[Obstacle, ...]] = _no_obstacles
+    """`obstacles(parameters)` are what the body meets besides the floor, as many for all parameters."""
     pulse: float | None = None
     """s: how long a force acts at a contact that one chooses on the surface of the body on the floor, with parameters
     `contact_x` to `_z` and `force_x` to `_z`; None for a load under which it begins in the air."""

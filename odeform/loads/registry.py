@@ -15,6 +15,9 @@ LOADS: dict[str, str] = {
     "drop": "odeform.loads.drop:LOAD",
     "throw": "odeform.loads.throw:LOAD",
     "kick": "odeform.loads.kick:LOAD",
+    "wall": "odeform.loads.wall:LOAD",
+    "step": "odeform.loads.step:LOAD",
+    "slope": "odeform.loads.slope:LOAD",
 }
 """Load name to "module:attribute", imported when the load is first asked for."""
 

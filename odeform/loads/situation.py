@@ -4,10 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.geometry.contact import SurfacePoint
-from odeform.types import Floats, Perpoint, Points, Rotations, Vector
+from odeform.loads.obstacle import Obstacle
+from odeform.types import Floats, Mesh, Perpoint, Points, Rotations, Vector
 
-__all__ = ["Flight", "Pulse", "Situation", "pulse_strength"]
+__all__ = ["Flight", "Pulse", "Situation", "beginning_outside", "pulse_strength"]
+
+TOUCH = 2e-3  # m that a body may begin inside an obstacle: how it gives way under its weight is not looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +26,12 @@ class Flight:
     """(3,) m/s, of its mass centre."""
     spin: Vector = field(default_factory=lambda: np.zeros(3))
     """(3,) rad/s."""
+
+    def placed(self, rest: Points) -> Points:
+        """About where points (N, 3) m of a body that rests on the floor begin: what it gives way under its weight
+        aside."""
+        turned = (rest - rest.mean(axis=0, dtype=float)) @ self.rotation.T
+        return turned + np.array([0.0, 0.0, self.height - turned[:, 2].min()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +63,17 @@ class Situation:
     flight: Flight | None = None
     """None for a body that begins at rest on the floor."""
     pulse: Pulse | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    """What the body meets besides the floor. All situations of a load have as many."""
+
+
+def beginning_outside(rest: Mesh, flight: Flight, obstacles: tuple[Obstacle, ...], name: str) -> Situation:
+    """A flight towards obstacles; `InputError` for a body that would begin inside one of them."""
+    points = flight.placed(rest.points)
+    inside = max(-float(obstacle.met(points)[0].min()) for obstacle in obstacles)
+    if inside > TOUCH:
+        raise InputError(f"distance: expected a body that begins outside the {name}, got {inside:.2g} m inside it")
+    return Situation(flight, obstacles=obstacles)
 
 
 def pulse_strength(time: float | Floats, duration: float) -> Floats:

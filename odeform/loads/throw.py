@@ -10,18 +10,22 @@ from odeform.loads.situation import Flight, Situation
 from odeform.schema import Parameter, Parameters
 from odeform.types import Mesh, Vector
 
-__all__ = ["LOAD"]
+__all__ = ["LOAD", "SPINS", "arrows", "flight_of", "velocity"]
 
 FASTEST, MOST_SPIN = 20.0, 200.0  # m/s and rad/s
 SHOWN = 0.1  # s of the way that the arrow of the velocity is long
 
 
-def _velocity(axis: str, low: float, high: float, default: float) -> Parameter:
+def velocity(axis: str, low: float, high: float, default: float) -> Parameter:
+    """The slider of one component of the velocity."""
     return Parameter(f"velocity_{axis}", "m/s", low, high, default, description=f"{axis} of the mass centre's velocity")
 
 
 def _spin(axis: str, default: float) -> Parameter:
     return Parameter(f"spin_{axis}", "rad/s", -10.0, 10.0, default, description=f"spin about {axis}")
+
+
+SPINS = (_spin("x", 0.0), _spin("y", 4.0), _spin("z", 0.0))
 
 
 def _vector(parameters: Parameters, name: str, unit: str, most: float) -> Vector:
@@ -31,21 +35,26 @@ def _vector(parameters: Parameters, name: str, unit: str, most: float) -> Vector
     return vector
 
 
+def flight_of(parameters: Parameters) -> Flight:
+    """A body in the air that moves and turns."""
+    speed = _vector(parameters, "velocity", "m/s", FASTEST)
+    spin = _vector(parameters, "spin", "rad/s", MOST_SPIN)
+    return Flight(height_of(parameters), turn_of(parameters), speed, spin)
+
+
 def situation(rest: Mesh, parameters: Parameters) -> Situation:
     """The body in the air, moving and turning."""
-    velocity = _vector(parameters, "velocity", "m/s", FASTEST)
-    spin = _vector(parameters, "spin", "rad/s", MOST_SPIN)
-    return Situation(flight=Flight(height_of(parameters), turn_of(parameters), velocity, spin))
+    return Situation(flight_of(parameters))
 
 
 def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
     """The velocity, from the middle of the body."""
-    velocity = _vector(parameters, "velocity", "m/s", FASTEST)
-    speed = float(np.linalg.norm(velocity))
+    vector = _vector(parameters, "velocity", "m/s", FASTEST)
+    speed = float(np.linalg.norm(vector))
     if speed == 0.0:
         return ()
     middle = 0.5 * (start.points.min(axis=0) + start.points.max(axis=0)).astype(float)
-    return (Arrow(middle, SHOWN * velocity, f"{speed:.1f} m/s", 0.0, SHOWN),)
+    return (Arrow(middle, SHOWN * vector, f"{speed:.1f} m/s", 0.0, SHOWN),)
 
 
 LOAD = Load(
@@ -53,12 +62,10 @@ LOAD = Load(
     title="Throw it",
     parameters=(
         *PARAMETERS,
-        _velocity("x", -1.5, 1.5, 1.0),
-        _velocity("y", -1.5, 1.5, 0.0),
-        _velocity("z", -0.5, 1.5, 0.0),
-        _spin("x", 0.0),
-        _spin("y", 4.0),
-        _spin("z", 0.0),
+        velocity("x", -1.5, 1.5, 1.0),
+        velocity("y", -1.5, 1.5, 0.0),
+        velocity("z", -0.5, 1.5, 0.0),
+        *SPINS,
     ),
     window=WINDOW,
     until=2.0,

@@ -55,7 +55,8 @@ class Constants(NamedTuple):
     reach: float  # m, of the farthest sample from the mass centre
     pulse: float  # s
     onset: float  # s: the floor acts on what would be in contact after that time
-    most: int  # contacts with the floor that are followed
+    most: int  # contacts with the floor, and with each obstacle, that are followed
+    obstacles: ndarray  # (B, O, 6, 3), as in `odeform.mechanics.obstacles.Obstacles`
     patch_points: ndarray  # (B, 3) m
     patch_rows: ndarray  # (B, 6, K)
     patch_forces: ndarray  # (B, 3) N
@@ -112,6 +113,80 @@ def _centre(c, b, z, size, out):
 
 @compiled
 @no_type_check
+def _met(box, z, place, local, normal):
+    """The signed distance of a place in axes of the body from a box, whose outward normal is set in axes of the
+    body; `local` is room for three numbers."""
+    p0 = z[3] * place[0] + z[4] * place[1] + z[5] * place[2] + z[0] - box[0, 0]
+    p1 = z[6] * place[0] + z[7] * place[1] + z[8] * place[2] + z[1] - box[0, 1]
+    p2 = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] - box[0, 2]
+    square, deepest, nearest = 0.0, -np.inf, 0
+    for axis in range(3):
+        x = box[1 + axis, 0] * p0 + box[1 + axis, 1] * p1 + box[1 + axis, 2] * p2
+        below, above = box[4, axis] - x, x - box[5, axis]
+        beyond = max(below, above)
+        if beyond > deepest:
+            deepest, nearest = beyond, axis
+        outside = max(beyond, 0.0)
+        square += outside * outside
+        local[axis] = outside if above >= below else -outside
+    distance = np.sqrt(square)
+    if deepest <= 0.0:
+        distance = deepest
+        x = box[1 + nearest, 0] * p0 + box[1 + nearest, 1] * p1 + box[1 + nearest, 2] * p2
+        for axis in range(3):
+            local[axis] = 0.0
+        local[nearest] = 1.0 if x - box[5, nearest] >= box[4, nearest] - x else -1.0
+    else:
+        for axis in range(3):
+            local[axis] /= distance
+    n0 = local[0] * box[1, 0] + local[1] * box[2, 0] + local[2] * box[3, 0]
+    n1 = local[0] * box[1, 1] + local[1] * box[2, 1] + local[2] * box[3, 1]
+    n2 = local[0] * box[1, 2] + local[1] * box[2, 2] + local[2] * box[3, 2]
+    for axis in range(3):
+        normal[axis] = z[3 + axis] * n0 + z[6 + axis] * n1 + z[9 + axis] * n2
+    return distance
+
+
+@compiled
+@no_type_check
+def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what):
+    """Choose the samples that may touch an obstacle in a step, after those of the floor: how many in all by now."""
+    points, rows, v = c.points[b], c.rows[b], 13 + size
+    motion, place, local, normal = np.empty(6), np.empty(3), np.empty(3), np.empty(3)
+    spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
+    speed = np.sqrt(z[v] * z[v] + z[v + 1] * z[v + 1] + z[v + 2] * z[v + 2])
+    ahead, count, extent = 2.0 * step + c.floor_damping, floor, 0.0
+    farthest = MARGIN + ahead * (speed + spin * c.reach)
+    for i in range(len(c.level)):
+        extent = max(extent, c.extents[b, i])
+    v0 = z[3] * z[v] + z[6] * z[v + 1] + z[9] * z[v + 2]
+    v1 = z[4] * z[v] + z[7] * z[v + 1] + z[10] * z[v + 2]
+    v2 = z[5] * z[v] + z[8] * z[v + 1] + z[11] * z[v + 2]
+    for number in range(c.obstacles.shape[1]):
+        box, first = c.obstacles[b, number], count
+        for axis in range(3):
+            place[axis] = 0.0
+        # all of the body may be so far away that its samples need not be looked at
+        if _met(box, z, place, local, normal) - c.reach - most * extent >= farthest:
+            continue
+        for i in range(len(c.level)):
+            for axis in range(3):
+                place[axis] = points[axis, i]
+            if _met(box, z, place, local, normal) - most * c.extents[b, i] >= farthest:
+                continue
+            _turn(rows, i, z, size, motion)
+            _bent(points, i, motion, place)
+            gaps[i] = _met(box, z, place, local, normal)
+            towards = min(normal[0] * v0 + normal[1] * v1 + normal[2] * v2 - c.reach * spin, 0.0)
+            if gaps[i] < MARGIN - ahead * towards:
+                count = _keep(chosen, first, count, c.most, gaps, i)
+        for j in range(first, count):
+            what[j] = number
+    return count
+
+
+@compiled
+@no_type_check
 def _keep(chosen, first, count, most, gaps, i):
     """Add sample i to at most `most` chosen from `first` on, or in place of the one with the largest gap."""
     if count - first < most:
@@ -128,8 +203,9 @@ def _keep(chosen, first, count, most, gaps, i):
 
 @compiled
 @no_type_check
-def _near(c, b, z, size, pushed, step, chosen, gaps):
-    """Choose the samples that may touch something in a step: how many on the floor, and how many in all."""
+def _near(c, b, z, size, pushed, step, chosen, gaps, what):
+    """Choose the samples that may touch something in a step: how many on the floor and obstacles, and how many in
+    all."""
     points, rows, v = c.points[b], c.rows[b], 13 + size
     motion, place, centre = np.empty(6), np.empty(3), np.empty(3)
     spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
@@ -149,6 +225,10 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
         gaps[i] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
         if gaps[i] < margin:
             floor = _keep(chosen, 0, floor, c.most, gaps, i)
+    for j in range(floor):
+        what[j] = -1
+    if c.obstacles.shape[1]:
+        floor = _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what)
     if not pushed:
         return floor, floor
     _centre(c, b, z, size, centre)
@@ -172,11 +252,11 @@ def _near(c, b, z, size, pushed, step, chosen, gaps):
 
 @compiled
 @no_type_check
-def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps):
+def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps):
     """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
     points, rows = c.points[b], c.rows[b]
     motion, place, centre, axes, turned = np.empty(6), np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    guide = np.zeros(3)
+    guide, local, normal = np.zeros(3), np.empty(3), np.empty(3)
     if pushed:
         _centre(c, b, z, size, centre)
         for axis in range(3):
@@ -185,16 +265,20 @@ def _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps):
         i = chosen[j]
         _turn(rows, i, z, size, motion)
         square, once, twice = _bent(points, i, motion, place)
-        if j < floor:
+        if j < floor and what[j] < 0:
             gaps[j] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
             for axis in range(3):
                 axes[0, axis], axes[1, axis], axes[2, axis] = z[9 + axis], z[3 + axis], z[6 + axis]
         else:
-            n0, n1, n2 = place[0] - centre[0], place[1] - centre[1], place[2] - centre[2]
-            distance = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-            gaps[j] = distance - c.radius
-            distance = max(distance, 1e-9)
-            n0, n1, n2 = n0 / distance, n1 / distance, n2 / distance
+            if j < floor:
+                gaps[j] = _met(c.obstacles[b, what[j]], z, place, local, normal)
+                n0, n1, n2 = normal[0], normal[1], normal[2]
+            else:
+                n0, n1, n2 = place[0] - centre[0], place[1] - centre[1], place[2] - centre[2]
+                distance = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+                gaps[j] = distance - c.radius
+                distance = max(distance, 1e-9)
+                n0, n1, n2 = n0 / distance, n1 / distance, n2 / distance
             sign = np.copysign(1.0, n0)
             scale = sign / abs(n0 + sign)
             half = (n0 + sign, n1, n2)
@@ -428,13 +512,13 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
 def _step(c, b, z, pushed, time, step, out, work):
     """The state after a step of second order from a time on; returns its error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, jacobian, whole, half, matrix = work
-    floor, count = _near(c, b, z, size, pushed, step, chosen, gaps)
+    chosen, gaps, what, jacobian, whole, half, matrix = work
+    floor, count = _near(c, b, z, size, pushed, step, chosen, gaps, what)
     good, begin = True, z
     # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
     for part in range(3):
         if part != 1:
-            _contacts(c, b, begin, size, pushed, chosen, floor, count, jacobian, gaps)
+            _contacts(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
             end = out
@@ -505,10 +589,12 @@ def _work(c):
     """Room for a step."""
     size = c.eigenvalues.shape[1]
     state, width = 20 + 2 * size, 7 + size
+    most = c.most * (1 + c.obstacles.shape[1]) + PUSH
     return (
-        np.empty(c.most + PUSH, np.int64),
-        np.empty(max(c.points.shape[2], c.most + PUSH)),
-        np.empty((c.most + PUSH, 3, width)),
+        np.empty(most, np.int64),
+        np.empty(max(c.points.shape[2], most)),
+        np.empty(most, np.int64),
+        np.empty((most, 3, width)),
         np.empty(state),
         np.empty(state),
         np.empty((width, width)),
@@ -590,13 +676,13 @@ def follow(c, b, control, times, states, slopes, rates, tried):
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, jacobian, _, _, matrix = _work(c)
+    chosen, gaps, what, jacobian, _, _, matrix = _work(c)
     start = 13 + size
     for row in range(len(rows)):
         b, z, pushed = rows[row], states[row], times[row] < c.pulse
         width = 6 + size + (1 if pushed else 0)
-        floor, count = _near(c, b, z, size, pushed, 0.0, chosen, gaps)
-        _contacts(c, b, z, size, pushed, chosen, floor, count, jacobian, gaps)
+        floor, count = _near(c, b, z, size, pushed, 0.0, chosen, gaps, what)
+        _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
         v, momentum, rate = np.empty(width), np.empty(width), np.empty(width)
         _local(z, size, v)
         _free(c, b, z, size, pushed, times[row], v, momentum, rate)

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from odeform.loads.situation import Pulse
 from odeform.mechanics.body import ReducedBody
+from odeform.mechanics.obstacles import Obstacles
 from odeform.types import Floats, Ints, Vector, Vectors
 
 __all__ = ["WIDTHS", "Patch", "Push", "kicked", "make_push", "no_push"]
@@ -74,11 +75,14 @@ class Push:
     """N along the guide."""
     patch: Patch | None = None
     """A force besides that of the sphere."""
+    obstacles: Obstacles | None = None
+    """What the support may touch besides the floor."""
 
     def some(self, rows: Ints) -> "Push":
         """The pushes `rows` (R,)."""
         each = {name: getattr(self, name)[rows] for name in PARTS}
-        return replace(self, **each, patch=None if self.patch is None else self.patch.some(rows))
+        patch = None if self.patch is None else self.patch.some(rows)
+        return replace(self, **each, patch=patch, obstacles=self.obstacles and self.obstacles.some(rows))
 
     @cached_property
     def over(self) -> "Push":

@@ -141,6 +141,7 @@ class CompiledBodies:
             pulse=self._pulse,
             onset=0.0 if mechanics.lands else parameters.floor_damping,
             most=most_contacts(stands),
+            obstacles=np.zeros((batch, 0, 6, 3)) if push.obstacles is None else push.obstacles.packed,
             patch_points=patch.points,
             patch_rows=patch.rows,
             patch_forces=patch.forces,

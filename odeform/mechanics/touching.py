@@ -1,4 +1,5 @@
-"""Finds where bodies of a batch are in contact with the floor, and with the projectiles that push them."""
+"""Finds where bodies of a batch are in contact: with the floor, with obstacles, and with the projectiles that push
+them."""
 
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ from jaxtyping import Bool, Float
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.floor import Floor
+from odeform.mechanics.obstacles import Obstacles
 from odeform.mechanics.push import Push
 from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State
@@ -28,7 +30,8 @@ def most_contacts(support: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """C samples of each of B bodies that may touch something in a step: the first F the floor, the others a sphere."""
+    """C samples of each of B bodies that may touch something in a step: the first F the floor, the next ones an
+    obstacle each, the others a sphere."""
 
     push: Push
     radius: float
@@ -41,28 +44,37 @@ class Near:
     """m, as in `Floor`."""
     springs: Float[np.ndarray, "5 batch contacts"]
     """Parameters of springs, as in `Contacts`."""
+    obstacles: tuple[tuple[Obstacles, int], ...] = ()
+    """One for each body, and how many samples may touch it."""
 
     def contacts(self, state: State) -> Contacts:
         """Linearised about a state, in axes of the bodies, in which samples need no rotation."""
         turning, place = bent(self.points, self.rows, state)
-        floor, at_sphere = self.level.shape[1], place[..., self.level.shape[1] :]
+        floor = self.level.shape[1]
+        fixed = floor + sum(count for _, count in self.obstacles)
         axes = np.empty((len(place), place.shape[2], 3, 3))
         gap = np.empty((len(place), place.shape[2]))
         gap[:, :floor] = _heights(place[..., :floor], self.level, state)
         axes[:, :floor] = state.rotation[:, None, UP_FIRST]
+        first = floor
+        for obstacle, count in self.obstacles:
+            some = slice(first, first + count)
+            gap[:, some], normals = obstacle.met(_in_scene(place[..., some], state))
+            axes[:, some] = _axes(normals @ state.rotation)
+            first += count
         if state.pushed:
-            away = at_sphere - _centre(self.push, state)
+            away = place[..., fixed:] - _centre(self.push, state)
             distance = np.sqrt((away * away).sum(axis=1))
-            gap[:, floor:] = distance - self.radius
-            axes[:, floor:] = _axes((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
+            gap[:, fixed:] = distance - self.radius
+            axes[:, fixed:] = _axes((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
         out = np.empty((*axes.shape[:3], state.velocity.shape[1]))
         out[..., :3] = axes
         np.matmul(axes, skew(-place.swapaxes(1, 2)), out=out[..., 3:6])
         np.matmul(axes @ turning.rotations, self.rows[:, :3].swapaxes(1, 2), out=out[..., 6 : state.body])
         if state.pushed:
-            out[:, :floor, :, -1] = 0.0
+            out[:, :fixed, :, -1] = 0.0
             guides = self.push.guides[:, None] @ state.rotation
-            np.matmul(axes[:, floor:], -guides[..., None], out=out[:, floor:, :, state.body :])
+            np.matmul(axes[:, fixed:], -guides[..., None], out=out[:, fixed:, :, state.body :])
         return Contacts(out, gap, *self.springs)
 
 
@@ -98,15 +110,19 @@ class Touching:
         height = _heights(place[..., : push.support], self._level, state)
         spin = np.sqrt((state.velocity[:, 3:6] ** 2).sum(axis=1))
         down = np.minimum(state.velocity[:, 2] - self._reach * spin, 0.0)
-        stand, real = _nearest(height, MARGIN - (2.0 * step + self._parameters.floor_damping) * down, self._most)
-        chosen = stand
+        margin = MARGIN - (2.0 * step + self._parameters.floor_damping) * down
+        stand, real = _nearest(height, margin[:, None], self._most)
+        chosen, obstacles = stand, ()
+        if push.obstacles is not None:
+            met, close, obstacles = self._met(push.obstacles, place[..., : push.support], state, spin, step)
+            chosen, real = np.concatenate([stand, met], axis=1), np.concatenate([real, close], axis=1)
         if state.pushed:
             away = place[..., push.support :] - _centre(push, state)
             distance = np.sqrt((away * away).sum(axis=1))
             speed = state.velocity[:, state.body :] * push.guides - state.velocity[:, :3]
             way = (2.0 * step + self._parameters.push_damping) * np.sqrt((speed * speed).sum(axis=1))
-            pushed, touched = _nearest(distance, self._radius + MARGIN + way, PUSH)
-            chosen = np.concatenate([stand, push.support + pushed], axis=1)
+            pushed, touched = _nearest(distance, (self._radius + MARGIN + way)[:, None], PUSH)
+            chosen = np.concatenate([chosen, push.support + pushed], axis=1)
             real = np.concatenate([real, touched], axis=1)
         springs = self._springs.reshape(5, -1).take(self._first + chosen, axis=1)
         springs[0] *= real
@@ -117,7 +133,26 @@ class Touching:
             push.rows.reshape(-1, push.rows.shape[-1]).take((6 * self._first + chosen)[:, None] + self._row, axis=0),
             self._level.take(stand),
             springs,
+            obstacles,
         )
+
+    def _met(
+        self, obstacles: Obstacles, place: Floats, state: State, spin: Floats, step: float | Floats
+    ) -> tuple[Ints, Bool[np.ndarray, "batch contacts"], tuple[tuple[Obstacles, int], ...]]:
+        """The samples of the support that may touch an obstacle, one obstacle after the other, which of them do, and
+        how many of each."""
+        ahead = np.reshape(2.0 * np.asarray(step) + self._parameters.floor_damping, (-1, 1))
+        points, velocity = _in_scene(place, state), state.velocity[:, :3, None]
+        chosen, real, counts = [], [], []
+        for obstacle in obstacles.each:
+            gap, normals = obstacle.met(points)
+            # convex obstacles: no sample gets nearer than along the normal where it is
+            towards = np.minimum((normals @ velocity)[..., 0] - self._reach * spin[:, None], 0.0)
+            some, close = _nearest(gap, MARGIN - ahead * towards, self._most)
+            chosen.append(some)
+            real.append(close)
+            counts.append((obstacle, some.shape[1]))
+        return np.concatenate(chosen, axis=1), np.concatenate(real, axis=1), tuple(counts)
 
 
 def bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
@@ -133,6 +168,11 @@ def _heights(place: Floats, level: Floats, state: State) -> Float[np.ndarray, "b
     return (state.rotation[:, 2:] @ place)[:, 0] + (state.shift[:, 2:] + level)
 
 
+def _in_scene(place: Floats, state: State) -> Float[np.ndarray, "batch samples 3"]:
+    """m in axes of the scene, from where the mass centres rest, of samples (B, 3, S) from these."""
+    return (state.rotation @ place).swapaxes(1, 2) + state.shift[:, None]
+
+
 def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
     """m, of the spheres, from the mass centres."""
     place = push.centres + state.projectile * push.guides - state.shift
@@ -140,11 +180,11 @@ def _centre(push: Push, state: State) -> Float[np.ndarray, "batch 3 1"]:
 
 
 def _nearest(
-    gap: Float[np.ndarray, "batch samples"], margin: Float[np.ndarray, " batch"], most: int
+    gap: Float[np.ndarray, "batch samples"], margin: Floats, most: int
 ) -> tuple[Ints, Bool[np.ndarray, "batch contacts"]]:
     """(B, C) the samples with the smallest gaps, as many as the motion with the most below its `margin` has, or `most`;
-    and which of them are below it."""
-    below = gap < margin[:, None]
+    and which of them are below it; it is (B, 1), or (B, S) for each sample."""
+    below = gap < margin
     count = min(int(np.count_nonzero(below, axis=1).max()), most)
     chosen = np.argpartition(gap, max(count, 1) - 1, axis=1)[:, :count]
     return chosen, np.take_along_axis(below, chosen, axis=1)

@@ -21,6 +21,7 @@ from odeform.models.solve import solved
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.body import CheckedBody, checked_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
+from odeform.motion.ground import Ground
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import InUse, geometry_key
 from odeform.motion.reduced_batch import BatchPart, ReducedBatch
@@ -42,8 +43,6 @@ class ReducedModel(Predictor):
     """How many motions are solved at once, as many as need a few tens of megabytes; 0: one by one."""
     reach: ClassVar[tuple[float, float]] = (1.0, BEYOND)
     """Half trained ranges up to which inputs are as they are asked for, and how far they go beyond."""
-    flat_on: float | None = None
-    """Height in metres of a floor on which points that would be below it lie, as of `ReducedMotion`."""
     continues_itself: bool = False
     """Whether what a subclass solves for goes on beyond the trained window, without `dynamics`."""
 
@@ -113,8 +112,12 @@ class ReducedModel(Predictor):
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
         trajectory = self._continued(self.inputs(parameters), evaluated, settings, until)
         shown = Shown(trajectory, self.to_body)
-        valid, body = self.validity, self.checked_body
-        return ReducedMotion(self.schema, parameters, geometry, self.space, evaluated, shown, valid, body, self.flat_on)
+        valid, body, ground = self.validity, self.checked_body, self.ground_of(parameters)
+        return ReducedMotion(self.schema, parameters, geometry, self.space, evaluated, shown, valid, body, ground)
+
+    def ground_of(self, parameters: Parameters) -> Ground | None:
+        """What a motion under these parameters is kept out of where it is shown; None: it is as it was solved."""
+        return None
 
     def to_body(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times body_y"]:
         """Returns what is shown at (T,) s, (..., T, 6 + K), for predictions (..., T, 6 + S)."""
@@ -139,7 +142,8 @@ class ReducedModel(Predictor):
         def part(some: Sequence[Parameters]) -> BatchPart:
             azimuths = np.array([self.schema.azimuth(each) for each in some])
             trajectory = self._continued_batch(geometry, some, given, until)
-            return BatchPart(trajectory, self.checked_body, limits, window, azimuths)
+            grounds = [self.ground_of(each) for each in some]
+            return BatchPart(trajectory, self.checked_body, limits, window, azimuths, grounds)
 
         parts = [part(sets[first : first + self.together]) for first in range(0, len(sets), self.together)]
         return ReducedBatch(
@@ -148,7 +152,7 @@ class ReducedModel(Predictor):
             window,
             parts,
             lambda azimuth: self.evaluate_basis(geometry, azimuth),
-            self.flat_on,
+            [self.ground_of(each) for each in sets],
         )
 
     def _continued_batch(

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from odeform.loads.obstacle import Obstacle
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.plausibility import Sample
 from odeform.motion.recent import Recent
@@ -26,13 +27,22 @@ class CheckedBody:
     all: EvaluatedBasis
     limit: float
 
-    def sample(self, predicted: Float[np.ndarray, "times y"], windows: Float[np.ndarray, " times"]) -> Sample:
+    def sample(
+        self,
+        predicted: Float[np.ndarray, "times y"],
+        windows: Float[np.ndarray, " times"],
+        obstacles: tuple[Obstacle, ...] = (),
+    ) -> Sample:
         """Samples the body at predictions (T, 6 + K), not yet bounded, in metres and radians, after `windows` (T,)
-        as in `ReducedSpace.bounded`."""
+        as in `ReducedSpace.bounded`. As low as it is inside one of `obstacles`, it is at least."""
         space = self.all.space
         with np.errstate(all="ignore"):
             deformation = np.sqrt(np.square(predicted[:, POSE:]).sum(axis=1)) / space.largest[1]
-            heights, rotation, shift = self._at(space.bounded(predicted, windows))
+            y = space.bounded(predicted, windows)
+            heights, rotation, shift = self._at(y)
+            if obstacles:
+                places = _local(self.few, y) @ rotation.swapaxes(-1, -2) + (shift + space.anchor)[:, None]
+                heights = np.minimum(heights, np.min([one.met(places)[0].min(axis=1) for one in obstacles], axis=0))
             return Sample(heights, deformation, rotation @ self._centre + shift + space.anchor)
 
     def lowest(self, predicted: Float[np.ndarray, "times y"]) -> Times:
@@ -69,9 +79,13 @@ class CheckedBody:
 
 def _lowest(evaluated: EvaluatedBasis, y: Floats, rotation: Rotations, shift: Vectors) -> Times:
     """(T,) height in metres of the lowest point. The azimuth does not change it."""
-    local = (y[:, POSE:].astype(np.float32) @ evaluated.values).reshape(len(y), -1, 3) + evaluated.rest
-    heights = (local @ rotation[:, 2, :, None].astype(np.float32))[..., 0]
+    heights = (_local(evaluated, y) @ rotation[:, 2, :, None].astype(np.float32))[..., 0]
     return heights.min(axis=1).astype(float) + shift[:, 2] + evaluated.space.anchor[2]
+
+
+def _local(evaluated: EvaluatedBasis, y: Floats) -> Floats:
+    """(T, N, 3) m: the deformed points before the pose."""
+    return (y[:, POSE:].astype(np.float32) @ evaluated.values).reshape(len(y), -1, 3) + evaluated.rest
 
 
 def checked_body(rest: Mesh | PointCloud, space: ReducedSpace, limit: float) -> CheckedBody:

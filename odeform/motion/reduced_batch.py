@@ -11,6 +11,7 @@ from odeform.motion.batch_plausibility import BatchPlausibility
 from odeform.motion.batch_trajectory import BatchTrajectory, Coordinates
 from odeform.motion.body import CheckedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.ground import Ground
 from odeform.motion.limits import Limits
 from odeform.motion.motion_batch import BatchPoses, BatchVertices, MotionBatch
 from odeform.motion.plausibility import Sample
@@ -26,17 +27,33 @@ class BatchPart:
     """Some of the motions of a batch, in their order."""
 
     def __init__(
-        self, trajectory: BatchTrajectory, body: CheckedBody, limits: Limits, window: Window, azimuths: Times
+        self,
+        trajectory: BatchTrajectory,
+        body: CheckedBody,
+        limits: Limits,
+        window: Window,
+        azimuths: Times,
+        grounds: Sequence[Ground | None],
     ) -> None:
-        """`body` is the trained one, by which motions are checked for plausibility, `azimuths` (B,) are in radians."""
+        """`body` is the trained one, by which motions are checked for plausibility, `azimuths` (B,) are in radians;
+        `grounds` (B,) are as of `ReducedMotion`."""
         self.trajectory, self.azimuths = trajectory, azimuths
         self._body, self._window = body, window
+        self._obstacles = [() if ground is None else ground.obstacles for ground in grounds]
         self.plausibility = BatchPlausibility(
             limits, window, len(azimuths), lambda times: self._sample(times, trajectory.reduced(times))
         )
 
     def _sample(self, times: Times, y: Coordinates) -> Sample:
-        return self._body.sample(y.reshape(-1, y.shape[-1]), np.tile(self._window.passed(times), len(y)))
+        passed = np.tile(self._window.passed(times), len(y))
+        sample = self._body.sample(y.reshape(-1, y.shape[-1]), passed)
+        if not any(self._obstacles):
+            return sample
+        each = [
+            self._body.sample(one, self._window.passed(times), some).lowest
+            for one, some in zip(y, self._obstacles, strict=True)
+        ]
+        return replace(sample, lowest=np.concatenate(each))
 
     def reduced(self, times: Times) -> tuple[Coordinates, Bool[np.ndarray, " batch"]]:
         """(B, T, 6 + K) at (T,) seconds of the clock, bounded, and which motions (B,) are valid there."""
@@ -58,11 +75,11 @@ class ReducedBatch(MotionBatch):
         window: Window,
         parts: Sequence[BatchPart],
         basis: Callable[[float], EvaluatedBasis],
-        flat_on: float | None = None,
+        grounds: Sequence[Ground | None],
     ) -> None:
-        """`basis` evaluates that of the geometry at an azimuth in radians; `flat_on` is as of `ReducedMotion`."""
+        """`basis` evaluates that of the geometry at an azimuth in radians; `grounds` (B,) are as of `ReducedMotion`."""
         super().__init__(sets, one)
-        self._flat_on = flat_on
+        self._grounds = grounds
         self._window, self._parts, self._basis = window, parts, basis
 
     @property
@@ -96,8 +113,8 @@ class ReducedBatch(MotionBatch):
             for row, *one in zip(rows.tolist(), y, weights, rotations, strict=True):
                 # as of a single motion: products of more rows round differently
                 out[row] = moved_points(evaluated, *one)
-                if self._flat_on is not None:
-                    np.maximum(out[row][..., 2], np.float32(self._flat_on), out=out[row][..., 2])
+                if (ground := self._grounds[row]) is not None:
+                    ground.keep_out(out[row])
 
         return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
 

@@ -9,6 +9,7 @@ from odeform.errors import InputError
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.body import CheckedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
+from odeform.motion.ground import Ground
 from odeform.motion.local_frames import Axes, gradients, moved_covariances
 from odeform.motion.plausibility import PlausibilityCheck, Sample
 from odeform.motion.reduced_space import ReducedSpace, rotation_of
@@ -40,18 +41,18 @@ class ReducedMotion(Motion):
     trajectory: Trajectory
     validity: Validity = UNKNOWN
     body: CheckedBody | None = None
-    flat_on: float | None = None
-    """Height in metres of a floor on which points that would be below it lie: what is in contact gives way there.
-    None: a motion is as its coordinates say."""
+    ground: Ground | None = None
+    """What points that would be inside of it lie on. None: a motion is as its coordinates say."""
 
     def _make_check(self) -> PlausibilityCheck | None:
         body, trajectory, window = self.body, self.trajectory, self.schema.window
+        obstacles = () if self.ground is None else self.ground.obstacles
         if body is None:
             return None
 
         # without this motion: what refers to itself stays until Python looks for cycles, and motions are large
         def sample(times: Times) -> Sample:
-            return body.sample(trajectory.reduced(times), window.passed(times))
+            return body.sample(trajectory.reduced(times), window.passed(times), obstacles)
 
         return PlausibilityCheck(self.validity.limits, window, sample)
 
@@ -77,8 +78,8 @@ class ReducedMotion(Motion):
     def vertices(self, t: float | Times) -> Points | Frames:
         y = self._reduced(t)
         out = moved_points(self.evaluated, y, *placements(self.space, y, self.schema.azimuth(self.parameters)))
-        if self.flat_on is not None:
-            np.maximum(out[..., 2], np.float32(self.flat_on), out=out[..., 2])
+        if self.ground is not None:
+            self.ground.keep_out(out)
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
@@ -86,13 +87,10 @@ class ReducedMotion(Motion):
         return out[0] if np.ndim(t) == 0 else out
 
     def local(self, t: float | Times) -> Points | Frames:
-        y = self._reduced(t)
+        y, azimuth = self._reduced(t), self.schema.azimuth(self.parameters)
         out = self._deformation(y) @ self._to_canonical_axes.astype(np.float32)
-        if self.flat_on is not None:
-            poses = poses_of(self.space, y, self.schema.azimuth(self.parameters)).astype(np.float32)
-            upwards = poses[:, None, 2, :3]
-            heights = ((self.evaluated.points + out) * upwards).sum(axis=-1) + poses[:, 2, 3, None]
-            out += np.maximum(np.float32(self.flat_on) - heights, 0.0)[..., None] * upwards
+        if self.ground is not None:
+            self.ground.keep_posed_out(self.evaluated.points, out, poses_of(self.space, y, azimuth))
         return out[0] if np.ndim(t) == 0 else out
 
     def deformed(self, t: float) -> Points:

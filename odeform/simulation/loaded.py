@@ -33,9 +33,11 @@ def simulate_situation(
     A pulse's place is one of the body's settled surface. `report` gets the fraction done. Raises `SimulationError`.
     """
     from odeform.simulation.inversion import GuardedBody  # looking at a scene needs no simulator
-    from odeform.simulation.objects.body import SoftBody
+    from odeform.simulation.objects.body import SoftBody, contact_of
+    from odeform.simulation.obstacles import obstacle_xml
 
-    body = SoftBody(item.points, item.elements, item.material, step)
+    others = obstacle_xml(situation.obstacles, contact_of(item.material))
+    body = SoftBody(item.points, item.elements, item.material, step, others=others)
     positions, velocities = released(item, situation.flight)
     body.positions, body.velocities[:] = positions, velocities
     solid = item.elements.shape[1] == 4

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from odeform.loads.arrow import Arrow
+from odeform.loads.obstacle import Obstacle
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
 from odeform.surroundings import Contacts, Surroundings
@@ -16,6 +17,10 @@ __all__ = ["Scene"]
 
 
 def _no_glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
+    return ()
+
+
+def _no_obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
     return ()
 
 
@@ -52,6 +57,8 @@ class Scene:
     """Resolutions of the simulated mesh, finest first. The first counts as the truth; none: it cannot be changed."""
     glyphs: Callable[[Parameters, Points], tuple[Arrow, ...]] = _no_glyphs
     """`glyphs(parameters, rest_points)` are the arrows that show the parameters on a body of points (N, 3) m."""
+    obstacles: Callable[[Parameters], tuple[Obstacle, ...]] = _no_obstacles
+    """`obstacles(parameters)` are what the body meets besides the floor."""
     checks: tuple[PhysicalCheck, ...] = STANDARD_CHECKS
     """Bounds that `odeform stress` checks predicted motions against."""
     contacts: Contacts | None = None

@@ -17,7 +17,7 @@ from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.scenes.registry import find_scene
 from odeform.stress.check import Check
-from odeform.types import Points
+from odeform.types import Frames, Points
 
 __all__ = ["BEYOND", "Watched", "draws_of", "stress_objects", "watch"]
 
@@ -38,7 +38,7 @@ class Watched:
     start_off: float
     """m between its first frame and where it should begin."""
     depth: float
-    """m below the floor, at most."""
+    """m below the floor, or inside an obstacle, at most."""
     held: float
     """Fraction of the frames that show an earlier moment, because it is not valid."""
     rests: bool
@@ -80,7 +80,15 @@ def watch(model: PerObject, draw: tuple[int, Parameters]) -> Watched:
         return Watched(f"fault: {type(error).__name__}", 0, 0.0, 0.0, 0.0, False, time.perf_counter() - begin)
     finite, floor = np.isfinite(frames).all(axis=(1, 2)), motion.validity.limits.floor
     depth = 0.0 if floor is None or not finite.any() else floor - float(frames[finite][..., 2].min())
+    depth = max(depth, _inside(model, motion.parameters, frames[finite]))
     return Watched(status, int((~finite).sum()), begun, depth, held, rests, time.perf_counter() - begin)
+
+
+def _inside(model: PerObject, parameters: Parameters, frames: Frames) -> float:
+    """m by which frames (T, N, 3) are inside an obstacle, at most; negative outside of all."""
+    load = load_of_scene(model.schema.scene)
+    obstacles = () if load is None or not len(frames) else load.obstacles(parameters)
+    return max((-float(obstacle.met(frames)[0].min()) for obstacle in obstacles), default=float("-inf"))
 
 
 def _start_off(model: PerObject, parameters: Parameters, frame: Points) -> float:

@@ -13,11 +13,12 @@ from odeform.simulation.scenes.registry import find_scene
 from odeform.types import GaussianSplats, Mesh, Points
 from odeform_viz.colors import Color, color_of, paler
 from odeform_viz.columns import Column
+from odeform_viz.obstacles import obstacles_of
 from odeform_viz.recording.entities import COEFFICIENTS, MODES, POINTS, PROVENANCE, REST, WORLD
 from odeform_viz.recording.modes import ModeEncoder
 from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.shown_points import ShownBudget
-from odeform_viz.recording.surroundings import log_arrows, spheres
+from odeform_viz.recording.surroundings import log_arrows, log_obstacles, spheres
 from odeform_viz.view import ColumnFrame
 
 __all__ = ["PLOTS", "LoggedColumn"]
@@ -55,6 +56,7 @@ class LoggedColumn:
         self._shown: Points | None = None
         self._arrows: tuple[Arrow, ...] = ()
         self._acting: tuple[bool, ...] = ()
+        self._obstacles = False  # whether there are any
         self._status = ""
         self._log_static()
 
@@ -136,6 +138,10 @@ class LoggedColumn:
         if changed:
             scene = find_scene(motion.schema.scene) if isinstance(motion, Motion) else None
             self._arrows = scene.glyphs(motion.parameters, self._rest) if scene is not None else ()
+            obstacles = obstacles_of(motion)
+            if obstacles or self._obstacles:
+                log_obstacles(self._stream, f"{WORLD}/{self.name}/obstacles", obstacles)
+            self._obstacles = bool(obstacles)
         acting = tuple(arrow.begin <= time <= arrow.end for arrow in self._arrows)
         if acting != self._acting or (changed and any(acting)):
             arrows = [arrow for arrow, acts in zip(self._arrows, acting, strict=True) if acts]

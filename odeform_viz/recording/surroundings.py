@@ -6,11 +6,12 @@ import numpy as np
 import rerun as rr
 
 from odeform.loads.arrow import Arrow
+from odeform.loads.obstacle import Obstacle
 from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint
-from odeform_viz.colors import ACTING
+from odeform_viz.colors import ACTING, BACKGROUND
 from odeform_viz.recording.entities import FLOOR, STILL
 
-__all__ = ["log_arrows", "log_surroundings", "spheres"]
+__all__ = ["log_arrows", "log_obstacles", "log_surroundings", "spheres"]
 
 HALF, CELL = 3.0, 0.25  # m; of the floor and its grid
 PLANE, LINES = (236, 238, 242), (190, 194, 202)
@@ -58,6 +59,18 @@ def log_arrows(stream: rr.RecordingStream, entity: str, arrows: Sequence[Arrow],
         radii=0.02 * size,
     )
     stream.log(entity, drawn)
+
+
+def log_obstacles(stream: rr.RecordingStream, entity: str, obstacles: Sequence[Obstacle]) -> None:
+    """Log what a body meets besides the floor, in place of what was there."""
+    stream.log(entity, rr.Clear(recursive=True))
+    for index, obstacle in enumerate(obstacles):
+        mesh = obstacle.mesh
+        points, faces = mesh.points[mesh.faces].reshape(-1, 3), np.arange(3 * len(mesh.faces)).reshape(-1, 3)
+        colors = [BACKGROUND] * len(points)
+        stream.log(
+            f"{entity}/{index}", rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
+        )
 
 
 def spheres(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:

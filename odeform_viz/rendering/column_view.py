@@ -14,6 +14,7 @@ from odeform_viz.rendering.disc import FloorDisc
 from odeform_viz.rendering.ghost import show_ghost
 from odeform_viz.rendering.glyphs import GlyphView
 from odeform_viz.rendering.look import Look
+from odeform_viz.rendering.obstacles import ObstacleView
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.push import Pull, PushView
 from odeform_viz.rendering.refined import refined
@@ -57,6 +58,7 @@ class ColumnView:
         drawn = self._refined.mesh if self._refined else column.geometry
         self._shape = show_shape(server, f"{self.root}/body", drawn, color, shadow=on_floor)
         self._glyphs = GlyphView(server, f"{self.root}/ground", self._rest)
+        self._obstacles = ObstacleView(server, f"{self.root}/ground")
         self._push_view = PushView(server, f"{self.root}/ground", f"{self.root}/body", pull)
         self._push: ShownPush | None = None
         self._disc: FloorDisc | None = None
@@ -160,6 +162,7 @@ class ColumnView:
             # not in `atomic`, which would hold back the frame until the path is computed
             self._path = show_path(self._server, f"{self.root}/ground", motion, self._centre, self._color)
         with self._server.atomic():
+            self._obstacles.show(motion)
             if self._push is not None:
                 self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
             elif isinstance(motion, Motion):

@@ -5,6 +5,7 @@ import numpy as np
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Floats, Pose, Vector
+from odeform_viz.obstacles import obstacles_of
 from odeform_viz.pushing import push_shown
 from odeform_viz.rendering.framing import Axes, Box
 from odeform_viz.view import ColumnFrame
@@ -38,7 +39,10 @@ def outline_of(shown: ColumnFrame, axes: Axes) -> Box:
     turned += centre * [1.0, 1.0, 0.0]
     turned[:, :, 2] += heights[:, None]
     acting = _acting_on(shown)
-    corners = turned.reshape(-1, 3) if acting is None else np.concatenate([turned.reshape(-1, 3), acting])
+    parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
+    # of obstacles, which are wide, their middle
+    parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
+    corners = np.concatenate(parts)
     across, upwards = corners @ axes.right, corners @ axes.above
     return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
 
@@ -56,6 +60,8 @@ def climb_of(shown: ColumnFrame) -> float:
 
 
 def direction_of(shown: ColumnFrame) -> Vector | None:
-    """(3,) the direction in which a body is pushed; None if nothing acts."""
+    """(3,) the direction in which a body is pushed, or that of an obstacle; None if nothing acts."""
+    for obstacle in obstacles_of(shown.motion):
+        return -obstacle.met(_poses(shown)[0, :3, 3])[1] * [1.0, 1.0, 0.0]
     acting = _acting_on(shown)
     return None if acting is None else acting[1] - acting[0]

@@ -7,14 +7,20 @@ from soft_block import POISSON, YOUNG, grid, outside
 from odeform.errors import InputError
 from odeform.geometry.solids.tetrahedra import inside_out, outward
 from odeform.loads.load import Load
+from odeform.loads.obstacle import Obstacle
 from odeform.loads.registry import get_load, known_loads, load_of_scene, register_load, split_load
 from odeform.loads.situation import Flight, Situation
+from odeform.loads.slope import slope
+from odeform.loads.step import step
+from odeform.loads.wall import wall
 from odeform.schema import Parameter, Window
+from odeform.simulation.flex import Contact
 from odeform.simulation.inversion import GuardedBody
 from odeform.simulation.loaded import released, simulate_situation
 from odeform.simulation.objects.body import SoftBody
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
+from odeform.simulation.obstacles import obstacle_xml
 from odeform.simulation.scenes.loaded import scene_of, simulate_load
 from odeform.simulation.scenes.registry import find_scene, get_scene
 from odeform.types import Mesh
@@ -99,7 +105,7 @@ def test_a_kick_gives_the_body_its_impulse() -> None:
     assert 0.5 * given < speed < given, "friction takes some of it"
 
 
-@pytest.mark.parametrize("name", ["drop", "throw", "kick"])
+@pytest.mark.parametrize("name", ["drop", "throw", "kick", "wall", "step", "slope"])
 def test_each_load_is_a_scene_of_all_objects(name: str) -> None:
     scene = get_scene(f"object-{name}")
     assert find_scene(scene.schema.scene) is scene
@@ -156,3 +162,24 @@ def test_names_without_a_load_stay_as_they_are() -> None:
     assert split_load("kick") == ("kick", "push")
     assert split_load("C:/models/kick.safetensors") == ("C:/models/kick.safetensors", "push")
     assert split_load("contact-force:drop") == ("contact-force", "drop")
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "speed"),
+    [(wall(0.1), 1.5), (step(0.1, 0.1), 1.5), (slope(0.12, 0.6), 0.0)],
+    ids=["wall", "step", "slope"],
+)
+def test_a_simulated_body_does_not_pass_through_an_obstacle(obstacle: Obstacle, speed: float) -> None:
+    item, flight = soft_block(), Flight(0.13, velocity=np.array([speed, 0.0, -0.5]))
+    ends = {}
+    for name, obstacles in (("met", (obstacle,)), ("free", ())):
+        _, vertices = simulate_situation(item, Situation(flight, obstacles=obstacles), 200.0, 0.06)
+        ends[name] = -float(obstacle.met(vertices)[0].min())
+    assert ends["met"] < 3e-3, "as deep as it sinks into the floor"
+    assert ends["free"] > 0.01, "without the obstacle it does, or this test shows nothing"
+
+
+def test_obstacles_that_the_simulator_does_not_have_are_refused() -> None:
+    ledge = Obstacle(np.zeros(3), np.full(3, -np.inf), np.array([0.0, np.inf, 0.0]), (np.zeros(3), np.ones(3)))
+    with pytest.raises(ValueError, match="half space"):
+        obstacle_xml([ledge], Contact(0.5, 0.002))

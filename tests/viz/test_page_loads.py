@@ -41,6 +41,9 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("drop", "height (m)"),
         ("throw", "spin_y (rad/s)"),
         ("kick", "force (N)"),
+        ("wall", "distance (m)"),
+        ("step", "rise (m)"),
+        ("slope", "angle (deg)"),
         ("push", "force (N)"),
     ):
         app.show_load(load)

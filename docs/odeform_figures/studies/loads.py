@@ -1,9 +1,9 @@
-"""Drops, throws and kicks of the seven objects: how they meet the floor is fitted, and their error is measured.
+"""Loads of the seven objects: how they meet the floor is fitted, and their error and time are measured.
 
 `odeform simulate object-throw --out THROWS` makes data, and so on. `python -m odeform_figures.studies.loads` then does
 the rest. `fit THROWS DROPS --checkpoint FILE` and `choose KICKS --checkpoint FILE` write what they find into a
 checkpoint; `measure DROPS KICKS --split all --out FILE.json` measures on others, and `measure DROPS --checkpoint GP`
-a baseline that was trained on drops.
+a baseline that was trained on drops. `time` compares how long motions with obstacles take with throws.
 """
 
 import argparse
@@ -26,11 +26,13 @@ from odeform.models.modal.training.impact_fit import FRAMES, Impact, impact_fit,
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load, load_model
 from odeform.schema import OBJECT
+from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames
 from odeform_figures.output import write_or_print
 
-__all__ = ["fit", "measured"]
+__all__ = ["fit", "measured", "timed"]
 
+TIMED = ("throw", "wall", "step", "slope")
 RIGID = 1e6  # times its stiffness: a body that does not deform
 
 
@@ -43,7 +45,9 @@ def _part(predictor: Any, name: str) -> ModalModel:
 
 def _impacts(dataset: Dataset, name: str, splits: Sequence[str]) -> list[Impact]:
     found = [s for split in splits for s in dataset.sequences(split) if s.parameters[OBJECT] == name]
-    return impacts_of(found, dataset.schema.window.rate)
+    acting = load_of_scene(dataset.schema.scene)
+    assert acting is not None
+    return impacts_of(found, dataset.schema.window.rate, acting)
 
 
 def fit(data: Sequence[str], checkpoint: str, names: Sequence[str] | None = None) -> None:
@@ -130,8 +134,10 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     models = {"model": model, "rigid": model.with_contact_parameters(stiff)}
     rows: dict[str, Any] = {"motions": len(impacts)}
     for key, one in models.items():
-        each = [_relative(impact, predicted(one, impact, evaluated, len(impact.times))) for impact in impacts]
+        each = [_relative(one, impact, predicted(one, impact, evaluated, len(impact.times))) for impact in impacts]
         rows[key] = {k: round(float(np.mean([row[k] for row in each])), 4) for k in each[0]}
+        for name in ("inside_mm", "cut_mm", "cut_truth_mm"):
+            rows[key][name] = round(max(row[name] for row in each), 1)
         rows[key]["median_whole"] = round(float(np.median([row["whole"] for row in each])), 4)
     begin = time.perf_counter()
     for impact in impacts:
@@ -140,7 +146,7 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     return rows
 
 
-def _relative(impact: Impact, points: Frames) -> dict[str, float]:
+def _relative(model: ModalModel, impact: Impact, points: Frames) -> dict[str, float]:
     truth = impact.vertices[impact.first :]
     square = ((points - truth) ** 2).sum(axis=2) @ impact.weights
     moved = ((truth - truth[0]) ** 2).sum(axis=2) @ impact.weights
@@ -151,11 +157,49 @@ def _relative(impact: Impact, points: Frames) -> dict[str, float]:
         "whole": float(np.sqrt(square.mean() / moved.mean())),
         "place_mm": 1e3 * float(np.linalg.norm(shift)),
         "turn_deg": float(np.degrees(np.linalg.norm(_vector(turn)))),
+        "inside_mm": 1e3 * _inside(model, impact, points),
+        "cut_mm": 1e3 * _inside(model, impact, _on_faces(model, points)),
+        "cut_truth_mm": 1e3 * _inside(model, impact, _on_faces(model, truth)),
     }
+
+
+def _on_faces(model: ModalModel, points: Frames) -> Frames:
+    """The middles of the sides of faces: the edge of an obstacle may cut a face of which all vertices are outside."""
+    corners = points[:, model.rest.faces]
+    return (0.5 * (corners + np.roll(corners, 1, axis=2))).reshape(len(points), -1, 3)
+
+
+def _inside(model: ModalModel, impact: Impact, points: Frames) -> float:
+    """m by which points (T, N, 3) m are below the floor or inside an obstacle, at most."""
+    assert model.load is not None
+    gaps = [points[..., 2], *(one.met(points)[0] for one in model.load.obstacles(impact.parameters))]
+    return max(-float(np.min(gaps)), 0.0)
 
 
 def _vector(turn: Floats) -> Floats:
     return vector_from_rotation(turn[None])[0]
+
+
+def timed(checkpoint: str, objects: Sequence[str], draws: int) -> dict[str, Any]:
+    """How long a new motion under each load takes with a frame at its end, in medians over draws of its data, relative
+    to that of a throw; one load after the other for each draw, so that all see the same machine."""
+    predictor, taken = load(checkpoint), {name: [] for name in TIMED}
+    models = {name: predictor.under(name) for name in TIMED}
+    for name, model in models.items():
+        for parameters in get_scene(f"object-{name}").sample(1, 1, objects):
+            model.solve(parameters=parameters).vertices(0.8)  # compiles, and computes what is kept
+    for index in range(draws):
+        for item in objects:
+            for name in TIMED:
+                parameters = get_scene(f"object-{name}").sample(draws, 2, [item])[index]
+                begin = time.perf_counter()
+                models[name].solve(parameters=parameters).vertices(0.8)
+                taken[name].append(time.perf_counter() - begin)
+    medians = {name: float(np.median(times)) for name, times in taken.items()}
+    return {
+        name: {"ms": round(1e3 * value, 1), "of_a_throw": round(value / medians["throw"], 2)}
+        for name, value in medians.items()
+    }
 
 
 def main() -> None:
@@ -174,11 +218,18 @@ def main() -> None:
     other.add_argument("--checkpoint", default="contact-force")
     other.add_argument("--split", default="test", choices=("test", "all"))
     other.add_argument("--out")
+    timing = commands.add_parser("time")
+    timing.add_argument("--checkpoint", default="contact-force")
+    timing.add_argument("--object", nargs="+", default=["donut", "pillow", "dog"])
+    timing.add_argument("--draws", type=int, default=8)
+    timing.add_argument("--out")
     args = parser.parse_args()
     if args.command == "fit":
         fit(args.data, args.checkpoint, args.object)
     elif args.command == "choose":
         choose(args.data, args.checkpoint)
+    elif args.command == "time":
+        write_or_print(timed(args.checkpoint, args.object, args.draws), args.out)
     else:
         write_or_print({Path(d).name: measured(d, args.checkpoint, args.split) for d in args.data}, args.out)
 

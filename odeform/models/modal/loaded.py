@@ -12,6 +12,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.loads.load import Load
 from odeform.loads.situation import Flight, Situation
 from odeform.mechanics.flat import parts_of, start_of
+from odeform.mechanics.obstacles import Obstacles
 from odeform.mechanics.push import PARTS, Push, kicked, no_push
 from odeform.mechanics.step import Mechanics
 from odeform.mechanics.warping import Turning
@@ -52,8 +53,9 @@ class LoadedBody:
     """(3, 3), from the body that was measured to how it rests."""
 
     def begin(self, situations: Sequence[Situation]) -> Beginning:
-        """The motions under several situations, which all have a pulse, or all have none."""
+        """The motions under several situations, which all have a pulse, or all have none, and as many obstacles."""
         push = _together([self._acted(situation) for situation in situations])
+        push = replace(push, obstacles=Obstacles.of([situation.obstacles for situation in situations], self.anchor))
         resting = self.mechanics.start(push)
         starts = [
             row if situation.flight is None else self._flying(situation.flight, push.eigenvalues.shape[1])

@@ -36,6 +36,7 @@ from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
+from odeform.motion.ground import Ground
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import Recent, geometry_key
 from odeform.motion.reduced_motion import ReducedMotion
@@ -130,11 +131,11 @@ class ModalModel(Model):
         self.contact_parameters, self.pulse = ContactParameters.from_json(law), float(config["pulse_s"])
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
-        self._largest = float(shift), float(deformation)
+        self._largest, self._flat_on = (float(shift), float(deformation)), None
         if self.load is not None:
             size = float(np.ptp(self.body.points, axis=0).max())
             self._largest = float("inf"), max(self._largest[1], ROOM * size)
-            self.flat_on = self._flat_below(self.rest)
+            self._flat_on = self._flat_below(self.rest)
         self._read_settings(config)
         self.qualities = self.qualities or QUALITIES
         if "correction" in config:
@@ -218,7 +219,7 @@ class ModalModel(Model):
                 self.body, self.contact_parameters, self.projectile, out._ratios, coordinates, basis
             )
             if self.load is not None:
-                out.flat_on = self._flat_below(out.settled_body.rest)
+                out._flat_on = self._flat_below(out.settled_body.rest)
         return out
 
     def with_contact_parameters(self, contact_parameters: ContactParameters) -> "ModalModel":
@@ -239,6 +240,11 @@ class ModalModel(Model):
         """The height below which a body of this rest shape is flat: what rests there already stays as it is."""
         floor = self.surroundings.floor if self.surroundings else None
         return None if floor is None else min(floor - SKIN, float(rest.points[:, 2].min()))
+
+    def ground_of(self, parameters: Parameters) -> Ground | None:
+        if self.load is None or self._flat_on is None:
+            return None
+        return Ground(self._flat_on, self.load.obstacles(parameters))
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         found = self.changed(parameters).settled_body

@@ -9,6 +9,7 @@ import numpy as np
 from odeform.loads.arrow import Arrow
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
+from odeform.loads.obstacle import Obstacle
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.loaded import STEP, released, simulate_situation
 from odeform.simulation.objects.catalog import OBJECTS, get_object
@@ -76,6 +77,9 @@ def scene_of(load: Load) -> Scene:
         rest = Mesh(points, np.zeros((0, 3), np.int32))
         return load.arrows(_begun(rest, load, parameters), parameters)
 
+    def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
+        return load.obstacles(parameters) if {p.name for p in load.parameters} <= set(parameters) else ()
+
     contacts = None
     if load.pulse is not None:
         contacts = Contacts({name: forces_of(get_object(name)) for name in OBJECTS}, load.pulse, 0.0)
@@ -88,17 +92,17 @@ def scene_of(load: Load) -> Scene:
         fixed={"gravity_m_s2": GRAVITY},
         until=load.until,
         glyphs=glyphs,
+        obstacles=obstacles,
         contacts=contacts,
         sampler=draw if load.pulse is not None else None,
     )
 
 
 def _begun(rest: Mesh, load: Load, parameters: Parameters) -> Mesh:
-    """About where a body that rests at points (N, 3) m begins: what it gives way under its weight aside."""
+    """About where a body begins that rests there, as of `Flight.placed`."""
     if not load.flies or (flight := load.situation(rest, parameters).flight) is None:
         return rest
-    turned = (rest.points - rest.points.mean(axis=0)) @ flight.rotation.T
-    return Mesh((turned + np.array([0.0, 0.0, flight.height - turned[:, 2].min()])).astype(np.float32), rest.faces)
+    return Mesh(flight.placed(rest.points).astype(np.float32), rest.faces)
 
 
 def _rest_mesh(name: str) -> Mesh:

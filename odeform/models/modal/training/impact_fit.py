@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from odeform.loads.load import Load
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.model import QUALITIES, ModalModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -27,7 +28,7 @@ FITTED = {
 motions that are as wrong as they are large."""
 START = {"floor_damping": 3e-3}  # s: without its force before contact, the floor damps less
 FRAMES = 12  # after the first contact, that are fitted
-TOUCHES = 5e-4  # m above the floor, from which on a body counts as landed
+TOUCHES = 5e-4  # m above the floor or before an obstacle, from which on a body counts as landed
 EVERY = 7  # of the vertices, one is looked at
 STEP, EVALUATIONS = 0.03, 10  # of the logarithms, for differences; of the Jacobian
 
@@ -49,13 +50,14 @@ class Impact:
         return float(np.sqrt((((part - part[0]) ** 2).sum(axis=2) @ self.weights).mean()))
 
 
-def impacts_of(sequences: Iterable[MotionSequence], rate: float) -> list[Impact]:
-    """The motions of a data set, at `rate` Hz."""
+def impacts_of(sequences: Iterable[MotionSequence], rate: float, load: Load) -> list[Impact]:
+    """The motions of a data set under a load, at `rate` Hz."""
     found = []
     for sequence in sequences:
         known = sequence.frames(float(sequence.times[-1]), rate)
         vertices = known.vertices.astype(float)
-        first = int((vertices[:, :, 2].min(axis=1) < TOUCHES).argmax())
+        gaps = [vertices[:, :, 2], *(one.met(vertices)[0] for one in load.obstacles(sequence.parameters))]
+        first = int((np.min(gaps, axis=(0, 2)) < TOUCHES).argmax())
         found.append(Impact(sequence.parameters, known.times, vertices, sequence.weights, first))
     return found
 
@@ -67,8 +69,8 @@ def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, fram
     solved = body.integrate(body.inputs(impact.parameters), evaluated, QUALITIES["balanced"], float(times[-1]))
     y = solved.reduced(times)
     out = moved_points(evaluated, y, *placements(body.space, y, 0.0)).astype(float)
-    if body.flat_on is not None:
-        np.maximum(out[..., 2], body.flat_on, out=out[..., 2])
+    if (ground := body.ground_of(impact.parameters)) is not None:
+        ground.keep_out(out)
     return out
 
 

@@ -1,0 +1,88 @@
+"""A rigid box that a body meets besides the floor: a wall, a step, a slope."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.types import Floats, Mesh, Rotations, Vector
+
+__all__ = ["Obstacle", "half_space"]
+
+FAR = np.full(3, np.inf)
+CORNERS = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)])
+FACES = np.array(
+    [
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ],
+    dtype=np.int32,
+)  # of a box with these corners, outward
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """A box from `low` to `high` in its own axes. Sides may be infinitely far: a half space has one that is not.
+
+    It does not move, and is as rough and as stiff as the floor.
+    """
+
+    place: Vector
+    """(3,) m: the origin of its axes."""
+    low: Vector
+    """(3,) m"""
+    high: Vector
+    """(3,) m"""
+    shown: tuple[Vector, Vector]
+    """(3,) m: the lowest and the highest corner of what is drawn of it."""
+    turn: Rotations = field(default_factory=lambda: np.eye(3))
+    """(3, 3), of which the columns are its axes."""
+
+    def met(self, points: Float[np.ndarray, "*points 3"]) -> tuple[Floats, Floats]:
+        """Signed distances (...,) m of points (..., 3) m, negative inside, and the outward normals (..., 3) there."""
+        local = (points - self.place) @ self.turn
+        below, above = self.low - local, local - self.high
+        beyond, side = np.maximum(below, above), np.where(above >= below, 1.0, -1.0)
+        outside = np.maximum(beyond, 0.0)
+        away, nearest = np.sqrt((outside * outside).sum(axis=-1)), beyond.argmax(axis=-1)
+        deepest = beyond.max(axis=-1)
+        free = (deepest > 0.0)[..., None]
+        normal = np.where(free, outside / np.where(free, away[..., None], 1.0), np.eye(3)[nearest]) * side
+        return np.where(free[..., 0], away, deepest), normal @ self.turn.T
+
+    def keep_out(self, points: Float[np.ndarray, "*points 3"]) -> None:
+        """Move those of the points (..., 3) m that are inside to the nearest place on its surface."""
+        gap, normal = self.met(points)
+        inside = gap < 0.0
+        points[inside] -= (gap[inside, None] * normal[inside]).astype(points.dtype)
+
+    @property
+    def mesh(self) -> Mesh:
+        """What is drawn of it, m."""
+        low, high = self.shown
+        corners = low + CORNERS * (high - low)
+        return Mesh((self.place + corners @ self.turn.T).astype(np.float32), FACES)
+
+
+def half_space(place: Vector, normal: Vector, wide: tuple[float, float], long: tuple[float, float]) -> Obstacle:
+    """Everything behind the plane through `place` (3,) m whose outward `normal` (3,) has no part along y.
+
+    Drawn is a plate of it: from and to, in m along y, and in m along the plane across y.
+    """
+    along = np.cross([0.0, 1.0, 0.0], normal)
+    turn = np.stack([along, [0.0, 1.0, 0.0], normal], axis=1)
+    plate = np.array([long[0], wide[0], -THICK]), np.array([long[1], wide[1], 0.0])
+    return Obstacle(np.asarray(place, dtype=float), -FAR, np.array([np.inf, np.inf, 0.0]), plate, turn)
+
+
+THICK = 0.02  # m, of the plate that is drawn of a half space

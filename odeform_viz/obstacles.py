@@ -1,0 +1,14 @@
+"""What a body meets besides the floor. Knows no GUI."""
+
+from odeform.loads.obstacle import Obstacle
+from odeform.motion.base import Motion
+from odeform.motion.recorded import RecordedMotion
+from odeform.simulation.scenes.registry import find_scene
+
+__all__ = ["obstacles_of"]
+
+
+def obstacles_of(motion: Motion | RecordedMotion) -> tuple[Obstacle, ...]:
+    """The obstacles of a motion; none in scenes that are not known."""
+    scene = find_scene(motion.schema.scene)
+    return () if scene is None else scene.obstacles(motion.parameters)
