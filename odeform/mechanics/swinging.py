@@ -17,7 +17,7 @@ __all__ = ["Loss", "Swing", "SwingingBody", "swinging_body"]
 
 CHUNK = 64  # elements whose strains are held at once
 TOLERANCE, MOST_STEPS = 1e-9, 40  # of Newton's method in one step in time: relative change, and iterations
-RENEWED = (6, 12, *range(18, MOST_STEPS))  # iterations whose matrix is made anew
+RENEWED = (5, 9, *range(12, MOST_STEPS))  # iterations whose matrix is made anew
 
 
 @dataclass(frozen=True)
@@ -97,21 +97,44 @@ class SwingingBody:
         terms = self.terms(q)[0]
         return float(0.5 * self.stiffer * terms @ self.products @ terms - self.load @ q)
 
+    def hanging(self, factor: float = 1.0) -> tuple[Floats, Floats]:
+        """(R,) amplitudes where it hangs still under `factor` times its load, and their derivative by the factor.
+        `InputError` where it collapses."""
+        q, load = np.zeros(self.size), factor * self.load
+        for _ in range(MOST_STEPS):
+            terms, slopes = self.terms(q)
+            stress = self.stiffer * (self.products @ terms)
+            slope = self.stiffer * (slopes.T @ (self.products @ slopes)) + self.curved(stress)
+            change = np.linalg.solve(slope, load - slopes.T @ stress)
+            q = q + change
+            if np.abs(change).max() <= TOLERANCE * (np.abs(q).max() + TOLERANCE):
+                return q, np.linalg.solve(slope, self.load)
+        raise InputError("the clamped body finds no equilibrium under its load: it is too soft for it")
+
     def release(self, until: float, step: float, loss: Loss) -> Swing:
-        """Let go without stress at time 0, and follow it to `until` s by implicit midpoint steps of `step` s, which are
-        of second order and keep the energy of a linear body. `InputError` where a step is not solved."""
+        """Let go at rest and without stress at time 0, and follow it to `until` s."""
+        return self.follow(np.zeros(self.size), np.zeros(self.size), until, step, loss)
+
+    def follow(self, q: Floats, speed: Floats, until: float, step: float, loss: Loss, aged: float = 0.0) -> Swing:
+        """The motion from amplitudes and speeds (R,) at time 0 to `until` s, by implicit midpoint steps of `step` s,
+        which are of second order and keep the energy of a linear body. It began without stress `aged` seconds before,
+        and deformed steadily since. `InputError` where a step is not solved."""
         count = round(until / step)
         if count < 1:
             raise InputError(f"expected a time of at least one step of {step:g} s, got {until:g} s")
-        still = np.zeros(self.size)
-        state = _State(still, still, np.zeros(len(self.products)))
-        stepper, found, energy = _Stepper(self, step, loss), [still], [0.0]
+        ratio = loss.time / aged if aged > 0.0 else np.inf
+        relaxed = 0.0 if aged <= 0.0 else 1.0 - ratio * -np.expm1(-1.0 / ratio)
+        state = _State(q, speed, relaxed * self.terms(q)[0])
+        stepper, found, energy = _Stepper(self, step, loss), [q], [self._total(state)]
         with threadpool_limits(1):  # products are too small to share
             for _ in range(count):
                 state = stepper.after(state)
                 found.append(state.q)
-                energy.append(0.5 * float(state.speed @ state.speed) + self.energy(state.q))
+                energy.append(self._total(state))
         return Swing(step * np.arange(count + 1), np.stack(found), np.array(energy))
+
+    def _total(self, state: "_State") -> float:
+        return 0.5 * float(state.speed @ state.speed) + self.energy(state.q)
 
 
 class _State(NamedTuple):
