@@ -12,7 +12,7 @@ from scipy.sparse.linalg import SuperLU, eigsh, splu
 
 from odeform.errors import InputError
 from odeform.mechanics.quadratic import QuadraticMesh, Stiffness
-from odeform.types import Floats, Points, Vector
+from odeform.types import Floats, Ints, Points, Vector
 
 __all__ = ["GRAVITY", "ClampedBody", "Weight", "held_by_ball", "held_by_face"]
 
@@ -90,7 +90,7 @@ class ClampedBody:
         return replace(self, stiffness=replace(self.stiffness, young=young))
 
     @cached_property
-    def free(self) -> Floats:
+    def free(self) -> Ints:
         """Indices of the coordinates that may move."""
         return np.flatnonzero(np.repeat(~self.held, 3))
 
