@@ -135,10 +135,10 @@ def predict_swing(
 
 
 def fit_swing(marked: MarkedBody, release: Release, law: str, until: float = 0.5, step: float = STEP) -> FittedSwing:
-    """Fit Young's modulus, damping and the state at the beginning to the markers up to `until` seconds, by least squares.
+    """Fit Young's modulus, damping and the beginning to the markers up to `until` seconds, by least squares.
 
     A hand that lets go may lower the body for a while. It can only support it, so that the body is free from where it
-    passes the place at which it hangs: the beginning. Nothing after `until` is looked at but that place's first passing.
+    passes the place at which it hangs in the end: the beginning. Nothing else after `until` is looked at.
     `law` is one of `LOSSES`.
     """
     if law not in LOSSES:

@@ -13,7 +13,7 @@ from odeform.formats.motion_capture import read_c3d
 from odeform.geometry.rigid import best_rigid
 from odeform.types import Floats, Frames, Points, Times, Vector
 
-__all__ = ["Markers", "MarkerLayout", "Release", "read_markers", "released"]
+__all__ = ["MarkerLayout", "Markers", "Release", "read_markers", "released"]
 
 MOVES = 0.1  # of the sag: what has moved that far has been let go
 BEGINS = 0.03  # of the sag, from which on it counts as begun

@@ -17,10 +17,18 @@ from odeform.types import Floats, Ints, Points, Vector
 __all__ = ["GRAVITY", "ClampedBody", "Weight", "held_by_ball", "held_by_face"]
 
 GRAVITY = 9.80665  # m/s^2
-TOLERANCE, MOST_STEPS, SMALLEST = 1e-8, 60, 2.0**-12  # of a static solution: relative force, Newton steps, fraction of one
+TOLERANCE, MOST_STEPS, SMALLEST = (
+    1e-6,
+    60,
+    2.0**-12,
+)  # of a static solution: relative force, Newton steps, fraction of one
 SHAPES = 8  # modes that the subspace begins with
 CURVED = 5  # of its first directions, whose curvature is in it too
-SAGS = (0.4, 1.0, 2.0)  # times the load, at which static solutions are in it: twice is how far a body that is let go swings
+SAGS = (
+    0.4,
+    1.0,
+    2.0,
+)  # times the load, at which static solutions are in it: twice is how far a body that is let go swings
 INDEPENDENT = 1e-4  # relative length of what a direction must add
 REACH = 0.1  # of the body's size, that directions are scaled to
 
@@ -68,7 +76,9 @@ class ClampedBody:
         if not self.density > 0.0 or not np.isfinite(self.density):
             raise InputError(f"density: expected a positive number in kg/m^3, got {self.density:g}")
         if not self._spans():
-            raise InputError("clamp: expected a region that holds the body, got one with fewer than three of its points")
+            raise InputError(
+                "clamp: expected a region that holds the body, got one with fewer than three of its points"
+            )
         if self.held.all():
             raise InputError("clamp: expected a region that leaves a part of the body free, got all of it")
 

@@ -1,7 +1,8 @@
-"""Quadratic tetrahedra of Saint Venant-Kirchhoff material, which neither lock in bending nor where nearly incompressible.
+"""Quadratic tetrahedra of Saint Venant-Kirchhoff material, for bending and for what is nearly incompressible.
 
-Displacements are quadratic and the change of volume is averaged over each element, so that a Poisson's ratio of 0.499 is
-as good as one of 0.3 (the pair P2-P0; Boffi, Brezzi and Fortin 2013, Mixed Finite Element Methods, 8.4). Sides are straight.
+Displacements are quadratic and the change of volume is averaged over each element, so that a Poisson's ratio of
+0.499 does not lock them (the pair P2-P0; Boffi, Brezzi and Fortin 2013, Mixed Finite Element Methods, 8.4). Sides are
+straight.
 """
 
 from dataclasses import dataclass
@@ -67,8 +68,8 @@ class QuadraticMesh:
         return csc_matrix((blocks.ravel(), (rows, columns)), shape=(count, count))
 
     def rows_at(self, places: Points) -> csc_matrix:
-        """(P, N) weights of the nodes' displacements at places (P, 3) m. A place outside, such as the centre of a marker
-        that is glued on, moves with the nearest point of the body and turns as the body does there."""
+        """(P, N) weights of the nodes' displacements at places (P, 3) m. A place outside, such as a marker that is
+        glued on, moves with the nearest point of the body and turns as the body does there."""
         rows = np.zeros((len(places), len(self.points)))
         origins = self.points[self.elements[:, 0]]
         for row, place in zip(rows, np.asarray(places, dtype=float), strict=True):

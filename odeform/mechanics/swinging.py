@@ -166,7 +166,7 @@ class _Stepper:
         raise InputError(f"a step of {step:g} s finds no end: the body is too soft for its load, or the step too long")
 
     def _wrong(self, state: _State, guess: Floats, fresh: bool) -> tuple[Floats, Floats]:
-        """(R,) what the balance of forces misses where the step ends at a guess, and (P,) the products in its middle."""
+        """(R,) what the balance of forces misses if the step ends at a guess, and (P,) the middle's products."""
         body, step, viscous = self._body, self._step, self._loss.viscous
         rate = (guess - state.q) / step
         terms, slopes = body.terms(0.5 * (state.q + guess))

@@ -1,4 +1,6 @@
-"""A clamped body: formulas of beams, large rotation, nearly incompressible material, energy, and the order of its steps."""
+"""A clamped body: formulas of beams, large rotation, nearly incompressible material, energy, order of steps."""
+
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,8 +17,8 @@ AREA, BENDING = SIDE**2, YOUNG * SIDE**4 / 12.0
 TIP = np.array([[0.5 * SIDE, 0.5 * SIDE, LENGTH]])
 
 
-def beam_mesh(length: float = LENGTH, along: int = 10) -> QuadraticMesh:
-    return quadratic_mesh(*block(np.zeros(3), np.array([SIDE, SIDE, length]), (1, 1, along)))
+def beam_mesh(length: float = LENGTH, along: int = 12) -> QuadraticMesh:
+    return quadratic_mesh(*block(np.zeros(3), np.array([SIDE, SIDE, length]), (2, 2, along)))
 
 
 def beam(
@@ -32,6 +34,7 @@ def tip_of(body: ClampedBody, moved: np.ndarray) -> np.ndarray:
     return (body.mesh.rows_at(TIP) @ moved)[0]
 
 
+@cache
 def swinging(gravity: float = 2.0) -> tuple[ClampedBody, SwingingBody]:
     body = beam(gravity=gravity)
     return body, swinging_body(body, body.directions())
@@ -102,10 +105,12 @@ def test_held_nodes_stay_and_few_directions_suffice() -> None:
 def test_the_load_factor_moves_where_it_hangs() -> None:
     _, reduced = swinging()
     derivative = reduced.hanging(1.0)[1]
-    assert np.allclose((reduced.hanging(1.01)[0] - reduced.hanging(0.99)[0]) / 0.02, derivative, atol=1e-3 * np.abs(derivative).max())
+    assert np.allclose(
+        (reduced.hanging(1.01)[0] - reduced.hanging(0.99)[0]) / 0.02, derivative, atol=1e-3 * np.abs(derivative).max()
+    )
 
 
-@pytest.mark.parametrize("loss", [Loss(viscous=2e-3), Loss(lag=0.3, time=0.03)])
+@pytest.mark.parametrize("loss", [Loss(viscous=2e-2), Loss(lag=0.3, time=0.03)])
 def test_energy_is_lost_and_it_comes_to_rest(loss: Loss) -> None:
     _, reduced = swinging()
     hangs, _ = reduced.hanging()
@@ -137,8 +142,8 @@ def test_a_lag_stiffens_fast_motion_only() -> None:
 
 @pytest.mark.parametrize("loss", [Loss(viscous=2e-3), Loss(lag=0.3, time=0.03)])
 def test_steps_are_of_second_order(loss: Loss) -> None:
-    _, reduced = swinging()
-    ends = [reduced.release(0.2, step, loss).amplitudes[-1] for step in (4e-3, 2e-3, 1e-3)]
+    _, reduced = swinging(gravity=0.5)
+    ends = [reduced.release(0.2, step, loss).amplitudes[-1] for step in (2e-3, 1e-3, 5e-4)]
     order = np.log2(np.linalg.norm(ends[0] - ends[1]) / np.linalg.norm(ends[1] - ends[2]))
     assert abs(order - 2.0) < 0.2
 
@@ -146,7 +151,9 @@ def test_steps_are_of_second_order(loss: Loss) -> None:
 def test_stiffness_scales_without_a_new_body() -> None:
     body, reduced = swinging()
     directions = np.einsum("rni,r->ni", body.directions(), reduced.times_as_stiff(1.5).hanging()[0])
-    assert tip_of(body, directions) == pytest.approx(tip_of(body, body.with_young(1.5 * YOUNG).static()), rel=0.01, abs=1e-5)
+    assert tip_of(body, directions) == pytest.approx(
+        tip_of(body, body.with_young(1.5 * YOUNG).static()), rel=0.01, abs=1e-5
+    )
 
 
 def test_a_marker_beside_the_body_turns_with_it() -> None:
@@ -171,6 +178,6 @@ def test_materials_that_cannot_be_are_refused(young: float, poisson: float) -> N
         Stiffness(beam_mesh(along=1), young, poisson)
 
 
-def test_what_is_too_soft_is_refused() -> None:
-    with pytest.raises(InputError, match="too soft"):
-        beam(young=1e-2, gravity=1e4).static()
+def test_a_weight_below_zero_is_refused() -> None:
+    with pytest.raises(InputError, match="at least 0 kg"):
+        Weight(-1.0, TIP)
