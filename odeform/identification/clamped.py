@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import least_squares, root_scalar
 
 from odeform.errors import InputError
 from odeform.identification.release import Release
@@ -84,7 +84,8 @@ def static_young(body: ClampedBody, release: Release) -> float:
     width = np.log(BRACKET)
     if missing(guess - width) < 0.0 or missing(guess + width) > 0.0:
         raise InputError("no Young's modulus lets the body hang as it was measured; are its masses right?")
-    return float(np.exp(brentq(missing, guess - width, guess + width, xtol=1e-4)))
+    found = root_scalar(missing, bracket=(guess - width, guess + width), method="brentq", xtol=1e-4)
+    return float(np.exp(found.root))
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,7 @@ class ClampedBody:
 
     @cached_property
     def _mass(self) -> csc_matrix:
-        return kron(self.masses, eye(3), format="csc")
+        return csc_matrix(kron(self.masses, eye(3)))
 
     def modes(self, count: int) -> tuple[Floats, Float[np.ndarray, "modes nodes 3"]]:
         """(K,) squared angular frequencies of the `count` softest modes around the shape without stress, and (K, N, 3)
