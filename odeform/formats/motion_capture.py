@@ -36,11 +36,14 @@ class Capture:
     notes: tuple[str, ...]
 
 
-def read_c3d(data: bytes, where: str) -> Capture:
+def read_c3d(data: bytes, where: str, gaps: bool = False) -> Capture:
     """The markers in the bytes of a C3D file. Markers that are never seen are left out, as are angles and forces.
 
+    With `gaps`, a marker's coordinates are not a number in frames that lack it.
+
     Raises:
-        InputError: No C3D file, a damaged one, unknown units, or a marker that some frames lack; `where` leads.
+        InputError: No C3D file, a damaged one, unknown units, or, without `gaps`, a marker that some frames lack;
+            `where` leads.
     """
     if len(data) < 512 or data[1] != 0x50:
         raise InputError(f"{where}: expected a C3D file, whose second byte is 80, got {data[1:2].hex() or 'nothing'}")
@@ -66,14 +69,18 @@ def read_c3d(data: bytes, where: str) -> Capture:
         raise InputError(f"{where}: expected units {', '.join(METRES)} in POINT:UNITS, got {unit!r}")
     notes = [] if unit else ["no unit is given, taken as mm"]
     recorded = np.stack(frames)
-    kept = _seen(recorded, labels, computed, notes, where)
+    kept = _seen(recorded, labels, computed, notes, where, gaps)
     points = METRES[unit or "mm"] * recorded[:, kept, :3].astype(float)
+    points[recorded[:, kept, 3] < 0.0] = np.nan
     names = tuple(labels[index] for index in kept)
     return Capture(np.arange(len(points)) / rate, points, names, tuple(notes))
 
 
-def _seen(recorded: Floats, labels: list[str], computed: set[str], notes: list[str], where: str) -> list[int]:
-    """The markers that all frames have. The fourth number of a point is negative where it is not seen."""
+def _seen(
+    recorded: Floats, labels: list[str], computed: set[str], notes: list[str], where: str, gaps: bool
+) -> list[int]:
+    """The markers that all frames have, or with `gaps` some. The fourth number of a point is negative where it is not
+    seen."""
     seen = recorded[:, :, 3] >= 0.0
     markers = [index for index, label in enumerate(labels) if label not in computed]
     kept = [index for index in markers if seen[:, index].any()]
@@ -82,7 +89,7 @@ def _seen(recorded: Floats, labels: list[str], computed: set[str], notes: list[s
     if len(kept) < len(markers):
         names = [labels[index] for index in markers if index not in kept]
         notes.append(f"never seen and left out: {', '.join(names[:5])}{' …' if len(names) > 5 else ''}")
-    for index in kept:
+    for index in kept if not gaps else []:
         if lacking := np.flatnonzero(~seen[:, index]).tolist():
             raise InputError(
                 f"{where}: marker {labels[index]} is not seen in {len(lacking)} of {len(seen)} frames, first in frame "

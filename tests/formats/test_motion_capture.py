@@ -55,6 +55,15 @@ def test_what_is_no_position_is_left_out() -> None:
     ]
 
 
+def test_gaps_are_kept_where_they_are_asked_for() -> None:
+    points = moving()
+    points[2:4, 1, 3] = -1.0
+    read = read_c3d(capture(points), "a.c3d", gaps=True)
+    assert read.labels == tuple(NAMES)
+    assert np.isnan(read.points[2:4, 1]).all()
+    assert np.isfinite(np.delete(read.points, 1, axis=1)).all()
+
+
 def test_gaps_are_named() -> None:
     points = moving()
     points[2:4, 1, 3] = -1.0
