@@ -114,6 +114,7 @@ def simulate(
     objects: Sequence[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
     made_of: Mapping[str, Any] | None = None,
+    report: Callable[[int, int], None] = lambda done, count: None,
 ) -> Dataset:
     """Simulate `count` sequences of a scene into the folder `out`; an interrupted run is continued.
 
@@ -133,6 +134,7 @@ def simulate(
             depend on which others are simulated.
         ranges: Low and high of parameters by name, in their units, in place of the scene's.
         made_of: Says in the provenance what the bodies of a scene of one's own were made of.
+        report: Called with the number of sequences that are done, and of all, at the start and after each.
 
     Returns:
         The data set. Failed sequences stay in its index, with the reason as their status. Those that failed with
@@ -162,14 +164,22 @@ def simulate(
     provenance |= {"ranges": {name: list(ends) for name, ends in ranges.items()}} if ranges else {}
     provenance |= {"made_of": dict(made_of)} if made_of else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
-    return _complete(empty, entries, workers, partial(_one, simulate=known.simulate, rate=rate, step=step))
+    return _complete(empty, entries, workers, partial(_one, simulate=known.simulate, rate=rate, step=step), report)
 
 
-def _complete(empty: Dataset, entries: Sequence[Entry], workers: int, work: Callable[[Entry], bytes | str]) -> Dataset:
+def _complete(
+    empty: Dataset,
+    entries: Sequence[Entry],
+    workers: int,
+    work: Callable[[Entry], bytes | str],
+    report: Callable[[int, int], None],
+) -> Dataset:
     """Do the `work` for those of the plan `entries` that the folder of `empty` lacks; returns what it then holds."""
     index = _Index(empty, entries, finished(empty.root, entries, empty))
     left = [entry for entry in entries if entry.name not in index.done]
     progress = Progress(f"simulate {empty.schema.scene}", len(entries), done=len(entries) - len(left))
+    done = len(entries) - len(left)
+    report(done, len(entries))
     try:
         for place, found in as_completed(work, left, workers):
             if isinstance(found, str):
@@ -177,6 +187,8 @@ def _complete(empty: Dataset, entries: Sequence[Entry], workers: int, work: Call
             else:
                 entry = replace(left[place], sha256=save_encoded(empty.root, left[place].name, found))
             index.add(entry)
+            done += 1
+            report(done, len(entries))
             progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
     finally:
         progress.close()

@@ -1,19 +1,23 @@
 """Motions of a user's own shape: its solid, and a data set of what the simulator does with it."""
 
 import hashlib
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from odeform.dataset.folder import INDEX
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.simulation.objects.materials import material_of
+from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.objects.user_object import UserObject, object_name, read_user_object, write_user_object
 from odeform.simulation.runner import simulate
 from odeform.simulation.scenes.user_object import scene_with
 from odeform.types import Geometry
 
-__all__ = ["body_in", "simulate_shape"]
+__all__ = ["body_in", "digest", "simulate_item", "simulate_shape"]
 
 
 def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | None = None, **settings: Any) -> Dataset:
@@ -42,7 +46,34 @@ def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | N
     if body is None:
         body = _made(read_shape(geometry)[0], object_name(geometry), material, source)
         write_user_object(root, body)
-    made_of = {"geometry": path.name, "sha256": mark, "material": body.item.material.young, "like": body.like}
+    return _simulated(scene, body, root, **settings)
+
+
+def simulate_item(scene: str, item: SoftObject, like: str, out: str | Path, **settings: Any) -> Dataset:
+    """Simulate motions of a soft object that is made already, as `simulate_shape` does.
+
+    It rests first where the simulator has it rest. `InputError` for a folder with motions of another body.
+    """
+    from odeform.simulation.objects.settling import rested
+
+    root, source = Path(out), digest(item)
+    body = body_in(root, source)
+    if body is None:
+        body = UserObject(rested(replace(item, name=object_name(item.name))), like, source)
+        write_user_object(root, body)
+    return _simulated(scene, body, root, **settings)
+
+
+def digest(item: SoftObject) -> str:
+    """Returns a text that tells soft objects of other nodes or material apart."""
+    material = replace(item.material, source="")
+    about = f"{np.asarray(item.points, np.float32).tobytes().hex()} {item.elements.tolist()} {asdict(material)}"
+    return hashlib.sha256(about.encode()).hexdigest()[:16]
+
+
+def _simulated(scene: str, body: UserObject, root: Path, **settings: Any) -> Dataset:
+    material = body.item.material
+    made_of = {"source": body.source, "young_pa": material.young, "density": material.density, "like": body.like}
     return simulate(scene_with(scene, body.item), root, made_of=made_of, **settings)
 
 

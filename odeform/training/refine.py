@@ -42,6 +42,7 @@ def refine(
     seed: int = 0,
     resume: bool = False,
     report: Callable[[str], None] = print_line,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Predictor:
     """Refine a mechanical model for the body of a data set, and write it as a checkpoint whose object is that body.
 
@@ -57,6 +58,7 @@ def refine(
         seed: Seeds the choice of motions that contact parameters are fitted to.
         resume: Goes on with an interrupted refinement of which `OUT.part` is the state.
         report: Called with each line of progress; default: prints it to standard error.
+        progress: Called with the fraction of the minutes that is spent.
 
     Returns:
         The refined predictor. `predictor.checkpoint.provenance["refined"]` has the errors before and after on test
@@ -84,7 +86,9 @@ def refine(
     best: Checkpoint | None = None
 
     def remaining() -> float:
-        return 1.0 - (time.process_time() - begin) / (60.0 * LAST * minutes)
+        spent = (time.process_time() - begin) / (60.0 * LAST * minutes)
+        progress(min(spent, 1.0))
+        return 1.0 - spent
 
     with threadpool_limits(1, "blas"):  # threads of small products wait for each other
         for candidate in refinements(used, body.item, _starts(trained), known, remaining, seed, report):
