@@ -44,8 +44,7 @@ def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | N
     source = f"{mark}, {material or 'default material'}"
     body = body_in(root, source)
     if body is None:
-        body = _made(read_shape(geometry)[0], object_name(geometry), material, source)
-        write_user_object(root, body)
+        body = _kept(root, _made(read_shape(geometry)[0], object_name(geometry), material, source))
     return _simulated(scene, body, root, **settings)
 
 
@@ -59,8 +58,7 @@ def simulate_item(scene: str, item: SoftObject, like: str, out: str | Path, **se
     root, source = Path(out), digest(item)
     body = body_in(root, source)
     if body is None:
-        body = UserObject(rested(replace(item, name=object_name(item.name))), like, source)
-        write_user_object(root, body)
+        body = _kept(root, UserObject(rested(replace(item, name=object_name(item.name))), like, source))
     return _simulated(scene, body, root, **settings)
 
 
@@ -91,6 +89,14 @@ def body_in(root: Path, source: str | None = None) -> UserObject | None:
             "folder"
         )
     return body
+
+
+def _kept(root: Path, body: UserObject) -> UserObject:
+    """The body as the folder holds it: rounded, as a continued run reads it."""
+    write_user_object(root, body)
+    kept = read_user_object(root)
+    assert kept is not None
+    return kept
 
 
 def _made(geometry: Geometry, name: str, material: str | None, source: str) -> UserObject:

@@ -68,11 +68,15 @@ class Teaching:
         """Add the controls to the page's; `changed` is called where the columns have another model."""
         self._page, self._changed = page, changed
         self._job: Job | None = None
-        self._begin = self._seconds = 0.0
+        self._clicked = self._begin = 0.0  # s
         self._begun: int | None = None
         gui = page.server.gui
         self._count = gui.add_dropdown(
-            "motions", MOTIONS, initial_value=MOTIONS[1], visible=False, hint="pushes to simulate; more of them take longer"
+            "motions",
+            MOTIONS,
+            initial_value=MOTIONS[1],
+            visible=False,
+            hint="pushes to simulate; more of them take longer",
         )
         self._start = gui.add_button("Teach this shape", visible=False, hint=OFFER)
         self._start.on_click(serialized(self._teach))
@@ -120,7 +124,7 @@ class Teaching:
         except InputError as error:
             self._failed(str(error))
             return
-        self._begin, self._begun = time.monotonic(), None
+        self._clicked, self._begun = time.monotonic(), None
         args = (body.item, body.like, str(folder), count)
         self._run(Job(simulate_lessons, args, lambda _: self._refine(folder), self._failed, self._progress))
         self._say(f"Laying **{body.item.name}** on the simulator's floor...")
@@ -138,14 +142,14 @@ class Teaching:
         self.show(user_body_of(self._page.model.predictor))
 
     def _progress(self, lesson: Lesson) -> None:
-        if self._begun is None:
-            self._begun = lesson.simulated
+        if self._begun is None:  # laying it on the floor says nothing of how long a motion takes
+            self._begin, self._begun = time.monotonic(), lesson.simulated
         done = 0.5 * lesson.simulated / max(lesson.motions, 1) + 0.5 * lesson.spent
         self._bar.value = 100.0 * min(done, 1.0)
         self._say(describe_lesson(lesson, time.monotonic() - self._begin, self._begun))
 
     def _taught(self, folder: Path, found: tuple[float, float, float]) -> None:
-        minutes = (time.monotonic() - self._begin) / 60.0
+        minutes = (time.monotonic() - self._clicked) / 60.0
         try:
             name = str(folder / MODEL)
             refined = odeform.load(name)

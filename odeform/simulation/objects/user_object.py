@@ -2,6 +2,7 @@
 
 import json
 import re
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,5 +59,5 @@ def read_user_object(folder: Path) -> UserObject | None:
         with np.load(path, allow_pickle=False) as file:
             origin = json.loads(str(file["origin"]))
             return UserObject(object_of(file), str(origin["like"]), str(origin["source"]))
-    except (OSError, KeyError, ValueError, TypeError, EOFError) as error:
+    except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"soft object {path}: cannot be read ({error})") from None
