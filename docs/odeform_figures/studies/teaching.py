@@ -2,7 +2,7 @@
 
 Each folder is one that `odeform simulate contact-force --geometry FILE --out FOLDER` wrote, beside the refined model
 FOLDER.safetensors. Prints pooled errors in mm on the folder's test motions: of the first guess, of it without
-deformation, of the nearest trained object's motion, of the refined model, and of the truth itself, whose step is halved.
+deformation, of the nearest trained object's motion, of the refined model, and of the truth itself, with half the step.
 """
 
 import argparse
