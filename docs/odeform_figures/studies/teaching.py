@@ -72,7 +72,7 @@ def main() -> int:
     def work() -> None:
         rows = []
         print(
-            "| | like | displacement | first guess | rigid | nearest object | **refined** | truth, step halved | ratio |"
+            "| | like | displacement | first guess | rigid | nearest object | refined | truth, half the step | ratio |"
         )
         print("|---|---|---|---|---|---|---|---|---|")
         for folder in args.folders:
