@@ -52,8 +52,8 @@ def describe_user_body(body: UserBody) -> str:
 
 
 def user_body_of(predictor: Predictor | None) -> UserBody | None:
-    """The user's own body that a model moves; None for trained bodies."""
-    return predictor.user_body if isinstance(predictor, UserBodyPredictor) else None
+    """The user's own body that a model moves, taught or not; None for trained bodies."""
+    return predictor.user_body if isinstance(predictor, UserBodyPredictor | TaughtBodyPredictor) else None
 
 
 def simulated_item(predictor: Predictor | None, parameters: Mapping[str, Any]) -> SoftObject | None:

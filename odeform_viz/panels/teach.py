@@ -163,7 +163,8 @@ class Teaching:
             self._failed(str(error))
             return
         before, after, _ = found
-        self._say(describe_result(before, after, minutes, str(folder)))
+        shown = folder.relative_to(self._page.workspace.root)
+        self._say(describe_result(before, after, minutes, str(shown)))
         self.show(user_body_of(self._page.model.predictor))
         self._changed()
 

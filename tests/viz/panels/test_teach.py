@@ -17,7 +17,14 @@ from odeform_viz.columns import Column
 from odeform_viz.panels import teach
 from odeform_viz.panels.teach import describe_lesson, describe_result, lesson_folder
 from odeform_viz.runtime.jobs import Lesson, Report
-from odeform_viz.user_bodies import TaughtBodyPredictor, UserBody, UserBodyPredictor, with_user_body, without_user_body
+from odeform_viz.user_bodies import (
+    TaughtBodyPredictor,
+    UserBody,
+    UserBodyPredictor,
+    user_body_of,
+    with_user_body,
+    without_user_body,
+)
 from tests.soft_block import block_object
 
 View = tuple[App, LoopbackClient]
@@ -111,6 +118,7 @@ def test_the_refined_model_stands_beside_the_first_guess(view: View, tmp_path: P
     guess, refined = app.columns.all
     assert isinstance(guess.predictor, UserBodyPredictor)
     assert isinstance(refined.predictor, TaughtBodyPredictor)
+    assert user_body_of(refined.predictor) is user_body_of(guess.predictor)
     assert Path(refined.origin).is_relative_to(tmp_path)
     assert load(refined.origin).schema.objects == ("block",)
     assert client.until(lambda: (f := app.presenter.frame) is not None and len(f.columns) == 2)
