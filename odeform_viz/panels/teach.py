@@ -18,6 +18,7 @@ from odeform_viz.user_bodies import (
     refined_column,
     user_body_of,
 )
+from odeform_viz.view import DISTANCE
 
 __all__ = ["Teaching", "describe_lesson", "describe_result", "lesson_folder"]
 
@@ -49,7 +50,8 @@ def describe_lesson(lesson: Lesson, seconds: float, begun: int) -> str:
 
 
 def describe_result(before: float, after: float, minutes: float, folder: str) -> str:
-    """Says in Markdown what was reached: errors in mm on motions that were not learned, and the minutes spent."""
+    """Says in Markdown what was reached: errors in mm, as RMS distances on motions that were not learned, and the
+    minutes spent."""
     better = f"**{before:.2g} mm → {after:.2g} mm**"
     return (
         f"Taught in {minutes:.1f} minutes: error {better}, of the first guess and of the refined model, on simulated "
@@ -162,7 +164,7 @@ class Teaching:
         except InputError as error:
             self._failed(str(error))
             return
-        before, after, _ = found
+        before, after = (DISTANCE * error for error in found[:2])
         shown = folder.relative_to(self._page.workspace.root)
         self._say(describe_result(before, after, minutes, str(shown)))
         self.show(user_body_of(self._page.model.predictor))
