@@ -20,9 +20,9 @@ from odeform.simulation.objects.soft_object import SoftObject
 
 __all__ = ["refinements"]
 
-SEQUENCES = 24  # to which contact parameters are fitted; there are ten of them
-STARTS = 3  # trained objects from whose contact parameters a fit starts
-EVALUATIONS = 12  # of the errors and their derivatives, from each start
+SEQUENCES = 16  # to which contact parameters are fitted; there are ten of them
+STARTS = 2  # trained objects from whose contact parameters a fit starts
+EVALUATIONS = 8  # of the errors and their derivatives, from each start
 CONTACT = 0.6  # fraction of the time that contact parameters may take
 PRIOR = 0.01  # of a squared logarithm of a contact parameter, in squared relative errors
 FITTED = "fitted"
