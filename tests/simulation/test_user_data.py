@@ -88,7 +88,7 @@ def test_an_interrupted_simulation_goes_on_with_the_same_body(tmp_path: Path) ->
     assert body is not None
     first = again.read(again.entries[0])
     assert np.array_equal(first.vertices[0], body.item.rest_mesh().points)
-    assert np.abs(first.vertices[-1] - first.vertices[0]).max() > 1e-4, "it was pushed"
+    assert np.abs(first.vertices - first.vertices[0]).max() > 2e-4, "it was pushed"
 
 
 @pytest.mark.slow
