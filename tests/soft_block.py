@@ -7,6 +7,7 @@ import numpy as np
 from odeform.mechanics.body import ReducedBody, reduce_body, solid_of
 from odeform.mechanics.elasticity import ElasticModes, elastic_modes, tangent_stiffness
 from odeform.mechanics.warping import surface_turns
+from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
 from odeform.types import Floats, Ints, Points
 
 SIZE = np.array([0.12, 0.08, 0.06])  # m
@@ -70,3 +71,19 @@ def make_block() -> Block:
     turns = surface_turns(points[surface], number[faces], shapes.transpose(1, 2, 0))
     body = reduce_body(points[surface] - centre, number[faces], shapes, turns, modes.eigenvalues, solid)
     return Block(points, elements, masses, modes, body)
+
+
+def block_object(name: str = "block") -> SoftObject:
+    """The block as a soft object that a user could have brought, its inner nodes last, not yet settled."""
+    points, elements = grid()
+    faces = outside(elements, points)
+    surface = np.unique(faces)
+    order = np.concatenate([surface, np.setdiff1d(np.arange(len(points)), surface)])
+    number = np.argsort(order)
+    points = points[order]
+    elements = number[elements]
+    corners = points[elements]
+    mirrored = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0.0
+    elements[mirrored] = elements[mirrored][:, [0, 2, 1, 3]]
+    material = SoftMaterial(YOUNG, POISSON, DENSITY, 0.004, 0.6, "a block for tests")
+    return SoftObject(name, points, elements, number[faces].astype(np.int32), points, material, (1.0, 4.0), 0.06)

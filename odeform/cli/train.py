@@ -3,9 +3,11 @@
 import argparse
 
 from odeform.cli.options import DATA, add_seed, add_window, parse_window
+from odeform.errors import InputError
 
 __all__ = ["HELP", "add_options", "run"]
 
+MINUTES, REFINE = 30.0, 5.0
 HELP = "Train a model on a data set and score it on the test split"
 
 
@@ -16,6 +18,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", required=True, metavar="FILE", help="checkpoint to write")
     models = f"one of {', '.join(TRAINABLE)} (default: odeform)"
     parser.add_argument("--model", default="odeform", metavar="NAME", help=models)
+    parser.add_argument(
+        "--from",
+        dest="start",
+        metavar="CKPT",
+        help="refine this mechanical model (contact-force) for the shape of DATASET, which `odeform simulate "
+        "--geometry` made; takes --minutes (default: 5), --sequences, --seed and --resume",
+    )
     add_window(parser, "train on")
     parser.add_argument("--every", type=int, default=1, metavar="K", help="train on every K-th frame (default: 1)")
     parser.add_argument(
@@ -25,9 +34,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--minutes",
         type=float,
-        default=30.0,
         metavar="M",
-        help="training budget in minutes of processor time, including trials (default: 30)",
+        help=f"training budget in minutes of processor time, including trials (default: {MINUTES:g})",
     )
     parser.add_argument(
         "--steps", type=int, metavar="N", help="number of training steps, in place of --minutes; repeatable"
@@ -52,8 +60,28 @@ def run(args: argparse.Namespace) -> None:
     from odeform.dataset.store import open_dataset
     from odeform.training.train import train
 
+    if args.start is not None:
+        _refine(args)
+        return
+    args.minutes = MINUTES if args.minutes is None else args.minutes
     dataset, window = open_dataset(args.dataset), parse_window(args.window)
     options = ("minutes", "steps", "seed", "every", "stagger", "resume", "sequences")
     chosen = {name: getattr(args, name) for name in options}
     without = [name for name in args.without.split(",") if name]
     train(dataset, args.out, args.model, window=window, without=without, objects=args.object, **chosen)
+
+
+def _refine(args: argparse.Namespace) -> None:
+    from odeform.dataset.store import open_dataset
+    from odeform.training.refine import refine
+
+    unused = {"--model": args.model != "odeform", "--window": args.window, "--every": args.every != 1}
+    unused |= {"--stagger": args.stagger, "--steps": args.steps, "--without": args.without, "--object": args.object}
+    for option, given in unused.items():
+        if given:
+            raise InputError(
+                f"{option}: not with --from, which refines a mechanical model for the one shape of DATASET"
+            )
+    minutes = REFINE if args.minutes is None else args.minutes
+    options = {name: getattr(args, name) for name in ("sequences", "seed", "resume")}
+    refine(open_dataset(args.dataset), args.out, args.start, minutes=minutes, **options)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from odeform.progress import Progress
 from odeform.schema import OBJECT
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.plan import counts, finished, plan
+from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import MotionSequence
 
@@ -101,7 +103,7 @@ class _Index:
 
 
 def simulate(
-    scene: str,
+    scene: str | Scene,
     out: str | Path,
     count: int | None = None,
     seed: int = 0,
@@ -111,6 +113,8 @@ def simulate(
     corners: bool = False,
     objects: Sequence[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
+    made_of: Mapping[str, Any] | None = None,
+    report: Callable[[int, int], None] = lambda done, count: None,
 ) -> Dataset:
     """Simulate `count` sequences of a scene into the folder `out`; an interrupted run is continued.
 
@@ -118,7 +122,7 @@ def simulate(
     objects splits its data at random; beyond the scene's own count, further sequences are for training.
 
     Args:
-        scene: Name of a scene, for example "kick".
+        scene: Name of a scene, for example "kick", or a scene.
         out: Folder to write to: empty, or with a data set of the same arguments that is unfinished or shorter.
         count: Number of sequences, for each object of a scene with several; default: that of the scene's own data set.
         seed: Seeds the parameters that are drawn and the splits.
@@ -129,6 +133,8 @@ def simulate(
         objects: Names of the objects to simulate in a scene with several; default: all. The data of one object do not
             depend on which others are simulated.
         ranges: Low and high of parameters by name, in their units, in place of the scene's.
+        made_of: Says in the provenance what the bodies of a scene of one's own were made of.
+        report: Called with the number of sequences that are done, and of all, at the start and after each.
 
     Returns:
         The data set. Failed sequences stay in its index, with the reason as their status. Those that failed with
@@ -143,7 +149,7 @@ def simulate(
         >>> next(dataset.sequences("all")).vertices.shape
         (31, 402, 3)
     """
-    known, ranges = get_scene(scene), dict(ranges or {})
+    known, ranges = get_scene(scene) if isinstance(scene, str) else scene, dict(ranges or {})
     known = replace(known, schema=known.schema.with_ranges(ranges))
     count = known.count if count is None else count
     if count < 1 or workers < 1 or seed < 0 or not (rate is None or 0.0 < rate < math.inf):
@@ -153,18 +159,27 @@ def simulate(
     window = replace(known.schema.window, rate=rate)
     schema = replace(known.schema, window=window, surroundings=known.surroundings)
     asked = counts(known, count, objects)
-    provenance = {"scene": scene, "count": asked, "seed": seed, "rate_hz": rate, "step_s": step}
+    provenance = {"scene": schema.scene, "count": asked, "seed": seed, "rate_hz": rate, "step_s": step}
     provenance |= {"corners": True} if corners else {}
     provenance |= {"ranges": {name: list(ends) for name, ends in ranges.items()}} if ranges else {}
+    provenance |= {"made_of": dict(made_of)} if made_of else {}
     empty = Dataset(root, schema, (), folder_reader(root), known.fixed, provenance)
-    return _complete(empty, entries, workers, partial(_one, simulate=known.simulate, rate=rate, step=step))
+    return _complete(empty, entries, workers, partial(_one, simulate=known.simulate, rate=rate, step=step), report)
 
 
-def _complete(empty: Dataset, entries: Sequence[Entry], workers: int, work: Callable[[Entry], bytes | str]) -> Dataset:
+def _complete(
+    empty: Dataset,
+    entries: Sequence[Entry],
+    workers: int,
+    work: Callable[[Entry], bytes | str],
+    report: Callable[[int, int], None],
+) -> Dataset:
     """Do the `work` for those of the plan `entries` that the folder of `empty` lacks; returns what it then holds."""
     index = _Index(empty, entries, finished(empty.root, entries, empty))
     left = [entry for entry in entries if entry.name not in index.done]
     progress = Progress(f"simulate {empty.schema.scene}", len(entries), done=len(entries) - len(left))
+    done = len(entries) - len(left)
+    report(done, len(entries))
     try:
         for place, found in as_completed(work, left, workers):
             if isinstance(found, str):
@@ -172,6 +187,8 @@ def _complete(empty: Dataset, entries: Sequence[Entry], workers: int, work: Call
             else:
                 entry = replace(left[place], sha256=save_encoded(empty.root, left[place].name, found))
             index.add(entry)
+            done += 1
+            report(done, len(entries))
             progress.advance(note="" if entry.status == "ok" else f"{entry.name} failed: {entry.status}")
     finally:
         progress.close()

@@ -21,7 +21,7 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.panels.uploads import content_of, take_upload
 from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_user_body
-from odeform_viz.user_bodies import user_body_of
+from odeform_viz.user_bodies import simulated_item
 from odeform_viz.view import Description
 
 __all__ = ["TruthPanel", "entry_label", "physics_difference"]
@@ -181,14 +181,15 @@ class TruthPanel(Panel):
     def _simulate(self) -> None:
         try:
             parameters = self._schema.complete(self._page.controls.parameters())
+            item = simulated_item(self._page.model.predictor, parameters)
         except InputError as error:
             self._page.notices.show("Simulation not started", str(error))
             return
-        rate, body = OVERSAMPLING * self._schema.window.rate, user_body_of(self._page.model.predictor)
-        if body is None:
+        rate = OVERSAMPLING * self._schema.window.rate
+        if item is None:
             work, arguments = simulate_motion, (self._schema.scene, parameters, rate)
         else:
-            work, arguments = simulate_user_body, (self._schema.scene, body.item, parameters, rate)
+            work, arguments = simulate_user_body, (self._schema.scene, item, parameters, rate)
         with self._starting:
             if self._job is not None and self._job.running:
                 return

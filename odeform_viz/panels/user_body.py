@@ -6,9 +6,12 @@ from pathlib import Path
 import viser
 
 from odeform.errors import InputError
+from odeform.types import Geometry
 from odeform_viz.fitting import MOST_POINTS, readable_shape
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import LOCK, serialized
+from odeform_viz.panels.material import MaterialChoice
+from odeform_viz.panels.teach import Teaching
 from odeform_viz.panels.uploads import path_of, take_upload
 from odeform_viz.runtime.jobs import Job, make_user_body
 from odeform_viz.state import PageState
@@ -43,6 +46,8 @@ class UserBodyPanel(Panel):
             self._cancel.on_click(serialized(self._give_up))
             self._back = gui.add_button("Back to the trained bodies", color="gray", visible=False)
             self._back.on_click(serialized(self._go_back))
+            self._material = MaterialChoice(page, self._remake)
+            self._teaching = Teaching(page, page.columns_changed)
         self._show()
 
     @classmethod
@@ -55,23 +60,38 @@ class UserBodyPanel(Panel):
 
     def close(self) -> None:
         """Cancel the work in progress, if any."""
+        self._teaching.close()
         if self._job is not None and self._job.running:
             self._job.cancel()
 
     def load(self, path: str | Path, name: str, origin: str) -> None:
         """Make a body of a file in another process, and show it. `InputError` for a file that cannot be read."""
         geometry, _ = readable_shape(path)
+        self._make(geometry, name, origin)
+
+    def _make(self, geometry: Geometry, name: str, origin: str) -> None:
         with LOCK:
             self.close()
-            self._job = Job(make_user_body, (geometry, name), lambda body: self._made(body, origin), self._failed)
+            args = (geometry, name, self._material.value())
+            self._job = Job(make_user_body, args, lambda body: self._made(body, origin), self._failed)
             self._working(WORKING.format(name))
             self._job.start()
+
+    def _remake(self) -> None:
+        """Make the same shape of another material."""
+        body = user_body_of(self._page.model.predictor)
+        if body is None:
+            return
+        try:
+            self._make(body.fit.source, body.item.name, body.fit.origin)
+        except InputError as error:
+            self._failed(str(error))
 
     def _upload(self, file: viser.UploadedFile) -> None:
         try:
             with path_of(file) as path:
                 self.load(path, file.name, origin="")
-        except (InputError, OSError) as error:
+        except (InputError, OSError) as error:  # also of the material
             self._failed(str(error))
 
     def _made(self, body: UserBody, origin: str) -> None:
@@ -98,8 +118,10 @@ class UserBodyPanel(Panel):
 
     def _working(self, text: str) -> None:
         self._text.content, self._cancel.visible, self._load.visible = text, True, False
+        self._teaching.show(None)
 
     def _show(self) -> None:
         body = user_body_of(self._page.model.predictor)
         self._text.content = TRAINED if body is None else describe_user_body(body)
         self._back.visible, self._cancel.visible, self._load.visible = body is not None, False, True
+        self._teaching.show(body)

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,16 +27,20 @@ if TYPE_CHECKING:
 __all__ = [
     "JOB",
     "Job",
+    "Lesson",
     "Report",
     "fit_parameters",
     "make_figure",
     "make_user_body",
+    "refine_model",
+    "simulate_lessons",
     "simulate_motion",
     "simulate_user_body",
     "stability_image",
 ]
 
 JOB = "odeform-job"  # the name of the processes
+POLITE = 10  # added to the niceness of long work
 MAPPED = 13  # values of each parameter in a map; with more it takes minutes
 Report = Callable[[Any], None]
 """Called with the progress of the work: the fraction that is done, 0 to 1, or what else the work says it is."""
@@ -137,7 +142,7 @@ def _send_result(outbox: Connection, work: Callable[..., Any], args: tuple[Any, 
     except BrokenPipeError:
         raise
     except Exception as error:
-        outbox.send(("failed", f"{error}" if isinstance(error, InputError | RuntimeError) else f"{error!r}"))
+        outbox.send(("failed", f"{error}" if isinstance(error, InputError | RuntimeError | OSError) else f"{error!r}"))
     else:
         outbox.send(("done", result))
 
@@ -165,11 +170,90 @@ def simulate_user_body(
     return simulate_load(load, rested(item), parameters, rate, report=report, until=load.until)
 
 
-def make_user_body(_: Report, geometry: Geometry, name: str) -> Any:
-    """Makes a soft body of a shape (`UserBody`)."""
+def make_user_body(_: Report, geometry: Geometry, name: str, material: str | None = None) -> Any:
+    """Makes a soft body of a shape (`UserBody`), of a material as `material_of` reads it."""
     from odeform.models.modal.user_body import user_body
+    from odeform.simulation.objects.materials import material_of
 
-    return user_body(geometry, name)
+    return user_body(geometry, name, material=None if material is None else material_of(material))
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """How far the teaching of a body is."""
+
+    simulated: int
+    motions: int
+    """Of so many."""
+    spent: float = 0.0
+    """The fraction of the time for the refinement."""
+    line: str = ""
+    """What was last found."""
+
+
+def simulate_lessons(report: Report, item: Any, like: str, folder: str, count: int) -> int:
+    """Simulates `count` pushes of a soft object (`SoftObject`) into a folder, or what is left of them; returns how many
+    it then holds. Reports a `Lesson` after each."""
+    from odeform.simulation.user_data import simulate_item
+
+    _give_way()
+
+    def told(done: int, motions: int) -> None:
+        report(Lesson(done, motions))
+
+    dataset = simulate_item("contact-force", item, like, folder, count=count, report=told)
+    return len(dataset.select("all"))
+
+
+def refine_model(report: Report, start: str, folder: str, out: str, minutes: float) -> tuple[float, float, float]:
+    """Refines a model for the body of a folder, or goes on with it; returns the error of the first guess and that of
+    the refined model in mm on test motions, and the minutes of processor time that it took. Reports `Lesson`s."""
+    from odeform.dataset.store import open_dataset
+    from odeform.training.refine import refine
+
+    _give_way()
+    dataset = open_dataset(folder)
+    motions = len(dataset.select("all"))
+    line = ""
+
+    def said(text: str) -> None:
+        nonlocal line
+        line = text
+
+    def spent(fraction: float) -> None:
+        report(Lesson(motions, motions, fraction, line))
+
+    made = _finished(Path(out), start, len(dataset.select("train")))
+    if made is None:
+        resume = Path(f"{out}.part").exists()
+        options = {"minutes": minutes, "report": said, "progress": spent}
+        try:
+            found = refine(dataset, out, start, resume=resume, **options)
+        except InputError:
+            if not resume:
+                raise
+            # what was interrupted learned from fewer motions
+            found = refine(dataset, out, start, **options)
+        made = found.checkpoint.provenance
+    return made["refined"]["first_guess_mm"], made["refined"]["test_mm"], made["training_seconds"] / 60.0
+
+
+def _finished(out: Path, start: str, motions: int) -> dict[str, Any] | None:
+    """The provenance of a refinement of a model by so many motions, if it has ended."""
+    from odeform.checkpoint import read_checkpoint
+
+    if not out.exists():
+        return None
+    made = read_checkpoint(out).provenance
+    known = made.get("refined", {})
+    ended = "test_mm" in known and (known["from"], known["sequences"]) == (start, motions)
+    return made if ended else None
+
+
+def _give_way() -> None:
+    """Let the page have the processor first."""
+    if hasattr(os, "nice"):
+        os.nice(POLITE)
 
 
 def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoint, seen: Observation) -> Identification:

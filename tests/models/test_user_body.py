@@ -13,7 +13,7 @@ from odeform.geometry.similarity import Similarity
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.step import Projectile
 from odeform.models.modal.elastic_body import elastic_body
-from odeform.models.modal.training.fit import _checkpoint
+from odeform.models.modal.training.fit import checkpoint_of
 from odeform.models.modal.training.pushes import Pushes
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
 from odeform.models.per_object import PerObject, joined
@@ -37,7 +37,7 @@ def pushed(name: str) -> Pushes:
 def trained() -> PerObject:
     """A model of the donut, with the contact parameters as it is before training."""
     schema = replace(SCENE.schema, objects=("donut",))
-    part = _checkpoint(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE, 3e4)
+    part = checkpoint_of(schema, np.zeros((2, 6)), pushed("donut"), ContactParameters(), PULSE, 3e4)
     part = replace(part, config={**part.config, "largest": (0.5, 0.1)})
     return PerObject(joined(schema, {"donut": part}), model_class(part.model))
 

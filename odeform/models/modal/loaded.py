@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
+from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
 from odeform.loads.situation import Flight, Situation
 from odeform.mechanics.flat import parts_of, start_of
@@ -121,12 +122,18 @@ def _config(config: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _schema(schema: Schema, load: Load) -> Schema:
-    scene = get_scene(load.scene)
+    scene, around = get_scene(load.scene), schema.surroundings
+    surroundings = scene.surroundings
+    if surroundings.contacts is not None and around is not None and around.contacts is not None:
+        # bodies of the user's own are not in the scene
+        own = {name: tuple(STRONGER * force for force in ends) for name, ends in around.contacts.forces.items()}
+        contacts = replace(surroundings.contacts, forces={**own, **surroundings.contacts.forces})
+        surroundings = replace(surroundings, contacts=contacts)
     return replace(
         schema,
         scene=load.scene,
         parameters=load.parameters + tuple(p for p in schema.parameters if p.role == "body"),
         window=replace(load.window, reach=load.until / load.window.stop - 1.0),
         notes=load.notes,
-        surroundings=scene.surroundings,
+        surroundings=surroundings,
     )

@@ -142,12 +142,13 @@ def _check_orientation(item: SoftObject, nodes: Points) -> None:
 
 def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
     """`count` parameter sets of the object `name`; see `contact_draws`."""
-    return drawn_on(name, get_object(name).forces, count, seed)
+    item = get_object(name)
+    return drawn_on(item, item.forces, count, seed)
 
 
-def drawn_on(name: str, forces: tuple[float, float], count: int, seed: int) -> list[dict[str, Any]]:
-    """`count` contacts and forces on the object `name`, from the weakest to the strongest of `forces` in newton."""
-    drawn = contact_draws(get_object(name).rest_mesh(), forces, count, [seed, zlib.crc32(name.encode())])
+def drawn_on(item: SoftObject, forces: tuple[float, float], count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` contacts and forces on an object, from the weakest to the strongest of `forces` in newton."""
+    drawn = contact_draws(item.rest_mesh(), forces, count, [seed, zlib.crc32(item.name.encode())])
     return [
         {
             f"{key}_{axis}": float(x)
@@ -166,7 +167,9 @@ def glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
     strength, size = float(np.linalg.norm(force)), float(np.ptp(rest_points, axis=0).max())
     if strength == 0.0:
         return ()
-    strongest = get_object(parameters.get(OBJECT, OBJECTS[0])).forces[1]
+    name = parameters.get(OBJECT, OBJECTS[0])
+    # what is strong on a body of the user's own is not known here
+    strongest = get_object(name).forces[1] if name in OBJECTS else strength
     direction = force / strength
     vector = 0.4 * size * min(strength / strongest, 2.0) * direction
     return (Arrow(contact - 2.0 * RADIUS * direction - vector, vector, f"{strength:.1f} N", 0.0, PULSE),)

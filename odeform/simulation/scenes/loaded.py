@@ -69,7 +69,8 @@ def scene_of(load: Load) -> Scene:
         return simulate_load(load, get_object(parameters[OBJECT]), parameters, **options)
 
     def draw(name: str, count: int, seed: int) -> list[dict[str, Any]]:
-        return drawn_on(name, forces_of(get_object(name)), count, seed)
+        item = get_object(name)
+        return drawn_on(item, forces_of(item), count, seed)
 
     def glyphs(parameters: Parameters, points: Points) -> tuple[Arrow, ...]:
         if not {p.name for p in load.parameters} <= set(parameters):

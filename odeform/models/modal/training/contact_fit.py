@@ -1,6 +1,7 @@
 """The few numbers of the mechanics, fitted to training motions of all bodies at once."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -36,36 +37,53 @@ def fit_contact_parameters(
     names: Sequence[str] = NAMES,
     report: Callable[[str], None] = print,
     evaluations: int | None = None,
+    prior: float = 0.0,
+    needed: Callable[[ContactParameters], bool] = lambda _: True,
 ) -> ContactParameters:
     """Fits the contact parameters with the smallest squared relative errors over all bodies, by Gauss-Newton in
     logarithms.
 
     Rigid motion and deformation of each body count alike. Errors and their derivatives are evaluated `EVALUATIONS`
-    times, or as often as `evaluations` says.
+    times, or as often as `evaluations` says. `prior` weighs squared logarithms of what they differ by from `start`.
+
+    `needed` is told of the best ones so far at each evaluation; where it returns false, they are the result.
     """
     first = asdict(start)
 
     def contact_parameters(x: Floats) -> ContactParameters:
         return replace(start, **{name: first[name] * float(np.exp(v)) for name, v in zip(names, x, strict=True)})
 
+    least: tuple[float, Floats] = np.inf, np.zeros(len(names))
+
     def errors(x: Floats) -> Floats:
+        nonlocal least
+        if not needed(contact_parameters(least[1])):
+            raise _NotNeeded
         parts = [
             relative_errors(pushes, pushes.predicted(contact_parameters(x), pulse, STEP)).ravel() for pushes in bodies
         ]
-        return np.nan_to_num(np.concatenate(parts), nan=10.0, posinf=10.0, neginf=-10.0)
+        parts.append(np.sqrt(prior) * x)
+        found = np.nan_to_num(np.concatenate(parts), nan=10.0, posinf=10.0, neginf=-10.0)
+        least = min(least, (float(found @ found), x.copy()), key=lambda one: one[0])
+        return found
 
     limit = np.log(RANGE)
-    found = least_squares(
-        errors,
-        np.zeros(len(names)),
-        bounds=(-limit, limit),
-        diff_step=0.02,
-        max_nfev=evaluations or EVALUATIONS,
-        x_scale=0.3,
-    )
-    best = contact_parameters(found.x)
-    report(f"contact parameters: relative error {np.sqrt(2.0 * found.cost / len(bodies)):.3f}; {described(best)}")
+    with suppress(_NotNeeded):
+        least_squares(
+            errors,
+            np.zeros(len(names)),
+            bounds=(-limit, limit),
+            diff_step=0.02,
+            max_nfev=evaluations or EVALUATIONS,
+            x_scale=0.3,
+        )
+    best = contact_parameters(least[1])
+    report(f"contact parameters: relative error {np.sqrt(least[0] / len(bodies)):.3f}; {described(best)}")
     return best
+
+
+class _NotNeeded(Exception):
+    """Ends a fit before it has converged."""
 
 
 def described(contact_parameters: ContactParameters) -> str:

@@ -29,10 +29,19 @@ from odeform.parallel import as_completed
 from odeform.progress import Progress
 from odeform.schema import Schema
 from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.simulation.objects.soft_object import SoftObject
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Arrays, Floats
 
-__all__ = ["fit_mechanical", "train_modal", "with_measured_qualities"]
+__all__ = [
+    "checkpoint_of",
+    "fit_mechanical",
+    "inputs_of",
+    "train_modal",
+    "training_pushes",
+    "with_measured_qualities",
+    "with_qualities_of",
+]
 
 SEQUENCES = 8  # of each body, to which the contact parameters that all share are fitted; it has ten numbers
 BODY_SEQUENCES, DRAWS = 32, 2  # to which those of one body are, and how many such draws; the best are kept
@@ -82,7 +91,7 @@ def fit_mechanical(
     begin, pulse = time.process_time(), dataset.fixed["pulse_s"]
     each: dict[str, Pushes] = {}
     for name in dataset.objects:
-        each[name] = _training_pushes(dataset, name)
+        each[name] = training_pushes(dataset.of(name), get_object(name))
         pushes = each[name]
         report(
             f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.eigenvalues)} modes leave out "
@@ -96,7 +105,7 @@ def fit_mechanical(
     bodies = [
         _Body(
             schema_of([get_object(name)], dataset.of(name).schema),
-            {split: _inputs(dataset.of(name), split) for split in ("train", "val")},
+            {split: inputs_of(dataset.of(name), split) for split in ("train", "val")},
             pushes,
             read_pushes(dataset.of(name), "val", pushes.body),
             shared,
@@ -124,7 +133,7 @@ def fit_mechanical(
     return replace(whole, config={**whole.config, "val": {"seconds": spent}})
 
 
-def _inputs(dataset: Dataset, split: str) -> Floats:
+def inputs_of(dataset: Dataset, split: str) -> Floats:
     """(S, P) in [-1, 1]."""
     return np.array([dataset.schema.vector(entry.parameters) for entry in dataset.select(split)])
 
@@ -156,14 +165,14 @@ def _fitted(body: _Body) -> tuple[ContactParameters, Checkpoint, float]:
     residual = (
         fit_contact_residual(body.train, body.val, contact_parameters, body.pulse) if body.with_residual else None
     )
-    checkpoint = _checkpoint(
+    checkpoint = checkpoint_of(
         body.schema, body.theta["train"], body.train, contact_parameters, body.pulse, body.young, residual
     )
-    checkpoint = _with_qualities(checkpoint, body.theta["val"], body.val)
+    checkpoint = with_qualities_of(checkpoint, body.theta["val"], body.val)
     return contact_parameters, checkpoint, time.process_time() - begin
 
 
-def _with_qualities(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
+def with_qualities_of(checkpoint: Checkpoint, theta: Floats, val: Pushes) -> Checkpoint:
     """Chooses solver settings for the body of a checkpoint, by validation pushes of inputs `theta` (S, P).
 
     Each body has its own: what a solver error does to a motion depends on it.
@@ -180,7 +189,7 @@ def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:
     """
     parts = model.parts.items() if isinstance(model, PerObject) else ()
     asked = [
-        (part.checkpoint, _inputs(dataset.of(name), "val"), read_pushes(dataset.of(name), "val", part.body))
+        (part.checkpoint, inputs_of(dataset.of(name), "val"), read_pushes(dataset.of(name), "val", part.body))
         for name, part in parts
         if isinstance(part, ModalModel)
     ]
@@ -194,7 +203,7 @@ def with_measured_qualities(model: Predictor, dataset: Dataset) -> Checkpoint:
 
 
 def _measured(asked: tuple[Checkpoint, Floats, Pushes]) -> Checkpoint:
-    return _with_qualities(*asked)
+    return with_qualities_of(*asked)
 
 
 def _contact_parameters(body: _Body) -> ContactParameters:
@@ -220,16 +229,16 @@ def _contact_parameters(body: _Body) -> ContactParameters:
     return min([*own, body.shared], key=error)
 
 
-def _training_pushes(dataset: Dataset, name: str) -> Pushes:
-    """Keeps as many modes as the body's motions ask for."""
+def training_pushes(dataset: Dataset, item: SoftObject) -> Pushes:
+    """Reads the training motions of one object, with as many modes as they ask for."""
     few, many = MODES
-    pushes = read_pushes(dataset.of(name), "train", elastic_body(get_object(name), few))
+    pushes = read_pushes(dataset, "train", elastic_body(item, few))
     if pushes.fraction_left_out <= LEFT_OUT:
         return pushes
-    return read_pushes(dataset.of(name), "train", elastic_body(get_object(name), many))
+    return read_pushes(dataset, "train", elastic_body(item, many))
 
 
-def _checkpoint(
+def checkpoint_of(
     schema: Schema,
     theta: Floats,
     pushes: Pushes,

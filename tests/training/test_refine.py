@@ -1,0 +1,147 @@
+"""A model is refined for a body that it was not trained on, by simulated motions of it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import odeform
+from odeform.cli import main
+from odeform.dataset.index import Dataset
+from odeform.dataset.store import open_dataset
+from odeform.errors import InputError
+from odeform.geometry.shape import FittedShape
+from odeform.geometry.similarity import Similarity
+from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.taught_body import TaughtBodyPredictor, item_of, taught
+from odeform.models.modal.training import fit
+from odeform.models.modal.training import refine as refining
+from odeform.models.modal.user_body import UserBody, UserBodyPredictor
+from odeform.models.per_object import PerObject
+from odeform.models.registry import load
+from odeform.simulation.user_data import body_in, simulate_item
+from odeform.training import refine as refinement
+from odeform.training.refine import refine
+from tests.soft_block import block_object
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
+    """Twenty pushes of a block of 60 nodes."""
+    out = tmp_path_factory.mktemp("taught") / "block"
+    return simulate_item("contact-force", block_object(), "pillow", out, count=20, step=1e-3)
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit, "MODES", (60, 60))
+    monkeypatch.setattr(refining, "STARTS", 1)
+    monkeypatch.setattr(refining, "EVALUATIONS", 4)
+
+
+@pytest.fixture(scope="module")
+def refined(dataset: Dataset) -> PerObject:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "MODES", (60, 60))
+        patch.setattr(refining, "STARTS", 1)
+        patch.setattr(refining, "EVALUATIONS", 4)
+        found = refine(dataset, dataset.root / "model.safetensors", "contact-force", report=lambda _: None)
+    assert isinstance(found, PerObject)
+    return found
+
+
+def test_the_error_falls_to_less_than_half_of_the_first_guess(dataset: Dataset, refined: PerObject) -> None:
+    made = refined.checkpoint.provenance["refined"]
+    assert made["test_mm"] < 0.5 * made["first_guess_mm"]
+    assert refined.schema.objects == ("block",)
+    truth = next(dataset.sequences("test"))
+    moved = refined.solve(None, truth.parameters).vertices(truth.times)
+    rmse = 1e3 * float(np.sqrt(((moved - truth.vertices) ** 2).mean()))
+    assert rmse < 3.0 * made["test_mm"]
+    assert not (dataset.root / "model.safetensors.part").exists()
+
+
+def test_the_checkpoint_holds_the_body_that_can_be_simulated(dataset: Dataset, refined: PerObject) -> None:
+    body, item = body_in(dataset.root), item_of(refined, {"object": "block"})
+    assert body is not None
+    assert item is not None
+    assert np.array_equal(item.elements, body.item.elements)
+    assert np.abs(item.settled - body.item.settled).max() < 1e-7
+    assert refined.force_range({"object": "block"}) == body.item.forces
+    assert item_of(load("contact-force"), {"object": "donut"}) is None
+    kicked = refined.under("kick")
+    assert kicked.force_range({"object": "block"})[1] > body.item.forces[1]
+
+
+def test_it_moves_the_shape_that_the_body_was_made_of(refined: PerObject) -> None:
+    item = block_object()
+    rest = item.rest_mesh()
+    body = UserBody(item, elastic_body(item, 60), "pillow", FittedShape(rest, None, Similarity(), rest, None, 0.0))
+    assert taught(refined, body)
+    model = TaughtBodyPredictor(refined, body)
+    guess = UserBodyPredictor(load("contact-force"), body)
+    given = guess.complete(guess.parameters_like())
+    there = {name: given[name] for name in ("object", *(f"{kind}_{a}" for kind in ("contact", "force") for a in "xyz"))}
+    mine = model.solve(rest, there).vertices(0.1)
+    assert np.abs(mine - refined.solve(rest, {**there, "object": "block"}).vertices(0.1)).max() < 1e-6
+    with pytest.raises(InputError, match="was not taught"):
+        TaughtBodyPredictor(load("contact-force"), body)
+
+
+def test_what_ends_it_leaves_the_best_model_so_far_and_it_goes_on(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, kept, lines = tmp_path / "model.safetensors", [], []
+
+    def killed(path: Path, *found: Any) -> None:
+        kept.append(path)
+        keep(path, *found)
+        if len(kept) == 2:
+            raise OSError(28, "No space left on device")
+
+    keep = refinement._keep
+    monkeypatch.setattr(refinement, "_keep", killed)
+    with pytest.raises(OSError, match="No space left"):
+        refine(dataset, out, "contact-force", report=lambda _: None)
+    assert odeform.load(out).schema.objects == ("block",)
+    monkeypatch.setattr(refinement, "_keep", keep)
+
+    def again(*given: object, **more: object) -> None:
+        raise AssertionError("contact parameters are fitted already")
+
+    monkeypatch.setattr(refining, "fit_contact_parameters", again)
+    found = refine(dataset, out, "contact-force", resume=True, report=lines.append)
+    assert found.checkpoint.provenance["refined"]["test_mm"] > 0.0
+
+
+def test_no_time_still_makes_a_model(dataset: Dataset, tmp_path: Path) -> None:
+    spent: list[float] = []
+    out = tmp_path / "model.safetensors"
+    found = refine(dataset, out, "contact-force", minutes=1e-3, report=lambda _: None, progress=spent.append)
+    assert isinstance(found, PerObject)
+    assert spent[-1] == 1.0
+    part = next(iter(found.parts.values()))
+    assert getattr(part, "residual", None) is None, "no time was left to regress"
+
+
+@pytest.mark.parametrize(
+    ("data", "more", "expected"),
+    [
+        ("contact-force", "", "expected motions of a shape of your own"),
+        ("{block}", "--from kick", "knows its trained bodies only"),
+        ("{block}", "--model gp", "--model: not with --from"),
+        ("{block}", "--minutes 0", "minutes: expected a positive number"),
+        ("{block}", "--sequences 99", "sequences: expected 1 to 14, got 99"),
+    ],
+)
+def test_other_data_and_options_are_refused_in_one_line(
+    dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str], data: str, more: str, expected: str
+) -> None:
+    command = ["train", data.format(block=dataset.root), "--from", "contact-force", "--out", str(tmp_path / "x")]
+    assert main([*command, *more.split()]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert expected in error
+    assert open_dataset(dataset.root).entries
