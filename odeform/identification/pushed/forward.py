@@ -10,6 +10,8 @@ from odeform.errors import InputError
 from odeform.identification.pushed.state import BODY, FRICTION, PUSH, PushState
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
+from odeform.motion.base import Motion
+from odeform.motion.reduced_motion import as_reduced, moved_points, placements
 from odeform.schema import Parameter, Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
@@ -66,12 +68,18 @@ class Forward:
         sets = [{**self.named, **state.parameters()} for state in states]
         model = self._model_of(states[0])
         if len(sets) == 1:
-            return model.solve(None, sets[0], SETTINGS, self.until).vertices(self.times).astype(float)[None]
+            return self._surface(model.solve(None, sets[0], SETTINGS, self.until))[None]
         batch = {name: [one[name] for one in sets] for name in sets[0] if name not in self.named}
         for name in ("mass", "young"):
             batch[name] = batch[name][0]
         solved = model.solve_batch({**self.named, **batch}, quality=SETTINGS, until=self.until)
         return solved.vertices(self.times).astype(float)
+
+    def _surface(self, motion: Motion) -> Floats:
+        """(T, S, 3) m, without the check that it is plausible: guesses need none."""
+        reduced = as_reduced(motion)
+        y = reduced.trajectory.reduced(self.times)
+        return moved_points(reduced.evaluated, y, *placements(reduced.space, y, 0.0)).astype(float)
 
     def jet(self, state: PushState, free: Sequence[int]) -> tuple[Floats, Floats]:
         """The surface (T, S, 3) m and its slopes (F, T, S, 3) along the steps `free` of `PushState.stepped`.
