@@ -8,11 +8,13 @@ from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
+from odeform.identification.pushed.identify import identifies_pushes, recorded_points
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Parameters, Schema
+from odeform.schema import Parameters
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
-from odeform_viz.runtime.jobs import Job, fit_parameters
+from odeform_viz.runtime.jobs import Job, fit_parameters, fit_push
 
 __all__ = ["FitPanel", "describe_identification"]
 
@@ -24,14 +26,14 @@ NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
 
 
-def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
+def describe_identification(found: Identification, truth: Parameters) -> str:
     """Markdown of estimates with their 90 % intervals, beside the true parameters where they are known."""
     rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
-    for p in schema.learned:
-        one, true = found.parameters[p.name], truth.get(p.name)
+    for name, one in found.parameters.items():
+        true = truth.get(name)
         estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
         known = "" if true is None else f"{true:.3g}"
-        rows.append(f"| {p.name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
+        rows.append(f"| {name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
     explained = (
         "model and noise explain the motion"
         if found.misfit <= EXPLAINED
@@ -67,7 +69,7 @@ class FitPanel(Panel):
     @classmethod
     def needed(cls, page: Page) -> bool:
         predictor = page.model.predictor
-        return predictor is not None and not why_not_identifiable(predictor)
+        return predictor is not None and (identifies_pushes(predictor) or not why_not_identifiable(predictor))
 
     def close(self) -> None:
         """Cancel the search in progress, if any."""
@@ -98,6 +100,9 @@ class FitPanel(Panel):
             if truth is None or model.predictor is None or (self._job is not None and self._job.running):
                 return
             schema, predictor = self._page.schema, model.predictor
+            if identifies_pushes(predictor):
+                self._begin_push(predictor, truth, model)
+                return
             try:
                 # an azimuth that is not known is the sliders'
                 known = {**self._page.controls.parameters(), **truth.setting}
@@ -115,6 +120,19 @@ class FitPanel(Panel):
             self._page.controls.set_overlay(True)
             self._job = Job(fit_parameters, arguments, search.done, search.failed, search.progress)
             self._job.start()
+
+    def _begin_push(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
+        """Searches the body and the push of a recorded motion."""
+        named = {name: value for name, value in truth.setting.items() if isinstance(value, str)}
+        try:
+            seen = recorded_points(predictor, truth.sequence, named)
+        except InputError as error:
+            self._show(FAILED.format(error))
+            return
+        search = _Search(self._page, model, truth.setting, named, self._show)
+        self._show("starting", working=True)
+        self._job = Job(fit_push, (predictor, seen, named), search.done, search.failed, search.progress)
+        self._job.start()
 
     def _use_estimate(self) -> None:
         self._page.controls.set_parameters(self._found)
@@ -145,16 +163,17 @@ class _Search:
             return
         parameters, misfit = report
         self.misfits.append(f"{misfit:.3g}")
-        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items())
+        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items() if "_" not in name)
         steps = " → ".join(self.misfits[-6:])
         self.show(f"step {len(self.misfits)}: {values}  \nmisfit {steps}", working=True)
         self._place(parameters)
 
     def done(self, found: Identification) -> None:
         """Show the estimates."""
-        estimate = {name: one.value for name, one in found.parameters.items()}
+        known = self.page.schema.names  # friction has no slider
+        estimate = {name: one.value for name, one in found.parameters.items() if name in known}
         self._place(estimate)
-        text = describe_identification(found, self.page.schema, self.truth)
+        text = describe_identification(found, self.truth)
         self.show("\n\n".join(filter(None, (text, self.note, self.hidden))), {**self.fixed, **estimate})
 
     def failed(self, message: str) -> None:
@@ -163,7 +182,8 @@ class _Search:
 
     def _place(self, parameters: Parameters) -> None:
         """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
-        columns = self.page.columns
+        columns, names = self.page.columns, self.page.schema.names
+        parameters = {name: value for name, value in parameters.items() if name in names}
         column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True)
         mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
         if mine:

@@ -27,8 +27,9 @@ FRICTION_RANGE = 2.0  # factor by which friction may differ from that of the mod
 def pushed_model(predictor: Predictor, parameters: Parameters) -> ModalModel | None:
     """The model of the one body that parameters select, if it can be identified by pushes; otherwise None."""
     part = predictor.model_of(parameters) if predictor.schema.objects or parameters else predictor
-    known = isinstance(part, ModalModel) and part.load is None and set(part.own_values) == {"mass", "young"}
-    return part if known else None
+    if not isinstance(part, ModalModel) or part.load is not None or set(part.own_values) != {"mass", "young"}:
+        return None
+    return part
 
 
 class Forward:
@@ -42,15 +43,17 @@ class Forward:
         own = model.own_values
         self.ranges = (
             *(replace(ranges[name], low=own[name] / 2.0, high=own[name] * 2.0, default=own[name]) for name in own),
-            Parameter(FRICTION, "", self.friction / FRICTION_RANGE, self.friction * FRICTION_RANGE, self.friction, "log"),
+            Parameter(
+                FRICTION, "", self.friction / FRICTION_RANGE, self.friction * FRICTION_RANGE, self.friction, "log"
+            ),
         )
         self.until = float(times.max())
 
     def state(self, contact: Floats, force: Floats, body: Floats | None = None, strongest: float = 1.0) -> PushState:
         """The state of a push at `contact` (3,) m by `force` (3,) N on the body as it was measured, or on another."""
-        measured = np.zeros(len(BODY)) if body is None else np.asarray(body, dtype=float)
-        vectors = (np.asarray(vector, dtype=float) for vector in (contact, force))
-        return PushState(self.model.rest, self.ranges, strongest, measured, *vectors)
+        unit = np.zeros(len(BODY)) if body is None else np.asarray(body, dtype=float)
+        place, pull = (np.asarray(vector, dtype=float) for vector in (contact, force))
+        return PushState(self.model.rest, self.ranges, strongest, unit, place, pull)
 
     def _model_of(self, state: PushState) -> ModalModel:
         ratio = state.value(FRICTION) / self.friction
@@ -58,9 +61,7 @@ class Forward:
         if abs(ratio - 1.0) < 1e-9:
             return changed
         known = self.model.contact_parameters
-        rougher = replace(
-            known, floor_friction=ratio * known.floor_friction, push_friction=ratio * known.push_friction
-        )
+        rougher = replace(known, floor_friction=ratio * known.floor_friction, push_friction=ratio * known.push_friction)
         return changed.with_contact_parameters(rougher)
 
     def motions(self, states: Sequence[PushState]) -> Float[np.ndarray, "batch times points 3"]:

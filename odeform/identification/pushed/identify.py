@@ -9,14 +9,16 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.identify import Identification, Identified
-from odeform.identification.pushed.evidence import Evidence
+from odeform.identification.pushed.evidence import Evidence, Known
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.state import BODY, PUSH, PushState
+from odeform.identification.pushed.views import points_of, window_of
 from odeform.models.base import Predictor
-from odeform.types import Floats, Times
+from odeform.schema import OBJECT
+from odeform.types import Floats, MotionSequence, Times
 
-__all__ = ["INFLATION", "identify_push", "model_errors", "posterior_of"]
+__all__ = ["INFLATION", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
 
 INFLATION = 2.0
 """Errors of a model are alike from frame to frame, and mislead more than independent ones of the same size, by this
@@ -52,6 +54,22 @@ def identify_push(
     problem, start = _problem(predictor, evidence, given, errors_mm)
     found = search(problem, start, lambda state, misfit: progress(_values(state), misfit))
     return Identification(_identified(problem, found), found.misfit, time.perf_counter() - begin)
+
+
+def identifies_pushes(predictor: Predictor) -> bool:
+    """Whether `identify_push` knows a model: a mechanical one of pushed bodies that have a mass and a stiffness."""
+    named = dict(getattr(predictor, "parameters_like", dict)())
+    first = {OBJECT: predictor.schema.objects[0]} if predictor.schema.objects else {}
+    return pushed_model(predictor, named or first) is not None
+
+
+def recorded_points(predictor: Predictor, recorded: MotionSequence, named: Mapping[str, Any]) -> Known:
+    """Observes a recorded motion of the body that `named` selects. `InputError` where it is one of another surface."""
+    model = pushed_model(predictor, named)
+    if model is None or not np.array_equal(recorded.faces, model.rest.faces):
+        raise InputError("identify: expected a motion of the body that the model knows, vertex by vertex")
+    times, surface = window_of(recorded, model.schema.window.stop, model.schema.window.rate)
+    return points_of(times, surface, recorded.faces)
 
 
 def model_errors(predictor: Predictor, given: Mapping[str, Any], times: Times) -> Times:
@@ -112,16 +130,17 @@ def _identified(problem: Problem, found: Found) -> dict[str, Identified]:
             half = TWO_SIDED * float(np.sqrt(posterior[at, at]))
             narrow = TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
             unit, parameter = float(state.body[index]), problem.forward.ranges[index]
-            ends = (parameter.denormalise(float(np.clip(unit + side * half, -1.0, 1.0))) for side in (-1.0, 1.0))
-            out[name] = Identified(parameter.denormalise(unit), *ends, narrow, unit, half)
+            low, high = (parameter.denormalise(float(np.clip(unit + side * half, -1.0, 1.0))) for side in (-1.0, 1.0))
+            out[name] = Identified(parameter.denormalise(unit), low, high, narrow, unit, half)
     if len(BODY) in free:
         first = free.index(len(BODY))
-        pushed = slice(first, first + 2), slice(first + 2, first + PUSH)
-        spans = state.size * state.tangents, state.strongest * np.eye(3)
-        for kind, vector, rows, span, scale in zip(
-            ("contact", "force"), (state.contact, state.force), pushed, spans, (state.size, state.strongest), strict=True
-        ):
-            out |= _vector(kind, vector, span.T @ posterior[rows, rows] @ span, span.T @ alone[rows, rows] @ span, scale)
+        parts = (
+            ("contact", state.contact, slice(first, first + 2), state.size * state.tangents, state.size),
+            ("force", state.force, slice(first + 2, first + PUSH), state.strongest * np.eye(3), state.strongest),
+        )
+        for kind, vector, rows, span, scale in parts:
+            wide, narrow = (span.T @ covariance[rows, rows] @ span for covariance in (alone, posterior))
+            out |= _vector(kind, vector, narrow, wide, scale)
     return out
 
 

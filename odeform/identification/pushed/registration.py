@@ -1,4 +1,4 @@
-"""Finds where a camera stood from a cloud of the body at rest: turns are tried, and each is refined (point to plane)."""
+"""Finds where a camera stood from a cloud of the body at rest: turns are tried, each is refined (point to plane)."""
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -33,7 +33,9 @@ def cameras_of(cloud: Points, rest: Mesh, count: int, seed: int = 0) -> list[Cam
     return [camera for _, camera in sorted(longer, key=lambda one: one[0])[:count]]
 
 
-def _refined(camera: Camera, cloud: Points, surface: tuple[KDTree, Floats, Floats], rounds: int) -> tuple[float, Camera]:
+def _refined(
+    camera: Camera, cloud: Points, surface: tuple[KDTree, Floats, Floats], rounds: int
+) -> tuple[float, Camera]:
     tree, middles, normals = surface
     about = middles.mean(axis=0)
     for _ in range(rounds):

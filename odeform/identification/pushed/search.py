@@ -1,6 +1,6 @@
 """Finds the push and the body that explain an observation best: draws are compared, the best are refined."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.registration import cameras_of
 from odeform.identification.pushed.state import BODY, POSE, PUSH, Camera, PushState
 from odeform.simulation.contact_draws import contact_draws
-from odeform.types import Floats
+from odeform.types import Floats, Ints
 
 __all__ = ["PRIOR", "Found", "Problem", "search"]
 
@@ -23,6 +23,7 @@ PRIOR = 0.58
 FORCE_PRIOR = 1.0  # of each component, in strongest forces
 DRAWS, COMPARED, REFINED = 96, 5, 3  # pushes that are tried, frames on which, and how many are refined at most
 CAMERAS = 2
+APART = 0.3  # half extents between two places that are tried
 ROUNDS, CLOSE = 12, 1e-2  # squared standard deviations: converged if an undamped step is shorter
 DAMPING = (1e-2, 0.2, 6.0)  # initially; factor after an accepted step; after a rejected one
 LARGEST = 1e5
@@ -99,9 +100,7 @@ def _equations(problem: Problem, state: PushState, sloped: bool = True) -> _Equa
     compared = problem.evidence.compared(surface, slopes, state.camera)
     size = len(free) + (POSE if problem.camera_free else 0)
     information, score, cost, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
-    for frame, (values, rows, causes) in enumerate(
-        zip(compared.values, compared.slopes, compared.causes, strict=True)
-    ):
+    for frame, (values, rows, causes) in enumerate(zip(compared.values, compared.slopes, compared.causes, strict=True)):
         weighted = _weighted(problem, frame, causes, np.concatenate([rows, values[None]]).T)
         information += rows @ weighted[:, :-1]
         score += rows @ weighted[:, -1]
@@ -162,17 +161,26 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
     return None, np.inf
 
 
-def search(
-    problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None
-) -> Found:
+def search(problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None) -> Found:
     """Compares drawn pushes, if the push is unknown, and refines the best until one explains the observation."""
     found: list[Found] = []
     with threadpool_limits(1):  # products are small
-        for state in _starts(problem, start)[:REFINED]:
+        for state in _apart(_starts(problem, start))[:REFINED]:
             found.append(_refined(problem, state, progress))
-            if found[-1].misfit < EXPLAINED:
+            # under noise, places that are wrong explain a cloud nearly as well
+            if found[-1].misfit < EXPLAINED and len(found) >= (2 if problem.camera_free else 1):
                 break
     return min(found, key=lambda one: one.misfit)
+
+
+def _apart(states: list[PushState]) -> list[PushState]:
+    """Those that push elsewhere than all before, or are seen by another camera."""
+    kept: list[PushState] = []
+    for state in states:
+        near = [one for one in kept if one.camera is state.camera]
+        if all(np.linalg.norm(one.contact - state.contact) > APART * state.size for one in near):
+            kept.append(state)
+    return kept
 
 
 def _starts(problem: Problem, start: PushState) -> list[PushState]:
@@ -193,7 +201,7 @@ def _starts(problem: Problem, start: PushState) -> list[PushState]:
     return [state for _, state in sorted(ranked, key=lambda one: one[0])]
 
 
-def _distance(evidence: Evidence, surface: Floats, frames: Sequence[int] | Floats, camera: Camera) -> float:
+def _distance(evidence: Evidence, surface: Floats, frames: Ints, camera: Camera) -> float:
     """m^2 between an observation and a surface at some frames."""
     if isinstance(evidence, Known):
         known = np.einsum("nc,tnci->tni", evidence.barycentric, surface[:, evidence.faces[evidence.face]])

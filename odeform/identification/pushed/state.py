@@ -87,7 +87,7 @@ class PushState:
         return {**push, "mass": self.value("mass"), "young": self.value("young")}
 
     def stepped(self, step: Floats) -> "PushState":
-        """Returns the state after a step (8,), with `BODY` kept in its ranges. `InputError` where no sphere can push."""
+        """Returns the state after a step (8,), `BODY` kept in its ranges. `InputError` where no sphere can push."""
         body = np.clip(self.body + step[: len(BODY)], -1.0, 1.0)
         along = self.size * step[len(BODY) : len(BODY) + 2] @ self.tangents
         force = self.force + self.strongest * step[len(BODY) + 2 :]
