@@ -30,10 +30,14 @@ class Residuals:
 class Evidence(Protocol):
     """An observation of T frames."""
 
-    times: Times
-    noise_mm: float
-    camera_free: bool
-    faces: Faces
+    @property
+    def times(self) -> Times: ...
+
+    @property
+    def noise_mm(self) -> float: ...
+
+    @property
+    def camera_free(self) -> bool: ...
 
     def compared(self, surface: Frames, slopes: Floats, camera: Camera) -> Residuals:
         """Compares predicted surfaces (T, S, 3) m and their slopes (F, T, S, 3) m."""
@@ -44,7 +48,8 @@ def _causes(points: Floats, lever: float) -> Floats:
     """(N, 3) m -> (N, 3, 6): displacements by a shift and by a turn of 1 mm at `lever` m from the centre."""
     arms = points - points.mean(axis=0)
     turns = np.cross(np.eye(3)[None], arms[:, None]) / lever
-    return np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), turns.transpose(0, 2, 1)], axis=2)
+    shifts = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    return np.concatenate([shifts, turns.transpose(0, 2, 1).astype(float)], axis=2)
 
 
 def _lever(surface: Floats) -> float:

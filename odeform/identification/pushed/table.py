@@ -42,7 +42,7 @@ def identify_drawn(
             given = {OBJECT: name, **{key: state.value(key) for key in known}}
             errors = None if from_simulator else np.zeros(len(forward.times))
             rows.append(_row(name, state, identify_push(predictor, evidence, given, errors)))
-            progress.advance(1)
+            progress.advance(1, _note(rows[-1]))
     progress.close()
     names = [name for name in (*BODY, "contact", "force") if name not in known]
     return {
@@ -54,6 +54,11 @@ def identify_drawn(
         "parameters": {name: _scores(name, rows) for name in names},
         "rows": rows,
     }
+
+
+def _note(row: dict[str, Any]) -> str:
+    errors = ", ".join(f"{name} off by {one['error']:.3f}" for name, one in row["parameters"].items())
+    return f"{row['object']}: {errors}; {row['seconds']:.1f} s"
 
 
 def _row(name: str, state: PushState, found: Identification) -> dict[str, Any]:
