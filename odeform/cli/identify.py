@@ -34,6 +34,9 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
     pushed.add_argument("--simulated", action="store_true", help="the simulator moves them (default: the model itself)")
     pushed.add_argument("--cloud", action="store_true", help="observe --points of half of the surface in each frame, "
                         "without correspondence, from an unknown place (default: 200 points)")  # fmt: skip
+    pushed.add_argument(
+        "--next", action="store_true", help="count the pushes that halve the widest interval, the best against random"
+    )
     pushed.add_argument("--known", nargs="+", default=[], choices=("mass", "young", "friction"), metavar="NAME",
                         help="what is known of the body: mass, young or friction")  # fmt: skip
 
@@ -48,6 +51,7 @@ def run(args: argparse.Namespace) -> None:
         raise InputError("identify: expected either --data or --drawn")
     predictor = load(args.checkpoint)
     if args.drawn is not None:
+        from odeform.identification.pushed.halving import halve_drawn, report_halved
         from odeform.identification.pushed.table import identify_drawn, report_drawn
         from odeform.identification.pushed.views import CloudView
 
@@ -55,6 +59,11 @@ def run(args: argparse.Namespace) -> None:
         objects = args.object or predictor.schema.objects
         for name in objects:
             predictor.schema.check_object(name)
+        if args.next:
+            halved = halve_drawn(predictor, objects, args.drawn, args.noise, args.seed)
+            write_json(halved, args.json)
+            print(report_halved(halved))
+            return
         result = identify_drawn(predictor, objects, args.drawn, view, args.noise, args.seed, args.simulated, args.known)
         write_json(result, args.json)
         print(report_drawn(result))

@@ -19,9 +19,11 @@ from odeform_viz.runtime.jobs import Job, fit_parameters, fit_push
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
+NEXT = "the push that would narrow the widest interval of the body most"
 NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
+FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
 
@@ -54,6 +56,7 @@ class FitPanel(Panel):
         self._job: Job | None = None
         self._truth: RecordedMotion | None = None
         self._found: Parameters = {}
+        self._proposed: Parameters = {}
         gui = page.server.gui
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
@@ -63,6 +66,8 @@ class FitPanel(Panel):
             self._cancel.on_click(lambda _: self.close())
             self._use = gui.add_button("Set sliders to the estimate", color="gray", visible=False)
             self._use.on_click(lambda _: self._use_estimate())
+            self._next = gui.add_button("Set sliders to the next push", color="gray", visible=False, hint=NEXT)
+            self._next.on_click(lambda _: self._use_proposed())
         page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
         self._refresh()
 
@@ -88,10 +93,13 @@ class FitPanel(Panel):
             self.close()
             self._show("" if truth else NO_TRUTH)
 
-    def _show(self, text: str, found: Parameters | None = None, working: bool = False) -> None:
+    def _show(
+        self, text: str, found: Parameters | None = None, working: bool = False, proposed: Parameters | None = None
+    ) -> None:
         self._text.content, self._text.visible = text, bool(text)
         self._found = found or {}
-        self._use.visible = bool(found)
+        self._proposed = proposed or {}
+        self._use.visible, self._next.visible = bool(found), bool(proposed)
         self._start.visible, self._cancel.visible = not working, working
 
     def _begin(self) -> None:
@@ -134,6 +142,10 @@ class FitPanel(Panel):
         self._job = Job(fit_push, (predictor, seen, named), search.done, search.failed, search.progress)
         self._job.start()
 
+    def _use_proposed(self) -> None:
+        self._page.controls.set_parameters(self._proposed)
+        self._page.wake()
+
     def _use_estimate(self) -> None:
         self._page.controls.set_parameters(self._found)
         self._page.wake()
@@ -174,7 +186,10 @@ class _Search:
         estimate = {name: one.value for name, one in found.parameters.items() if name in known}
         self._place(estimate)
         text = describe_identification(found, self.truth)
-        self.show("\n\n".join(filter(None, (text, self.note, self.hidden))), {**self.fixed, **estimate})
+        proposed = {**self.fixed, **found.proposed} if found.proposed else {}
+        further = FURTHER.format(found.narrowed) if proposed else ""
+        lines = "\n\n".join(filter(None, (text, further, self.note, self.hidden)))
+        self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
 
     def failed(self, message: str) -> None:
         """Say why there are none."""

@@ -192,7 +192,7 @@ def fit_push(report: Report, predictor: Predictor, seen: "Evidence", known: dict
     """Estimates how a pushed body is made and how it was pushed; reports the parameters and misfit of each step."""
     from odeform.identification.pushed.identify import identify_push
 
-    return identify_push(predictor, seen, known, progress=lambda values, misfit: report((values, misfit)))
+    return identify_push(predictor, seen, known, progress=lambda *step: report(step), propose=True)
 
 
 def stability_image(report: Report, checkpoint: str) -> np.ndarray:

@@ -10,6 +10,7 @@ from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.identify import Identification, Identified
 from odeform.identification.pushed.evidence import Evidence, Known
+from odeform.identification.pushed.experiment import candidates, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.state import BODY, PUSH, PushState
@@ -20,6 +21,8 @@ from odeform.types import Floats, MotionSequence, Times
 
 __all__ = ["INFLATION", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
 
+CERTAIN = 1e-4
+"""Standard deviation of what is known of the body, in halves of its range."""
 INFLATION = 2.0
 """Errors of a model are alike from frame to frame, and mislead more than independent ones of the same size, by this
 factor; measured on validation motions of the seven objects (docs/identification.md)."""
@@ -31,6 +34,7 @@ def identify_push(
     known: Mapping[str, Any] | None = None,
     errors_mm: Times | None = None,
     progress: Callable[[dict[str, float], float], None] = lambda *_: None,
+    propose: bool = False,
 ) -> Identification:
     """Estimate how a pushed body is made and how it was pushed, all jointly, each with a 90 % interval.
 
@@ -41,6 +45,7 @@ def identify_push(
             push (`contact_x` to `contact_z` in m, `force_x` to `force_z` in N).
         errors_mm: (T,) how wrong the model is at the times of the evidence; by default as its error band says.
         progress: Called with the parameters and the misfit before each step; an exception that it raises ends it.
+        propose: Whether to look for the push that would tell most next.
 
     Returns:
         Estimates of `mass`, `young`, `friction`, and of the push where it is not known. A parameter whose interval
@@ -53,7 +58,11 @@ def identify_push(
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
     found = search(problem, start, lambda state, misfit: progress(_values(state), misfit))
-    return Identification(_identified(problem, found), found.misfit, time.perf_counter() - begin)
+    estimates, seconds = _identified(problem, found), time.perf_counter() - begin
+    if not propose or not set(problem.free) & set(range(len(BODY))):
+        return Identification(estimates, found.misfit, seconds)
+    proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
+    return Identification(estimates, found.misfit, time.perf_counter() - begin, proposed, narrowed)
 
 
 def identifies_pushes(predictor: Predictor) -> bool:
@@ -105,6 +114,18 @@ def _free(given: Collection[str]) -> tuple[int, ...]:
     if parts & set(given) and not parts <= set(given):
         raise InputError("identify: expected the whole push to be known, contact and force, or nothing of it")
     return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH)))
+
+
+def _proposed(problem: Problem, found: Found, forces: tuple[float, float]) -> tuple[dict[str, float], float]:
+    """The push that narrows the widest interval of the body most, and to which fraction. Keeps the estimated body."""
+    covariance = CERTAIN**2 * np.eye(len(BODY))
+    open_ = [index for index in problem.free if index < len(BODY)]
+    posterior = posterior_of(problem, found)[0]
+    covariance[np.ix_(open_, open_)] = posterior[: len(open_), : len(open_)]
+    errors = problem.errors_mm
+    pushes = candidates(problem.forward, found.state.body, forces, problem.evidence.noise_mm, errors)
+    best = pushes.best(covariance)
+    return pushes.states[best].parameters(), widest(pushes.after(covariance, best)) / widest(covariance)
 
 
 def _values(state: PushState) -> dict[str, float]:

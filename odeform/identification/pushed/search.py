@@ -9,14 +9,14 @@ from scipy.spatial import KDTree
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
-from odeform.identification.pushed.evidence import Cloud, Evidence, Known
+from odeform.identification.pushed.evidence import Cloud, Evidence, Known, Residuals
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.registration import cameras_of
 from odeform.identification.pushed.state import BODY, POSE, PUSH, Camera, PushState
 from odeform.simulation.contact_draws import contact_draws
 from odeform.types import Floats, Ints
 
-__all__ = ["PRIOR", "Found", "Problem", "search"]
+__all__ = ["PRIOR", "Found", "Problem", "information_of", "search"]
 
 PRIOR = 0.58
 """Standard deviation of each of `BODY` before anything is seen: that of a uniform draw from [-1, 1]."""
@@ -98,15 +98,21 @@ def _equations(problem: Problem, state: PushState, sloped: bool = True) -> _Equa
         surface = forward.motions([state])[0]
         slopes = np.zeros((len(free), *surface.shape))
     compared = problem.evidence.compared(surface, slopes, state.camera)
-    size = len(free) + (POSE if problem.camera_free else 0)
-    information, score, cost, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
-    for frame, (values, rows, causes) in enumerate(zip(compared.values, compared.slopes, compared.causes, strict=True)):
+    count = sum(len(values) for values in compared.values)
+    return _Equations(*information_of(problem, compared), count)
+
+
+def information_of(problem: Problem, compared: Residuals) -> tuple[Floats, Floats, float]:
+    """Returns the Fisher information (F + C, F + C), the score (F + C,) and the weighted sum of squares."""
+    size = len(compared.slopes[0])
+    information, score, cost = np.zeros((size, size)), np.zeros(size), 0.0
+    frames = zip(compared.values, compared.slopes, compared.causes, strict=True)
+    for frame, (values, rows, causes) in enumerate(frames):
         weighted = _weighted(problem, frame, causes, np.concatenate([rows, values[None]]).T)
         information += rows @ weighted[:, :-1]
         score += rows @ weighted[:, -1]
         cost += float(values @ weighted[:, -1])
-        count += len(values)
-    return _Equations(information, score, cost, count)
+    return information, score, cost
 
 
 def _prior_cost(problem: Problem, state: PushState) -> float:
