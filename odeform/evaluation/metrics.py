@@ -49,9 +49,8 @@ def evaluate(
         Scores by name: errors in mm (`rmse_mm`, `mae_mm`, `rmse_pooled_mm`, `vertex_mm`, ...) and ratios (`relative`,
         `deformation_relative`, `coverage_90`). Without a window, the impact of a scene is also scored as `impact`. In a
         scene with objects, `per_object` has the scores of each by name, and `mean_of_objects` their means.
-        `motions_covered_90` is the fraction of motions that stay within the error band at all frames, and
-        `motions_tenths` the same in tenths. `coverage_tenths` has, for each parameter, the fraction of frames within the error band in each tenth of the
-        sequences, sorted by that parameter.
+        `motions_covered_90` is the fraction of motions within the error band at all frames, and `motions_tenths` the
+        same in each tenth of the motions, sorted by each parameter; `coverage_tenths` has the fraction of frames there.
 
     Raises:
         InputError: Another scene, an empty split, or a window without frames to score.

@@ -1,7 +1,7 @@
 """What was observed of a pushed body, compared with predicted surfaces: points that are known, or clouds."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -27,6 +27,7 @@ class Residuals:
     """T of (R, 6): the residual of a body displaced by 1 mm along or about each axis."""
 
 
+@runtime_checkable
 class Evidence(Protocol):
     """An observation of T frames."""
 

@@ -29,7 +29,7 @@ Covariance = Float[np.ndarray, "body body"]
 class Candidates:
     """Pushes that could be made next, and what each would tell."""
 
-    states: list[PushState]
+    states: Sequence[PushState]
     informations: Float[np.ndarray, "pushes body body"]
     """About `BODY`, in halves of their ranges."""
 
@@ -39,7 +39,7 @@ class Candidates:
 
     def best(self, covariance: Covariance) -> int:
         """Returns the push after which the widest interval of the body is expected to be narrowest."""
-        return int(np.argmin([widest(self.after(covariance, index)) for index in range(len(self.states))]))
+        return int(np.argmin([widest(self.after(covariance, index)) for index in range(len(self.informations))]))
 
 
 def widest(covariance: Covariance) -> float:
