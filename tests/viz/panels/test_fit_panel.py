@@ -128,7 +128,7 @@ def test_what_is_not_determined_is_not_given_as_a_number() -> None:
 
 
 def test_models_that_cannot_be_fitted_have_no_panel(serve) -> None:
-    predictor = load("contact-force")
+    predictor = load("contact-force/gp")
     app, client = serve(Column("odeform", predictor, predictor.rest))
     assert START not in client.controls
     assert not any(isinstance(panel, FitPanel) for panel in app.page.panels)
