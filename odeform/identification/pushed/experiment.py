@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.pushed.evidence import Known
 from odeform.identification.pushed.forward import BODY_STEP, Forward
@@ -57,6 +58,10 @@ def candidates(
     drawn = contact_draws(forward.model.rest, forces, COUNT, [seed, 2])
     states = [forward.state(contact, force, body, forces[1]) for contact, force in drawn]
     inward = [-BODY_STEP if unit + BODY_STEP > 1.0 else BODY_STEP for unit in body]
+    bodies = [body, *(body + np.diag(inward))]
+    states = [state for state in states if all(_fits(forward, replace(state, body=each)) for each in bodies)]
+    if not states:
+        raise InputError("identify: no push of this body was found")
     base = forward.motions(states)
     slopes = []
     for index, step in enumerate(inward):
@@ -68,6 +73,14 @@ def candidates(
         problem = Problem(forward, evidence, errors_mm, tuple(range(len(BODY))))
         informations.append(information_of(problem, evidence.compared(row, changes, states[0].camera))[0])
     return Candidates(states, np.stack(informations))
+
+
+def _fits(forward: Forward, state: PushState) -> bool:
+    try:
+        forward.check(state)
+    except InputError:
+        return False
+    return True
 
 
 def until_halved(found: Candidates, covariance: Covariance, order: Sequence[int] | None, most: int = 20) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.errors import InputError
+from odeform.geometry.contact import checked_contact, nearest_on
 from odeform.identification.pushed.state import BODY, FRICTION, PUSH, PushState
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
@@ -99,15 +100,22 @@ class Forward:
                 slopes[index] = (self.motions([ahead])[0] - base) / length
         return base, np.stack([slopes[index] for index in free])
 
-    @staticmethod
-    def _step(state: PushState, index: int) -> tuple[PushState, float]:
+    def check(self, state: PushState) -> None:
+        """`InputError` where the sphere does not fit once the body has settled: a softer one lies lower."""
+        settled = self._model_of(state).settled(state.parameters())
+        place = nearest_on(self.model.rest, state.contact).moved(settled.points, settled.faces)
+        checked_contact(settled, place, state.force)
+
+    def _step(self, state: PushState, index: int) -> tuple[PushState, float]:
         length = BODY_STEP if index < len(BODY) else CONTACT_STEP if index < len(BODY) + 2 else FORCE_STEP
         inward = index < len(BODY) and state.body[index] + length > 1.0
         for signed in (-length,) if inward else (length, -length):
             step = np.zeros(len(BODY) + PUSH)
             step[index] = signed
             try:
-                return state.stepped(step), signed
+                stepped = state.stepped(step)
+                self.check(stepped)
+                return stepped, signed
             except InputError:
                 continue
         return state, length

@@ -161,6 +161,7 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
     for half in (1.0, 0.5, 0.25):
         try:
             moved = _moved(problem, state, half * step)
+            problem.forward.check(moved)
         except InputError:
             continue
         return moved, _equations(problem, moved, sloped=False).cost + _prior_cost(problem, moved)
