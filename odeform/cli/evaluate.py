@@ -28,7 +28,6 @@ COLUMNS = (
     "relative",
     "deformation_relative",
     "off_grid_rmse_mm",
-    "motions_covered_90",
 )
 
 
