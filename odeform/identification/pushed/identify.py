@@ -25,7 +25,7 @@ CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
 INFLATION = 2.0
 """Errors of a model are alike from frame to frame, and mislead more than independent ones of the same size, by this
-factor; measured on validation motions of the seven objects (docs/identification.md)."""
+factor: a guess, which no motions were used to calibrate (docs/identification.md)."""
 
 
 def identify_push(
