@@ -8,6 +8,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.errors import InputError
+from odeform.evaluation.bootstrap import mean_interval
 from odeform.evaluation.scores import Comparison, Mask, Scores, mean_of
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
@@ -48,8 +49,8 @@ def evaluate(
         Scores by name: errors in mm (`rmse_mm`, `mae_mm`, `rmse_pooled_mm`, `vertex_mm`, ...) and ratios (`relative`,
         `deformation_relative`, `coverage_90`). Without a window, the impact of a scene is also scored as `impact`. In a
         scene with objects, `per_object` has the scores of each by name, and `mean_of_objects` their means.
-        `coverage_tenths` has, for each parameter, the fraction of frames within the error band in each tenth of the
-        sequences, sorted by that parameter.
+        `motions_covered_90` is the fraction of motions within the error band at all frames, and `motions_tenths` the
+        same in each tenth of the motions, sorted by each parameter; `coverage_tenths` has the fraction of frames there.
 
     Raises:
         InputError: Another scene, an empty split, or a window without frames to score.
@@ -72,20 +73,26 @@ def evaluate(
     scores = {name: Scores() for name in spans}
     objects: dict[str, Scores] = {}
     covered: list[tuple[dict[str, Any], float]] = []
+    whole: list[float] = []
     for recorded in dataset.sequences(split):
         compared = _compared(predictor, dataset, recorded, quality, clock, spans)
         for name, comparison in compared.items():
             scores[name].add(*comparison)
         covered.append((recorded.parameters, _fraction_covered(*compared["whole"])))
+        whole.append(float(covered[-1][1] >= 1.0) if np.isfinite(covered[-1][1]) else np.nan)
         if body := recorded.parameters.get(OBJECT):
             objects.setdefault(body, Scores()).add(*compared["whole"])
     result = scores["whole"].result()
     result |= {name: scored.result() for name, scored in scores.items() if name != "whole"}
     result["per_object"] = {name: scored.result() for name, scored in objects.items()}
     if objects:
-        result["mean_of_objects"] = mean_of(list(result["per_object"].values()))
+        mean = mean_of(list(result["per_object"].values()))
+        mean["rmse_pooled_95"] = mean_interval([scored.motions for scored in objects.values()])
+        result["mean_of_objects"] = mean
     result["parameters"] = _learned_numbers(predictor)
     result["coverage_tenths"] = _tenths(covered)
+    result["motions_covered_90"] = None if np.isnan(whole).any() else float(np.mean(whole))
+    result["motions_tenths"] = _tenths([(row, inside) for (row, _), inside in zip(covered, whole, strict=True)])
     return result
 
 

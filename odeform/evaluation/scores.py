@@ -13,6 +13,7 @@ from jaxtyping import Float
 from numpy.typing import NDArray
 
 from odeform.errors import InputError
+from odeform.evaluation.bootstrap import Motions, pooled_interval
 from odeform.geometry.rigid import best_rigid
 from odeform.types import Floats, Frames, MotionSequence, Perpoint, Points
 
@@ -23,7 +24,7 @@ Comparison = tuple[Frames, MotionSequence, Mask, Mask, Floats]
 """The arguments of `Scores.add`."""
 AVERAGED = (
     *("rmse_mm", "mae_mm", "mse_mm2", "rmse_pooled_mm", "mae_pooled_mm", "mse_pooled_mm2", "vertex_mm"),
-    *("relative", "deformation_relative", "off_grid_rmse_mm", "coverage_90"),
+    *("relative", "deformation_relative", "off_grid_rmse_mm", "coverage_90", "median_mm"),
 )
 
 
@@ -47,6 +48,11 @@ class Scores:
         self._moved: list[Floats] = []
         self._covered: list[Floats] = []
         self._residual = self._reference = 0.0
+
+    @property
+    def motions(self) -> Motions:
+        """Sums of squares in mm^2 over the frames of each motion, and the numbers of its frames."""
+        return np.array([row.sum() for row in self._mse]), np.array([float(len(row)) for row in self._mse])
 
     def add(
         self,
@@ -81,19 +87,26 @@ class Scores:
         self._reference += float(size[large].sum())
 
     def result(self) -> dict[str, Any]:
-        """All scores by name, in millimetres or as ratios; `off_grid_rmse_mm` is the pooled RMSE between the trained
-        frames, None without any. `InputError` if nothing was added."""
+        """All scores by name, in millimetres or as ratios. `InputError` if nothing was added.
+
+        `off_grid_rmse_mm` is the pooled RMSE between the trained frames, None without any; `rmse_pooled_95` the 95 %
+        bootstrap interval of `rmse_pooled_mm`; `motions_mm` the RMSE of each motion, and `median_mm` its median.
+        """
         if not self._mse:
             raise InputError("evaluate: expected at least one sequence")
         mse, mae, between = (np.concatenate(rows) for rows in (self._mse, self._mae, self._between))
         pooled, moved = float(np.sqrt(mse.mean())), float(np.sqrt(np.concatenate(self._moved).mean()))
         covered = np.concatenate(self._covered)
         even = len({len(row) for row in self._mse}) == 1
+        single = [float(np.sqrt(row.mean())) for row in self._mse]
         return {
             "rmse_mm": float(np.sqrt(mse).mean()),
             "mae_mm": float(mae.mean()),
             "mse_mm2": float(mse.mean()),
             "rmse_pooled_mm": pooled,
+            "rmse_pooled_95": pooled_interval(self.motions),
+            "median_mm": float(np.median(single)),
+            "motions_mm": single,
             "mae_pooled_mm": float(mae.mean()),
             "mse_pooled_mm2": float(mse.mean()),
             "vertex_mm": float(np.concatenate(self._distance).mean()),
@@ -106,7 +119,7 @@ class Scores:
         }
 
 
-def mean_of(results: Sequence[Mapping[str, Any]]) -> dict[str, float | None]:
+def mean_of(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """The mean of each score over several results, each with equal weight; None for a score that one of them lacks."""
     rows = {name: [result[name] for result in results] for name in AVERAGED}
     return {name: None if None in row else float(np.mean(row)) for name, row in rows.items()}

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,11 +48,16 @@ class Identification:
         parameters: Estimates by name.
         misfit: Mean square residual relative to its expectation; at most 1 where model and noise explain the data.
         seconds: Elapsed time.
+        proposed: Parameters of the next experiment, which would narrow the widest interval most; empty where none was
+            asked for.
+        narrowed: Half the width that this interval is expected to have afterwards, relative to that it has now.
     """
 
     parameters: dict[str, Identified]
     misfit: float
     seconds: float
+    proposed: dict[str, float] = field(default_factory=dict)
+    narrowed: float = 1.0
 
 
 def identify(

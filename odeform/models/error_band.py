@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from odeform.models.conformal import SCORES, conformal_factor
 from odeform.models.continuation import LATER_ERRORS
 from odeform.types import Arrays, Floats, Times
 
@@ -35,13 +36,15 @@ class ErrorBand:
     ranges it grows as errors on simulations there did (`OUTSIDE`); without these, it doubles with each `width`. Beyond
     the window it grows in proportion to the time, or as the errors of the continuation did when it predicted the last
     third of the window, if that is more; after as long as that, with the square of the time that they were predicted
-    for.
+    for. Where a checkpoint has scores of whole motions (`odeform.models.conformal`), the upper quantile is widened or
+    narrowed so that `NOMINAL` of them stay within it at all times.
     """
 
     def __init__(self, arrays: Arrays) -> None:
         """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
         self._growth = arrays.get(OUTSIDE)
+        self._whole = conformal_factor(arrays.get(SCORES, np.zeros(0)).astype(float), NOMINAL) or 1.0
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
@@ -84,7 +87,9 @@ class ErrorBand:
             [np.interp(frames, leads, np.concatenate([[0.0], column])) for column in self._later.T], axis=1
         )
         later *= (np.maximum(frames / leads[-1], 1.0) ** 2)[:, None]
-        return np.where(times[:, None] > 0.0, np.maximum(grown, later), 0.0)
+        band = np.where(times[:, None] > 0.0, np.maximum(grown, later), 0.0)
+        # nine in ten are not fewer than half
+        return np.stack([band[:, 0], np.maximum(self._whole * band[:, 1], band[:, 0])], axis=1)
 
 
 def excess_of(theta: Float[np.ndarray, "*batch parameters"]) -> Float[np.ndarray, "*batch 2 parameters"]:

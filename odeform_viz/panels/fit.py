@@ -8,30 +8,34 @@ from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
+from odeform.identification.pushed.identify import identifies_pushes, recorded_points
+from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Parameters, Schema
+from odeform.schema import Parameters
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
-from odeform_viz.runtime.jobs import Job, fit_parameters
+from odeform_viz.runtime.jobs import Job, fit_parameters, fit_push
 
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
+NEXT = "the push that would narrow the widest interval of the body most"
 NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
+FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
 
 
-def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
+def describe_identification(found: Identification, truth: Parameters) -> str:
     """Markdown of estimates with their 90 % intervals, beside the true parameters where they are known."""
     rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
-    for p in schema.learned:
-        one, true = found.parameters[p.name], truth.get(p.name)
+    for name, one in found.parameters.items():
+        true = truth.get(name)
         estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
         known = "" if true is None else f"{true:.3g}"
-        rows.append(f"| {p.name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
+        rows.append(f"| {name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
     explained = (
         "model and noise explain the motion"
         if found.misfit <= EXPLAINED
@@ -52,6 +56,7 @@ class FitPanel(Panel):
         self._job: Job | None = None
         self._truth: RecordedMotion | None = None
         self._found: Parameters = {}
+        self._proposed: Parameters = {}
         gui = page.server.gui
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
@@ -61,13 +66,15 @@ class FitPanel(Panel):
             self._cancel.on_click(lambda _: self.close())
             self._use = gui.add_button("Set sliders to the estimate", color="gray", visible=False)
             self._use.on_click(lambda _: self._use_estimate())
+            self._next = gui.add_button("Set sliders to the next push", color="gray", visible=False, hint=NEXT)
+            self._next.on_click(lambda _: self._use_proposed())
         page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
         self._refresh()
 
     @classmethod
     def needed(cls, page: Page) -> bool:
         predictor = page.model.predictor
-        return predictor is not None and not why_not_identifiable(predictor)
+        return predictor is not None and (identifies_pushes(predictor) or not why_not_identifiable(predictor))
 
     def close(self) -> None:
         """Cancel the search in progress, if any."""
@@ -86,10 +93,13 @@ class FitPanel(Panel):
             self.close()
             self._show("" if truth else NO_TRUTH)
 
-    def _show(self, text: str, found: Parameters | None = None, working: bool = False) -> None:
+    def _show(
+        self, text: str, found: Parameters | None = None, working: bool = False, proposed: Parameters | None = None
+    ) -> None:
         self._text.content, self._text.visible = text, bool(text)
         self._found = found or {}
-        self._use.visible = bool(found)
+        self._proposed = proposed or {}
+        self._use.visible, self._next.visible = bool(found), bool(proposed)
         self._start.visible, self._cancel.visible = not working, working
 
     def _begin(self) -> None:
@@ -98,6 +108,9 @@ class FitPanel(Panel):
             if truth is None or model.predictor is None or (self._job is not None and self._job.running):
                 return
             schema, predictor = self._page.schema, model.predictor
+            if identifies_pushes(predictor):
+                self._begin_push(predictor, truth, model)
+                return
             try:
                 # an azimuth that is not known is the sliders'
                 known = {**self._page.controls.parameters(), **truth.setting}
@@ -115,6 +128,23 @@ class FitPanel(Panel):
             self._page.controls.set_overlay(True)
             self._job = Job(fit_parameters, arguments, search.done, search.failed, search.progress)
             self._job.start()
+
+    def _begin_push(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
+        """Searches the body and the push of a recorded motion."""
+        named = {name: value for name, value in truth.setting.items() if isinstance(value, str)}
+        try:
+            seen = recorded_points(predictor, truth.sequence, named)
+        except InputError as error:
+            self._show(FAILED.format(error))
+            return
+        search = _Search(self._page, model, truth.setting, named, self._show)
+        self._show("starting", working=True)
+        self._job = Job(fit_push, (predictor, seen, named), search.done, search.failed, search.progress)
+        self._job.start()
+
+    def _use_proposed(self) -> None:
+        self._page.controls.set_parameters(self._proposed)
+        self._page.wake()
 
     def _use_estimate(self) -> None:
         self._page.controls.set_parameters(self._found)
@@ -145,17 +175,21 @@ class _Search:
             return
         parameters, misfit = report
         self.misfits.append(f"{misfit:.3g}")
-        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items())
+        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items() if "_" not in name)
         steps = " → ".join(self.misfits[-6:])
         self.show(f"step {len(self.misfits)}: {values}  \nmisfit {steps}", working=True)
         self._place(parameters)
 
     def done(self, found: Identification) -> None:
         """Show the estimates."""
-        estimate = {name: one.value for name, one in found.parameters.items()}
+        known = self.page.schema.names  # friction has no slider
+        estimate = {name: one.value for name, one in found.parameters.items() if name in known}
         self._place(estimate)
-        text = describe_identification(found, self.page.schema, self.truth)
-        self.show("\n\n".join(filter(None, (text, self.note, self.hidden))), {**self.fixed, **estimate})
+        text = describe_identification(found, self.truth)
+        proposed = {**self.fixed, **found.proposed} if found.proposed else {}
+        further = FURTHER.format(found.narrowed) if proposed else ""
+        lines = "\n\n".join(filter(None, (text, further, self.note, self.hidden)))
+        self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
 
     def failed(self, message: str) -> None:
         """Say why there are none."""
@@ -163,7 +197,8 @@ class _Search:
 
     def _place(self, parameters: Parameters) -> None:
         """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
-        columns = self.page.columns
+        columns, names = self.page.columns, self.page.schema.names
+        parameters = {name: value for name, value in parameters.items() if name in names}
         column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True)
         mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
         if mine:

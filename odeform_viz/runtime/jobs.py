@@ -23,6 +23,7 @@ from odeform.types import Geometry, MotionSequence, Times
 
 if TYPE_CHECKING:
     from odeform.figure import Source
+    from odeform.identification.pushed.evidence import Evidence
 
 __all__ = [
     "JOB",
@@ -30,6 +31,7 @@ __all__ = [
     "Lesson",
     "Report",
     "fit_parameters",
+    "fit_push",
     "make_figure",
     "make_user_body",
     "refine_model",
@@ -268,6 +270,13 @@ def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoin
     misfits: list[float] = []
     discrepancy = known_discrepancy(predictor, report)
     return identify(predictor, seen, discrepancy, lambda theta: report((theta, misfits[-1])), misfits.append)
+
+
+def fit_push(report: Report, predictor: Predictor, seen: "Evidence", known: dict[str, Any]) -> Identification:
+    """Estimates how a pushed body is made and how it was pushed; reports the parameters and misfit of each step."""
+    from odeform.identification.pushed.identify import identify_push
+
+    return identify_push(predictor, seen, known, progress=lambda *step: report(step), propose=True)
 
 
 def stability_image(report: Report, checkpoint: str) -> np.ndarray:

@@ -223,9 +223,11 @@ class ModalModel(Model):
         return out
 
     def with_contact_parameters(self, contact_parameters: ContactParameters) -> "ModalModel":
-        """The same bodies, which meet the floor in another way."""
+        """The same bodies, which meet the floor in another way, and lie on it as before."""
         out = copy(self)
         out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
+        if (settled := self.settled_body) is not None:
+            out.settled_body = replace(settled, mechanics=replace(settled.mechanics, parameters=contact_parameters))
         for name in ("_loaded", "_mechanics"):
             vars(out).pop(name, None)
         return out

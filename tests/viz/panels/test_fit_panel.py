@@ -120,16 +120,15 @@ def test_a_search_that_fails_says_why(dropped: View, monkeypatch: pytest.MonkeyP
 
 
 def test_what_is_not_determined_is_not_given_as_a_number() -> None:
-    schema = load("mass-elastic").schema
     sure, vague = Identified(0.7, 0.69, 0.71, True, 0.1, 0.01), Identified(0.3, 0.1, 0.9, False, 0.0, 1.3)
-    text = describe_identification(Identification({"mass": sure, "bending": vague}, 3.0, 1.0), schema, {"mass": 0.72})
+    text = describe_identification(Identification({"mass": sure, "bending": vague}, 3.0, 1.0), {"mass": 0.72})
     assert "| mass | **0.7** | 0.69–0.71 | 0.72 |" in text
     assert "| bending | not identifiable | 0.1–0.9 |  |" in text
     assert "the model does not explain this motion" in text
 
 
 def test_models_that_cannot_be_fitted_have_no_panel(serve) -> None:
-    predictor = load("contact-force")
+    predictor = load("contact-force/gp")
     app, client = serve(Column("odeform", predictor, predictor.rest))
     assert START not in client.controls
     assert not any(isinstance(panel, FitPanel) for panel in app.page.panels)

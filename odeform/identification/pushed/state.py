@@ -1,0 +1,98 @@
+"""Holds what is unknown of a pushed body: how it is made, where and how it was pushed, and where the camera stood."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from odeform.errors import InputError
+from odeform.geometry.contact import checked_contact, nearest_on
+from odeform.geometry.rigid import rotation_from_vector
+from odeform.schema import Parameter
+from odeform.types import Floats, Mesh, Points, Rotations, Vector
+
+__all__ = ["BODY", "FRICTION", "POSE", "PUSH", "Camera", "PushState"]
+
+FRICTION = "friction"
+BODY = ("mass", "young", FRICTION)
+"""Names of what is unknown of the body itself, in this order."""
+PUSH = 5
+"""Unknowns of a push: two of the contact's place on the surface, three of the force."""
+POSE = 6
+"""Unknowns of a camera."""
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Maps points as they were observed to the scene: `rotation` x + `shift`, in metres."""
+
+    rotation: Rotations = field(default_factory=lambda: np.eye(3))
+    shift: Vector = field(default_factory=lambda: np.zeros(3))
+
+    def points(self, observed: Points) -> Points:
+        """Returns (N, 3) m in the scene."""
+        return observed @ self.rotation.T + self.shift
+
+    def moved(self, step: Float[np.ndarray, " 6"], about: Vector) -> "Camera":
+        """Returns the camera after a turn by `step[3:]` rad about `about` (3,) m and a shift by `step[:3]` m."""
+        turn = rotation_from_vector(step[3:])
+        return Camera(turn @ self.rotation, turn @ (self.shift - about) + about + step[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class PushState:
+    """One guess of everything that is unknown.
+
+    Steps from it are vectors: of `BODY`, in halves of their ranges; of the contact along two `tangents`, in `size` m;
+    and of the force, in `strongest` N.
+    """
+
+    rest: Mesh
+    """The body at rest as it was measured, on which contacts are places."""
+    ranges: tuple[Parameter, ...]
+    """Of `BODY`."""
+    strongest: float
+    """N"""
+    body: Float[np.ndarray, " 3"]
+    """`BODY` in [-1, 1]."""
+    contact: Vector
+    """(3,) m on `rest`."""
+    force: Vector
+    """(3,) N."""
+    camera: Camera = field(default_factory=Camera)
+
+    @property
+    def size(self) -> float:
+        """Metres: half of the body's largest extent."""
+        return 0.5 * float(np.ptp(self.rest.points, axis=0).max())
+
+    @cached_property
+    def tangents(self) -> Float[np.ndarray, "2 3"]:
+        """Unit vectors along the surface at the contact."""
+        normal = nearest_on(self.rest, self.contact).normal
+        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+        side /= np.linalg.norm(side)
+        return np.stack([side, np.cross(normal, side)])
+
+    def value(self, name: str) -> float:
+        """One of `BODY` in its own unit."""
+        index = BODY.index(name)
+        return self.ranges[index].denormalise(float(self.body[index]))
+
+    def parameters(self) -> dict[str, float]:
+        """The parameters of the scene."""
+        pairs = (("contact", self.contact), ("force", self.force))
+        push = {f"{key}_{axis}": float(x) for key, vector in pairs for axis, x in zip("xyz", vector, strict=True)}
+        return {**push, "mass": self.value("mass"), "young": self.value("young")}
+
+    def stepped(self, step: Floats) -> "PushState":
+        """Returns the state after a step (8,), `BODY` kept in its ranges. `InputError` where no sphere can push."""
+        body = np.clip(self.body + step[: len(BODY)], -1.0, 1.0)
+        along = self.size * step[len(BODY) : len(BODY) + 2] @ self.tangents
+        force = self.force + self.strongest * step[len(BODY) + 2 :]
+        contact = nearest_on(self.rest, self.contact + along).point if along.any() else self.contact
+        checked_contact(self.rest, contact, force)
+        if not force.any():
+            raise InputError("force: expected one that is not zero")
+        return replace(self, body=body, contact=contact, force=force)

@@ -1,0 +1,114 @@
+"""Identification of drawn bodies that are pushed, of which all is known, as a table."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from odeform.identification.identify import Identification
+from odeform.identification.pushed.drawn import drawn_states, forward_of, seen, simulated
+from odeform.identification.pushed.identify import identify_push
+from odeform.identification.pushed.state import BODY, PushState
+from odeform.identification.pushed.views import CloudView
+from odeform.models.base import Predictor
+from odeform.progress import Progress
+from odeform.schema import OBJECT
+
+__all__ = ["identify_drawn", "report_drawn"]
+
+
+def identify_drawn(
+    predictor: Predictor,
+    objects: Sequence[str],
+    count: int,
+    view: CloudView | None = None,
+    noise_mm: float = 0.0,
+    seed: int = 0,
+    from_simulator: bool = False,
+    known: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Scores, and a row for each of `count` drawn bodies of each object.
+
+    Their motion is that of the model itself, whose error is then zero, or that of the simulator. `known` are those of
+    mass, young and friction that the search is told.
+    """
+    rows: list[dict[str, Any]] = []
+    progress = Progress("identify", count * len(objects))
+    for name in objects:
+        forward = forward_of(predictor, name)
+        for index, state in enumerate(drawn_states(predictor, name, count, seed)):
+            surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+            evidence = seen(forward, surface, view, noise_mm, seed + index)
+            given = {OBJECT: name, **{key: state.value(key) for key in known}}
+            errors = None if from_simulator else np.zeros(len(forward.times))
+            rows.append(_row(name, state, identify_push(predictor, evidence, given, errors)))
+            progress.advance(1, _note(rows[-1]))
+    progress.close()
+    names = [name for name in (*BODY, "contact", "force") if name not in known]
+    return {
+        "truth": "simulator" if from_simulator else "model",
+        "view": "all points" if view is None else f"{view.points} points a frame of half of the surface",
+        "noise_mm": noise_mm,
+        "seconds": float(np.median([row["seconds"] for row in rows])),
+        "bodies": len(rows),
+        "parameters": {name: _scores(name, rows) for name in names},
+        "rows": rows,
+    }
+
+
+def _note(row: dict[str, Any]) -> str:
+    errors = ", ".join(f"{name} off by {one['error']:.3f}" for name, one in row["parameters"].items())
+    return f"{row['object']}: {errors}; {row['seconds']:.1f} s"
+
+
+def _row(name: str, state: PushState, found: Identification) -> dict[str, Any]:
+    """Errors in fractions of the range, from half to twice the body's own; of the push in mm and N."""
+    one: dict[str, Any] = {"object": name, "misfit": found.misfit, "seconds": found.seconds, "parameters": {}}
+    for index, key in enumerate(BODY):
+        if key in found.parameters:
+            each, true = found.parameters[key], float(state.body[index])
+            one["parameters"][key] = {
+                "true": true,
+                "found": each.unit,
+                "error": abs(each.unit - true) / 2.0,
+                "inside": bool(abs(each.unit - true) <= each.half_width),
+                "half_width": each.half_width,
+                "identifiable": each.identifiable,
+            }
+    for kind, vector, factor in (("contact", state.contact, 1e3), ("force", state.force, 1.0)):
+        parts = [found.parameters[f"{kind}_{axis}"] for axis in "xyz"]
+        off = np.array([part.value for part in parts]) - vector
+        halves = np.array([part.half_width for part in parts]) * (state.size if kind == "contact" else state.strongest)
+        one["parameters"][kind] = {
+            "error": factor * float(np.linalg.norm(off)),
+            "inside": float((np.abs(off) <= halves).mean()),
+            "identifiable": all(part.identifiable for part in parts),
+        }
+    return one
+
+
+def _scores(name: str, rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
+    each = [row["parameters"][name] for row in rows]
+    sure = [one for one in each if one["identifiable"]]
+    return {
+        "mae": float(np.mean([one["error"] for one in each])),
+        "median": float(np.median([one["error"] for one in each])),
+        "inside_90": float(np.mean([one["inside"] for one in each])),
+        "identifiable": len(sure) / len(each),
+        "mae_identifiable": float(np.mean([one["error"] for one in sure])) if sure else None,
+    }
+
+
+def report_drawn(result: dict[str, Any]) -> str:
+    """Returns the result as a text table."""
+    lines = [
+        f"{result['bodies']} bodies moved by the {result['truth']}, {result['view']}, "
+        f"{result['noise_mm']:g} mm of noise; "
+        f"{result['seconds']:.1f} s each (median)",
+        f"{'':<12}{'MAE':>10}{'median':>10}{'in 90 %':>10}{'identifiable':>14}   of",
+    ]
+    units = {"contact": "mm", "force": "N"}
+    for name, one in result["parameters"].items():
+        scores = f"{one['mae']:>10.3f}{one['median']:>10.3f}{one['inside_90']:>10.0%}{one['identifiable']:>14.0%}"
+        lines.append(f"{name:<12}{scores}   {units.get(name, 'the range')}")
+    return "\n".join(lines)

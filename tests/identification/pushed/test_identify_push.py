@@ -1,0 +1,52 @@
+import numpy as np
+import pytest
+
+from odeform.errors import InputError
+from odeform.identification.pushed.drawn import drawn_states, forward_of
+from odeform.identification.pushed.experiment import Candidates, until_halved, widest
+from odeform.identification.pushed.identify import identifies_pushes, identify_push
+from odeform.identification.pushed.views import points_of
+from odeform.models.registry import load
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_the_body_and_the_push_of_the_models_own_motion_are_found() -> None:
+    predictor = load("contact-force")
+    assert identifies_pushes(predictor)
+    assert not identifies_pushes(load("contact-force/gp"))
+    forward, state = forward_of(predictor, "cat"), drawn_states(predictor, "cat", 1, seed=0)[0]
+    seen = points_of(forward.times, forward.motions([state])[0], forward.model.rest.faces, noise_mm=0.2)
+    found = identify_push(predictor, seen, {"object": "cat"}, np.zeros(len(forward.times)), propose=True)
+    for name, true in zip(("mass", "young", "friction"), state.body, strict=True):
+        one = found.parameters[name]
+        assert abs(one.unit - true) < 0.1
+        assert one.identifiable
+    contact = np.array([found.parameters[f"contact_{axis}"].value for axis in "xyz"])
+    np.testing.assert_allclose(contact, state.contact, atol=2e-3)
+    assert found.misfit < 1.3
+    assert found.narrowed < 1.0
+    assert set(found.proposed) == {*state.parameters()}
+    with pytest.raises(InputError, match="whole push"):
+        identify_push(predictor, seen, {"object": "cat", "force_x": 1.0})
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_a_push_that_is_hardly_seen_says_that_it_is_not_identifiable() -> None:
+    predictor = load("contact-force")
+    forward, state = forward_of(predictor, "pillow"), drawn_states(predictor, "pillow", 1, seed=1)[0]
+    seen = points_of(forward.times[:2], forward.motions([state])[0][:2], forward.model.rest.faces, noise_mm=20.0)
+    push = {name: value for name, value in state.parameters().items() if name not in ("mass", "young")}
+    found = identify_push(predictor, seen, {"object": "pillow", **push}, np.zeros(2))
+    assert not any(one.identifiable for one in found.parameters.values())
+
+
+def test_the_push_that_tells_of_what_is_most_open_is_proposed() -> None:
+    # one push tells of mass, the other of friction
+    pushes = Candidates([], np.array([np.diag([100.0, 0.0, 0.0]), np.diag([0.0, 0.0, 9.0])]))
+    open_friction = np.diag([0.01, 0.01, 0.3])
+    assert pushes.best(open_friction) == 1
+    assert widest(pushes.after(open_friction, 1)) < 0.6 * widest(open_friction)
+    assert until_halved(pushes, open_friction, None) == 2
+    assert until_halved(pushes, open_friction, [0, 0, 1, 1]) == 4
