@@ -17,6 +17,7 @@ from odeform.motion.base import Motion
 from odeform_viz.app import App
 from odeform_viz.columns import Column
 from odeform_viz.motion_files import write_html
+from odeform_viz.words import model_title
 
 __all__ = ["EmbeddedMotion", "NotebookPage", "embed", "show"]
 
@@ -45,7 +46,7 @@ def show(*models: Predictor | str, height: int = 640, port: int = 0) -> "Noteboo
     loaded = [(str(m), odeform.load(m)) if isinstance(m, str) else ("", m) for m in models]
     if not loaded:
         raise odeform.InputError("show: expected a predictor, or the name of a checkpoint")
-    columns = [Column(predictor.model, predictor, predictor.rest, origin=name) for name, predictor in loaded]
+    columns = [Column(model_title(predictor), predictor, predictor.rest, origin=name) for name, predictor in loaded]
     return NotebookPage(App(columns, port=port), height)
 
 

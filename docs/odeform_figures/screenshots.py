@@ -173,7 +173,7 @@ def _compare(view: View) -> None:
 def _fit(view: View) -> None:
     view.tab("Compare")
     view.client.click("Fit to the truth")
-    view.wait(lambda: "Misfit" in view.client.text())
+    view.wait(lambda: "of what is expected" in view.client.text())
     view.show(0.008)
     view.wait(lambda: view.app.presenter.settled)
 

@@ -34,6 +34,13 @@ style.textContent = `
   [data-mantine-color-scheme=dark] [data-odeform-view] [data-hotkey] { color: #f0955f; }
   [data-odeform-view] [data-hotkey]:hover { background: color-mix(in srgb, currentColor 14%, transparent); }
   [data-odeform-view] [data-hotkey] svg { display: block; width: 18px; height: 18px; fill: currentColor; }
+  .mantine-Paper-root [style*="letter-spacing"], .mantine-Paper-root input { letter-spacing: 0 !important; }
+  .odeform-range { position: relative; margin: -1.15em calc(4.5em + 4px) calc(1.15em - 5px) calc(7.6em - 4px); }
+  .odeform-range b {
+    position: absolute; right: calc(100% + 4px); top: -2px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
+    white-space: nowrap;
+  }
+  [data-mantine-color-scheme=dark] .odeform-range b { color: #f0955f; }
   .odeform-moment { width: 5em; text-align: right; font-variant-numeric: tabular-nums; font-weight: 600; }
   .odeform-track { position: relative; flex: 1; height: 46px; cursor: ew-resize; touch-action: none; min-width: 0; }
   .odeform-track > svg { position: absolute; left: 0; top: 0; width: 100%; height: 32px; overflow: visible; }
@@ -47,8 +54,14 @@ style.textContent = `
   }
   .odeform-track span:first-of-type { transform: none; }
   .odeform-track span.last { transform: translateX(-100%); }
+  .odeform-track span.until { background: var(--mantine-color-body); }
+  @media (max-width: 68em) { .odeform-track span.truth { display: none; } }
   .odeform-track i {
     position: absolute; top: -2px; width: 3px; height: 36px; margin-left: -1.5px; border-radius: 2px; background: #d66030;
+  }
+  @media (max-width: 60em) {
+    #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
+    .odeform-aside, .odeform-wide { display: none !important; }
   }
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }

@@ -13,15 +13,18 @@ from odeform.schema import Parameters, Schema
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.runtime.jobs import Job, fit_parameters
+from odeform_viz.words import parameter_title, plain
 
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
-NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
+NO_TRUTH = (
+    "Choose a test sequence above, or open or simulate a motion: the parameters that explain it are then estimated."
+)
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
-EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
+EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 
 
 def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
@@ -31,13 +34,15 @@ def describe_identification(found: Identification, schema: Schema, truth: Parame
         one, true = found.parameters[p.name], truth.get(p.name)
         estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
         known = "" if true is None else f"{true:.3g}"
-        rows.append(f"| {p.name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
+        name = f"{parameter_title(p)} ({p.unit})" if p.unit else parameter_title(p)
+        rows.append(f"| {name} | {estimate} | {one.low:.3g} to {one.high:.3g} | {known} |")
     explained = (
         "model and noise explain the motion"
         if found.misfit <= EXPLAINED
         else "⚠ **the model does not explain this motion**, and the intervals are wider for it"
     )
-    return "\n".join([*rows, "", f"Misfit {found.misfit:.2g}: {explained}. {found.seconds:.1f} s."])
+    apart = f"Mean square difference from the motion: {found.misfit:.2g} of what is expected"
+    return "\n".join([*rows, "", f"{apart}; {explained}. The search took {found.seconds:.1f} s."])
 
 
 class FitPanel(Panel):
@@ -145,9 +150,10 @@ class _Search:
             return
         parameters, misfit = report
         self.misfits.append(f"{misfit:.3g}")
-        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items())
+        values = plain(parameters, self.page.schema)
         steps = " → ".join(self.misfits[-6:])
-        self.show(f"step {len(self.misfits)}: {values}  \nmisfit {steps}", working=True)
+        text = f"step {len(self.misfits)}: {values}  \ndifference, of what is expected: {steps}"
+        self.show(text, working=True)
         self._place(parameters)
 
     def done(self, found: Identification) -> None:

@@ -81,7 +81,7 @@ def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.
     _open(app, client)
     monkeypatch.setattr(fit, "fit_parameters", endless)
     client.click(START)
-    assert client.until(lambda: "misfit 3" in client.text())
+    assert client.until(lambda: "of what is expected: 3" in client.text())
     panel = app.panel(FitPanel)
     assert panel._job is not None
     if how == "cancel":
@@ -94,7 +94,7 @@ def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.
     assert not panel._job.running
     panel._job._process.join(60.0)
     assert not panel._job._process.is_alive()
-    assert client.until(lambda: "misfit" not in client.text())
+    assert client.until(lambda: "of what is expected" not in client.text())
     assert not client.controls[USE].visible
 
 
