@@ -1,6 +1,7 @@
 """Shows what is in view: scene, models and shape, what the colours mean, and what is not to scale."""
 
-from html import escape
+import re
+from html import escape, unescape
 from pathlib import Path
 
 from odeform.schema import OBJECT
@@ -13,7 +14,7 @@ from odeform_viz.panels.in_view import in_view
 from odeform_viz.view import ColorScale, Description, DisplayOptions, Frame
 from odeform_viz.words import model_title, subject_of
 
-__all__ = ["CaptionPanel", "caption_html", "scale_html"]
+__all__ = ["CaptionPanel", "caption_html", "scale_html", "subject_text"]
 
 OF = {
     "displacement": "displacement from the rest shape",
@@ -30,6 +31,11 @@ def caption_html(frame: Frame, options: DisplayOptions) -> str:
     if options.overlay and len(frame.columns) > 1:
         lines.append(_legend(frame))
     return "".join(lines)
+
+
+def subject_text(frame: Frame) -> str:
+    """What moves and which models show it, without markup."""
+    return unescape(re.sub(r"<[^>]+>", "", _subject(frame)))
 
 
 def scale_html(scale: ColorScale | None, histogram: Floats | None) -> str:

@@ -170,7 +170,7 @@ class _Search:
     def _place(self, parameters: Parameters) -> None:
         """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
         columns = self.page.columns
-        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True)
+        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True, fitted=True)
         mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
         if mine:
             self.key = mine[0].key
