@@ -99,8 +99,8 @@ class Session:
             return source.solve(geometry, parameters, quality, observed=_observed_frames(source, record))
 
     def truth_of(self, column: Column, request: ViewRequest) -> RecordedMotion | None:
-        """The visible record, if it has the column's parameters, or they are its estimate, and the column has the trained
-        body."""
+        """The visible record, if it has the column's parameters, or these are estimated from it, and the column has the
+        trained body."""
         truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
         if truth is None or column.truth is not None:
             return None

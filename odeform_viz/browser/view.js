@@ -35,9 +35,11 @@ style.textContent = `
   [data-odeform-view] [data-hotkey]:hover { background: color-mix(in srgb, currentColor 14%, transparent); }
   [data-odeform-view] [data-hotkey] svg { display: block; width: 18px; height: 18px; fill: currentColor; }
   .mantine-Paper-root [style*="letter-spacing"], .mantine-Paper-root input { letter-spacing: 0 !important; }
-  .odeform-range { position: relative; margin: -1.15em calc(4.5em + 4px) calc(1.15em - 5px) calc(7.6em - 4px); }
+  .odeform-range { position: relative; height: 3px; pointer-events: none;
+    margin: calc(-1.15em - 12px) calc(4.5em + 4px) calc(1.15em + 9px) calc(7.6em - 4px); }
+  .odeform-range svg { height: 3px; }
   .odeform-range b {
-    position: absolute; right: calc(100% + 4px); top: -2px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
+    position: absolute; right: calc(100% + 4px); top: 17px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
     white-space: nowrap;
   }
   [data-mantine-color-scheme=dark] .odeform-range b { color: #f0955f; }
@@ -91,6 +93,8 @@ function mirror() {
   }
   const slider = shown.get("timeline").querySelector("[data-time-slider]")?.dataset.timeSlider;
   document.getElementById(slider)?.closest(".mantine-Paper-root")?.classList.add("odeform-unseen");
+  const map = document.querySelector("[data-map-box]")?.dataset.mapBox;
+  document.getElementById(map)?.closest(".mantine-Flex-root")?.classList.add("odeform-unseen");
 }
 new MutationObserver((changes) => {
   if (changes.some((change) => !layer.contains(change.target))) mirror();
