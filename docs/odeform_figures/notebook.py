@@ -19,8 +19,8 @@ __all__ = ["CELLS", "build", "main"]
 CELLS: tuple[tuple[str, str], ...] = (
     (
         "markdown",
-        "# ODeform in a notebook\n\nA model is a function of parameters and time. `odeform_viz.show` puts its page into "
-        "the notebook; a figure with sliders stays in the file, and needs no server.\n\n"
+        "# ODeform in a notebook\n\nA model is a function of parameters and time. `odeform_viz.show` puts its page "
+        "into the notebook; a figure with sliders stays in the file, and needs no server.\n\n"
         "Written by `python -m odeform_figures.notebook`.",
     ),
     ("code", 'import numpy as np\n\nimport odeform\nimport odeform_viz\n\npredictor = odeform.load("mass-elastic")'),
@@ -28,13 +28,13 @@ CELLS: tuple[tuple[str, str], ...] = (
         "code",
         'motion = predictor.solve(parameters={"mass": 0.6})  # kg; the rest at their defaults\n'
         "times = np.linspace(0.0, 1.0, 5)  # s\n"
-        "for time, deformation in zip(times, 1e3 * motion.deformation_rms(times)):\n"
+        "for time, deformation in zip(times, 1e3 * motion.deformation_rms(times), strict=True):\n"
         '    print(f"{time:.2f} s: {deformation:.2f} mm RMS deformation")',
     ),
     (
         "markdown",
-        "The page. Its sliders are read and moved from Python. It is served to this machine, so that its frame is empty "
-        "where the notebook is only read.",
+        "The page. Its sliders are read and moved from Python. It is served to this machine, so that its frame is "
+        "empty where the notebook is only read.",
     ),
     (
         "code",
@@ -44,8 +44,8 @@ CELLS: tuple[tuple[str, str], ...] = (
     ("code", "page.close()"),
     (
         "markdown",
-        "A figure that moves, with a slider for the mass: motions on a grid, interpolated in the browser. How far it is "
-        "from the model is measured when it is made, and printed in it.",
+        "A figure that moves, with a slider for the mass: motions on a grid, interpolated in the browser. How far it "
+        "is from the model is measured when it is made, and printed in it.",
     ),
     (
         "code",
