@@ -20,7 +20,11 @@ style.textContent = `
   .odeform-badge.inside { background: #1b7f4b; }
   .odeform-badge.outside { background: #b06a00; }
   .odeform-badge.unknown { background: #b3260c; }
-  .odeform-bar { width: 27em; max-width: 100%; }
+  .odeform-bar { width: 24em; max-width: 100%; }
+  @media (min-width: 75em) {
+    #odeform-view > [data-odeform-view=scale] { position: absolute; right: ${SIDE}px; top: 12px; }
+    #odeform-view > :is([data-odeform-view=caption], [data-odeform-view=trust]) { max-width: calc(100% - 28em); }
+  }
   .odeform-bar svg { display: block; width: 100%; height: 14px; }
   #odeform-view > [data-odeform-view=timeline] {
     position: absolute; left: 12px; right: ${SIDE}px; bottom: 12px; max-width: none; height: 56px; padding: 4px 12px;
