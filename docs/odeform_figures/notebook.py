@@ -78,7 +78,10 @@ def build(cells: tuple[tuple[str, str], ...] = CELLS) -> bytes:
 def _run(source: str, space: dict[str, Any], count: int) -> list[dict[str, Any]]:
     """The outputs of one cell."""
     tree = ast.parse(source)
-    last = ast.Expression(tree.body.pop().value) if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    end = tree.body[-1] if tree.body else None
+    last = ast.Expression(end.value) if isinstance(end, ast.Expr) else None
+    if last is not None:
+        tree.body.pop()
     printed, value = io.StringIO(), None
     with contextlib.redirect_stdout(printed):
         exec(compile(tree, "cell", "exec"), space)

@@ -115,7 +115,7 @@ def refined_map(
             report(min(spent / seconds, 1.0))
     at = np.array(list(known))
     shown = np.stack(np.meshgrid(*2 * [np.arange(0, count, step)], indexing="ij"), axis=-1)
-    nearest = KDTree(at).query(shown.reshape(-1, 2))[1]
+    nearest = np.atleast_1d(KDTree(at).query(shown.reshape(-1, 2))[1])
     found = list(known.values())
     values, sound = (
         np.stack([found[index][part] for index in nearest], axis=1).reshape(len(times), *shown.shape[:2])

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from PIL import Image
 
+from odeform.formats.picture_files import Picture
 from odeform.schema import Parameter
 from odeform.stress.stability import StabilityMap
-from odeform.types import Floats
 from odeform_viz.coloring.scale import colors_of
 from odeform_viz.view import ColorScale
 from odeform_viz.words import parameter_title
@@ -110,7 +110,7 @@ def _tick(parameter: Parameter, unit: float) -> str:
     return f"{value:.2g}" if math.isfinite(value) else ""
 
 
-def _png(pixels: Floats) -> str:
+def _png(pixels: Picture) -> str:
     file = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels)).save(file, "PNG")
     return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -25,8 +25,8 @@ __all__ = ["UserBodyPanel"]
 
 TRAINED = "The trained bodies. A mesh with any defects, or points or splats of a solid, can be pushed as well."
 WORKING = (
-    "**{}** is being filled with tetrahedra and laid on the floor. It takes five seconds on an idle machine, and longer "
-    "beside other work."
+    "**{}** is being filled with tetrahedra and laid on the floor. It takes five seconds on an idle machine, and "
+    "longer beside other work."
 )
 
 
