@@ -34,7 +34,7 @@ document.addEventListener("pointerup", () => (dragged = null));
 // a click on a map writes its place into a text box, which the server reads
 document.addEventListener("click", (event) => {
   const map = event.target.closest?.("[data-map]");
-  const box = map && document.getElementById(map.dataset.mapBox);
+  const box = map && window.odeform.boxAfter(map)?.querySelector("input");
   if (!box) return;
   const area = map.getBoundingClientRect();
   const across = (event.clientX - area.left) / area.width, up = 1 - (event.clientY - area.top) / area.height;

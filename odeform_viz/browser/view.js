@@ -20,10 +20,10 @@ style.textContent = `
   .odeform-badge.inside { background: #1b7f4b; }
   .odeform-badge.outside { background: #b06a00; }
   .odeform-badge.unknown { background: #b3260c; }
-  .odeform-bar { width: 24em; max-width: 100%; }
+  .odeform-bar { width: 27em; max-width: 100%; }
   @media (min-width: 75em) {
     #odeform-view > [data-odeform-view=scale] { position: absolute; right: ${SIDE}px; top: 12px; }
-    #odeform-view > :is([data-odeform-view=caption], [data-odeform-view=trust]) { max-width: calc(100% - 28em); }
+    #odeform-view > :is([data-odeform-view=caption], [data-odeform-view=trust]) { max-width: calc(100% - 30em); }
   }
   .odeform-bar svg { display: block; width: 100%; height: 14px; }
   #odeform-view > [data-odeform-view=timeline] {
@@ -87,6 +87,14 @@ const shown = new Map(ORDER.map((name) => {
   return [name, place];
 }));
 
+// The control after the one that holds an element: viser gives text boxes no id.
+window.odeform.boxAfter = (element) => {
+  for (let part = element; part && part !== document.body; part = part.parentElement) {
+    if (part.nextElementSibling?.querySelector("input")) return part.nextElementSibling;
+  }
+  return null;
+};
+
 function mirror() {
   const sources = new Map([...document.querySelectorAll("[data-odeform-view]")]
     .filter((part) => part.parentElement !== layer)
@@ -97,8 +105,8 @@ function mirror() {
   }
   const slider = shown.get("timeline").querySelector("[data-time-slider]")?.dataset.timeSlider;
   document.getElementById(slider)?.closest(".mantine-Paper-root")?.classList.add("odeform-unseen");
-  const map = document.querySelector("[data-map-box]")?.dataset.mapBox;
-  document.getElementById(map)?.closest(".mantine-Flex-root")?.classList.add("odeform-unseen");
+  const map = document.querySelector("[data-map]");
+  if (map) window.odeform.boxAfter(map)?.classList.add("odeform-unseen");
 }
 new MutationObserver((changes) => {
   if (changes.some((change) => !layer.contains(change.target))) mirror();

@@ -72,7 +72,7 @@ class StabilityPanel(Panel):
         self._bar.visible = self._cancel.visible = False
         self._text.content = FOUND.format(found.solved)
         first, second = self._page.schema.learned[:2]
-        self._map.content = map_html(found, (first, second), self._place._impl.uuid)
+        self._map.content = map_html(found, (first, second))
         self._map.visible = self._place.visible = True
 
     def _go(self) -> None:

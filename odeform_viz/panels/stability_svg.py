@@ -21,18 +21,18 @@ CLAMPED = (70, 70, 74)
 TICKS = (-3.0, -1.0, 1.0, 3.0)  # halves of the trained range, from its middle
 
 
-def map_html(plot: StabilityMap, parameters: tuple[Parameter, Parameter], box: str) -> str:
-    """Draws the map; a click writes "column of the map, row, moment" as fractions into the text box of that id."""
+def map_html(plot: StabilityMap, parameters: tuple[Parameter, Parameter]) -> str:
+    """Draws the map; a click writes "across,upwards,moment", the first two as fractions, into the text box after it."""
     top = _top(plot)
     width = LEFT + len(plot.times) * (SIDE + GAP)
-    panels = "".join(_panel(plot, index, parameters, top, box) for index in range(len(plot.times)))
+    panels = "".join(_panel(plot, index, parameters, top) for index in range(len(plot.times)))
     x, y = parameters
     names = (
         f'<text x="{0.5 * width}" y="{TOP + SIDE + 29}" text-anchor="middle">{_named(x)}</text>'
         f'<text transform="translate(9,{TOP + 0.5 * SIDE}) rotate(-90)" text-anchor="middle">{_named(y)}</text>'
     )
     drawing = (
-        f'<svg class="odeform-map" viewBox="0 0 {width} {TOP + SIDE + FOOT}" width="100%">'
+        f'<svg class="odeform-map" viewBox="0 0 {width} {TOP + SIDE + FOOT}" width="100%" style="max-height:230px">'
         f"<style>.odeform-map text{{font:9px sans-serif;fill:var(--mantine-color-text)}}"
         f".odeform-map image{{cursor:crosshair;image-rendering:pixelated}}</style>{panels}{names}</svg>"
     )
@@ -73,7 +73,7 @@ def _scale(top: float) -> ColorScale:
     return ColorScale("displacement", "mm", top, False)
 
 
-def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Parameter], top: float, box: str) -> str:
+def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Parameter], top: float) -> str:
     left, reach = LEFT + index * (SIDE + GAP), _reach(plot)
     values = 1e3 * plot.largest * plot.values[index]
     colors = np.where(plot.sound[index][..., None], colors_of(values, _scale(top)), CLAMPED).astype(np.uint8)
@@ -87,7 +87,7 @@ def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Paramete
     parts = [
         f'<text x="{left + 0.5 * SIDE}" y="13" text-anchor="middle">{when}</text>',
         f'<image href="{_png(colors[::-1])}" x="{left}" y="{TOP}" width="{SIDE}" height="{SIDE}" '
-        f'preserveAspectRatio="none" data-map="{index}" data-map-box="{box}"/>',
+        f'preserveAspectRatio="none" data-map="{index}"/>',
         f'<rect x="{left + low:.1f}" y="{TOP + low:.1f}" width="{high - low:.1f}" height="{high - low:.1f}" '
         'fill="none" stroke="#fff" stroke-width="1.5" pointer-events="none"/>',
     ]
