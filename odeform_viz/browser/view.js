@@ -89,8 +89,8 @@ const shown = new Map(ORDER.map((name) => {
 
 // The control after the one that holds an element: viser gives text boxes no id.
 window.odeform.boxAfter = (element) => {
-  for (let part = element; part && part !== document.body; part = part.parentElement) {
-    if (part.nextElementSibling?.querySelector("input")) return part.nextElementSibling;
+  for (let part = element; part && !part.matches("[role=tabpanel], body"); part = part.parentElement) {
+    if (part.nextElementSibling?.querySelectorAll("input").length === 1) return part.nextElementSibling;
   }
   return null;
 };

@@ -72,8 +72,9 @@ class StabilityPanel(Panel):
         self._bar.visible = self._cancel.visible = False
         self._text.content = FOUND.format(found.solved)
         first, second = self._page.schema.learned[:2]
+        self._place.visible = True  # before the map: clicks look for it
         self._map.content = map_html(found, (first, second))
-        self._map.visible = self._place.visible = True
+        self._map.visible = True
 
     def _go(self) -> None:
         if self._found is None or not self._place.value:
