@@ -1,4 +1,5 @@
-"""The viewer. In a notebook: `odeform_viz.show(predictor)` shows its page, `odeform_viz.embed(motion)` a motion.
+"""The viewer. In a notebook: `odeform_viz.show(predictor)` shows its page, `embed` a motion, `figure` one with
+sliders.
 
 Names are imported when they are first used, so that the command starts at once.
 """
@@ -6,9 +7,9 @@ Names are imported when they are first used, so that the command starts at once.
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from odeform_viz.notebook import embed, show
+    from odeform_viz.notebook import embed, figure, show
 
-__all__ = ["embed", "show"]
+__all__ = ["embed", "figure", "show"]
 
 
 def __getattr__(name: str) -> Any:

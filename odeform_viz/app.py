@@ -109,19 +109,27 @@ class App:
     def show_load(self, load: str) -> None:
         """Build the page anew, with its models under another load; models that know one scene only are left out.
 
-        `InputError` while a recording, which is of one scene, is in progress.
+        `InputError` while a recording, which is of one scene, is in progress, and if the page cannot be built; the page
+        before is then there again.
         """
         with self._switching:
             if self.recording.active:
                 raise InputError("a recording is of one scene: stop it before something else happens")
-            columns = columns_under(self.columns.all, load)
-            self._end_page()
-            self.scene.close()
-            forget_clients(self.server)
-            self.server.gui.reset()
-            self.server.scene.reset()
-            self.server.gui.set_panel_label(_title(columns))
-            self._build(columns)
+            before, columns = self.columns.all, columns_under(self.columns.all, load)
+            try:
+                self._rebuild(columns)
+            except Exception as error:  # of any panel, also a plugged one: the page must not stay half built
+                self._rebuild(before)
+                raise InputError(f"load {load!r}: its page could not be built: {error}") from error
+
+    def _rebuild(self, columns: Sequence[Column]) -> None:
+        self._end_page()
+        self.scene.close()
+        forget_clients(self.server)
+        self.server.gui.reset()
+        self.server.scene.reset()
+        self.server.gui.set_panel_label(_title(columns))
+        self._build(columns)
 
     def _end_page(self) -> None:
         for panel in self.page.panels:

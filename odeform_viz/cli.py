@@ -18,6 +18,7 @@ from odeform_viz.fitting import describe_fit, shape_from
 from odeform_viz.recording.replay import TOLERANCE, replay
 from odeform_viz.runtime.access import is_loopback
 from odeform_viz.user_bodies import describe_user_body, read_user_body, takes_user_bodies, with_user_body
+from odeform_viz.words import model_title
 
 __all__ = ["main", "make_columns"]
 
@@ -51,7 +52,8 @@ def make_columns(
 
 def _label(model: Predictor, fit: FittedShape | None) -> str:
     """The authors' files contain no body, so a ball is shown unless the user gives one."""
-    return model.model if fit or model.rescales_input or model.schema.objects else f"{model.model} (shown on a ball)"
+    name = model_title(model)
+    return name if fit or model.rescales_input or model.schema.objects else f"{name} (shown on a ball)"
 
 
 def _serve(args: argparse.Namespace) -> None:

@@ -40,6 +40,8 @@ class Column:
     """Assigned by `Columns`; constant while a column is hidden, shown or given another shape."""
     color_index: int = -1
     """Assigned by `Columns`: the lowest that no other model has, so that each keeps a colour of its own."""
+    fitted: bool = False
+    """Whether its parameters were estimated from the truth: it is compared with it whatever they are."""
     rank: float | None = None
     """Its place from 0 to 1 in a sweep of an ordered parameter, whose columns have ordered colours; None outside."""
 

@@ -4,6 +4,7 @@ The library finds these writers by the entry points `odeform.motion_writers`.
 """
 
 import html
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -24,6 +25,7 @@ from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.session import visible_deformation
 from odeform_viz.view import ColumnFrame, DisplayOptions, Frame, ViewRequest
+from odeform_viz.words import parameter_title, subject_of, unit_text
 
 __all__ = ["write_html", "write_rrd"]
 
@@ -71,6 +73,7 @@ def write_html(file: IO[bytes], motion: Motion, times: Times, fit: FittedShape |
         page = serializer.as_html()
     finally:
         stop_server(server)
+    page = re.sub(r"<title>[^<]*</title>", f"<title>{html.escape(_title(motion))}</title>", page, count=1)
     head, body, rest = page.partition("</body>")
     file.write(f"{head}{BANNER.format(_caption(motion, times))}{body}{rest}".encode())
 
@@ -85,9 +88,17 @@ def _frames(motion: Motion, times: Times, fit: FittedShape | None) -> Iterator[F
         yield Frame(ViewRequest(motion.parameters, float(time), "", (column,)), (shown,))
 
 
+def _title(motion: Motion) -> str:
+    return f"{subject_of(motion.schema.scene, str(motion.parameters.get(OBJECT, '')))} · ODeform"
+
+
 def _caption(motion: Motion, times: Times) -> str:
-    values = [f"{p.name} {motion.parameters[p.name]:.4g} {p.unit}".strip() for p in motion.schema.parameters]
-    body = motion.parameters.get(OBJECT, "")
-    lines = [f"<b>{html.escape(motion.schema.scene)}</b> {html.escape(str(body))}", html.escape(", ".join(values))]
+    values = [
+        f"{parameter_title(p)} {motion.parameters[p.name]:.4g} {unit_text(p.unit)}".strip()
+        for p in motion.schema.parameters
+    ]
+    subject = subject_of(motion.schema.scene, str(motion.parameters.get(OBJECT, "")))
+    span = f"{times[0]:.3g} to {times[-1]:.3g} s, lengths in metres"
+    lines = [f"<b>{html.escape(subject)}</b>, {span}", html.escape(", ".join(values))]
     lines += [f'<span style="color:#b3261e">{html.escape(note)}</span>' for note in caveats(motion, times)]
     return "<br>".join(lines)

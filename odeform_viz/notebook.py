@@ -17,8 +17,9 @@ from odeform.motion.base import Motion
 from odeform_viz.app import App
 from odeform_viz.columns import Column
 from odeform_viz.motion_files import write_html
+from odeform_viz.words import model_title
 
-__all__ = ["EmbeddedMotion", "NotebookPage", "embed", "show"]
+__all__ = ["EmbeddedMotion", "NotebookPage", "embed", "figure", "show"]
 
 PATIENCE = 10.0  # s that the page may take to move its sliders
 
@@ -45,7 +46,7 @@ def show(*models: Predictor | str, height: int = 640, port: int = 0) -> "Noteboo
     loaded = [(str(m), odeform.load(m)) if isinstance(m, str) else ("", m) for m in models]
     if not loaded:
         raise odeform.InputError("show: expected a predictor, or the name of a checkpoint")
-    columns = [Column(predictor.model, predictor, predictor.rest, origin=name) for name, predictor in loaded]
+    columns = [Column(model_title(predictor), predictor, predictor.rest, origin=name) for name, predictor in loaded]
     return NotebookPage(App(columns, port=port), height)
 
 
@@ -121,7 +122,7 @@ class _Sliders(MutableMapping[str, Any]):
 
 
 class EmbeddedMotion:
-    """A page that plays a motion without a server; a notebook keeps it in its file.
+    """A page that needs no server, of a motion or of a figure with sliders; a notebook keeps it in its file.
 
     Attributes:
         html: The page, as text.
@@ -156,3 +157,13 @@ def embed(motion: Motion, times: Any = None, height: int = 480) -> EmbeddedMotio
     frames = motion.schema.window.times if times is None else times
     write_html(file, motion, np.atleast_1d(np.asarray(frames, dtype=float)), None)
     return EmbeddedMotion(file.getvalue().decode(), height)
+
+
+def figure(page: bytes, height: int = 520) -> EmbeddedMotion:
+    """Put a figure with sliders into a notebook, which keeps it.
+
+    Args:
+        page: what `odeform.figure.figure_page` returned, or the content of a file of `odeform predict --sweep`.
+        height: of the frame in the notebook, in pixels.
+    """
+    return EmbeddedMotion(page.decode(), height)

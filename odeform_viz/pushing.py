@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from odeform.geometry.contact import CONE, projectile_centre, touching_centre
 from odeform.geometry.push import Push
 from odeform.geometry.rays import first_on_mesh, first_on_points
+from odeform.loads.registry import load_of_scene
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT, Parameters, Schema
@@ -140,6 +141,8 @@ def acting_times(shown: ColumnFrame) -> list[tuple[float, float]]:
     """From when to when, in s, something acts on a body: a sphere, or what the scene draws as arrows."""
     if (contacts := contacts_of(shown.motion.schema)) is not None:
         return [(0.0, contacts.pulse)]
+    if (load := load_of_scene(shown.motion.schema.scene)) is not None and load.flies:
+        return []  # its arrow is a velocity
     scene = find_scene(shown.motion.schema.scene)
     if scene is None:
         return []
@@ -162,13 +165,13 @@ def picked(geometry: Geometry, shown: Points, origin: Floats, direction: Floats)
     return None if found is None else (np.asarray(geometry.points[found[0]], dtype=float), found[1])
 
 
-def push_excess(push: Push, forces: tuple[float, float]) -> dict[str, str]:
-    """Says in words in what a push is beyond those of the training data, and how far these go."""
+def push_excess(push: Push, forces: tuple[float, float], known: str = "trained") -> dict[str, str]:
+    """Says in words in what a push is beyond those that are `known`, "trained" or "measured", and how far these go."""
     excess = {}
     if push.strength > forces[1] * (1.0 + 1e-6):
-        excess["force"] = f"trained up to {forces[1]:g} N"
+        excess["force"] = f"{known} up to {forces[1]:g} N"
     if push.strength > 0.0 and push.steep:
-        excess["direction"] = f"trained up to {math.degrees(CONE):.0f}° off the inward normal"
+        excess["direction"] = f"{known} up to {math.degrees(CONE):.0f}° off the inward normal"
     return excess
 
 
@@ -180,7 +183,7 @@ def describe_push(push: Push, name: str) -> str:
     if push.strength == 0.0:
         return f"<b>no force</b> on {place}: nothing moves"
     angle = math.degrees(push.angle)
-    tilt = "straight in" if angle < 0.5 else f"{angle:.0f}° off the inward normal"
+    tilt = "along the inward normal" if angle < 0.5 else f"{angle:.0f}° off the inward normal"
     return f"<b>{push.strength:.3g} N</b> on {place}, {tilt}"
 
 

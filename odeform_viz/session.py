@@ -99,9 +99,12 @@ class Session:
             return source.solve(geometry, parameters, quality, observed=_observed_frames(source, record))
 
     def truth_of(self, column: Column, request: ViewRequest) -> RecordedMotion | None:
-        """The visible record, if it has the column's parameters and the column the trained body."""
+        """The visible record, if it has the column's parameters, or these are estimated from it, and the column has the
+        trained body."""
         truth = next((c.source for c in request.columns if c.visible and isinstance(c.source, RecordedMotion)), None)
-        if truth is None or column.truth is not None or not truth.of(self.parameters(column, request)):
+        if truth is None or column.truth is not None:
+            return None
+        if not (column.fitted or truth.of(self.parameters(column, request))):
             return None
         body = user_body_of(column.predictor)
         if body is not None:

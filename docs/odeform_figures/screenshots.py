@@ -57,7 +57,6 @@ MOMENT = 0.012  # s; the kicked ball is deformed then
 # which `kick/gp` lets sink into the floor
 SINKING = {"mass (kg)": 1.392, "bending (N m)": 0.475, "force (N)": 86.8, "elevation (rad)": 0.196}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
-SOFTEST = {"mass (kg)": 0.4, "bending (N m)": 0.3, "force (N)": 160.0}  # of the trained kicks
 
 
 @dataclass(frozen=True)
@@ -173,7 +172,7 @@ def _compare(view: View) -> None:
 def _fit(view: View) -> None:
     view.tab("Compare")
     view.client.click("Fit to the truth")
-    view.wait(lambda: "Misfit" in view.client.text())
+    view.wait(lambda: "of what is expected" in view.client.text())
     view.show(0.008)
     view.wait(lambda: view.app.presenter.settled)
 
@@ -219,6 +218,7 @@ def _stability(view: View) -> None:
     view.client.click("Map stability")
     controls = view.client.controls
     view.wait(lambda: not controls["Map stability"].visible and not controls["Cancel the map"].visible)
+    view.wait(lambda: "Click a place to go there" in view.client.text())
 
 
 def _simulate(view: View) -> None:
@@ -296,21 +296,37 @@ def _packed(picture: Image.Image) -> bytes:
     raise ValueError(f"the picture takes more than {MOST_BYTES} bytes at any quality")
 
 
-def _film() -> Iterator[tuple[list[Column], dict[str, float], Floats]]:
-    """The scenes of the film: columns, parameters, and the times to show."""
-    for name in ("donut", "flip-flop"):
-        yield _push(name), {}, np.linspace(0.0, 0.19, 20)
-    yield _kick(), SOFTEST, np.concatenate([np.linspace(0.0, 0.03, 14), np.linspace(0.05, 0.5, 16)])
+@dataclass(frozen=True)
+class Shot:
+    """A scene of the film: its columns, what is set before it begins, and the times to show in s."""
+
+    columns: Callable[[], list[Column]]
+    settings: dict[str, object]
+    times: Floats
+
+
+FILM = (
+    Shot(lambda: _loaded("drop"), {"object": "dog", "preset": "on an edge"}, np.linspace(0.0, 0.6, 16)),
+    Shot(lambda: _loaded("throw"), {"object": "donut", "preset": "a somersault"}, np.linspace(0.0, 0.75, 20)),
+    Shot(lambda: _loaded("kick"), {"object": "bottle"}, np.linspace(0.0, 0.9, 18)),
+    Shot(lambda: _push("flip-flop"), {}, np.linspace(0.0, 0.19, 14)),
+)
+
+
+def _loaded(load: str) -> list[Column]:
+    """The soft objects under a load."""
+    return make_columns(f"contact-force:{load}", (), None)
 
 
 def _take_film(browser: Browser, out: Path) -> None:
     frames = []
-    for columns, parameters, times in _film():
-        with _open(browser, columns, FILM_SIZE) as view:
+    for shot in FILM:
+        with _open(browser, shot.columns(), FILM_SIZE) as view:
             view.show(0.0)
-            for label, value in parameters.items():
+            for label, value in shot.settings.items():
                 view.set(label, value)
-            for moment in times:
+            view.wait(lambda v=view: v.app.presenter.settled)
+            for moment in shot.times:
                 view.show(round(float(moment), 4))
                 height = FILM_WIDTH * FILM_SIZE[1] // FILM_SIZE[0]
                 frames.append(view.picture().resize((FILM_WIDTH, height), Image.Resampling.LANCZOS))

@@ -71,7 +71,7 @@ LOAD = Load(
             "force",
             "N",
             {"x": (-FORCE, FORCE, -24.0), "y": (-FORCE, FORCE, 0.0), "z": (-FORCE, FORCE, 0.0)},
-            f"the peak of the force, F sin^2(pi t / {1e3 * PULSE:.0f} ms)",
+            f"the peak of the force, which rises and falls within {1e3 * PULSE:.0f} ms",
         ),
     ),
     window=Window(0.0, 0.5, 100.0),

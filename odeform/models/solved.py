@@ -13,6 +13,7 @@ from odeform.motion.base import SolveStats
 from odeform.motion.reduced_space import motion_rmse
 from odeform.solver.integrate import SolverSettings, integrate
 from odeform.solver.method import Field
+from odeform.solver.registry import TITLES
 from odeform.solver.solution import Solution, Status
 from odeform.types import Floats, Times
 
@@ -155,5 +156,10 @@ class SolvedTrajectory:
 
 def describe(settings: SolverSettings) -> str:
     """Name the method of a solver with its step or tolerance."""
-    value = f"h = {1e3 * settings.step:.3g} ms" if settings.step else f"tol {settings.tolerance:.0e}"
-    return f"{settings.method}, {value}"
+    title = TITLES.get(settings.method, settings.method)
+    if settings.step:
+        return f"{title}, steps of {1e3 * settings.step:.3g} ms"
+    assert settings.tolerance is not None
+    if settings.method == "limex":
+        return f"{title}, tolerance {1e3 * settings.tolerance:.2g} mm"
+    return f"{title}, tolerance {settings.tolerance:g}"

@@ -6,7 +6,7 @@ from odeform.solver.linearly_implicit import LinearlyImplicit
 from odeform.solver.method import Method
 from odeform.solver.runge_kutta import ExplicitRungeKutta
 
-__all__ = ["METHODS", "get_method"]
+__all__ = ["METHODS", "TITLES", "get_method"]
 
 METHODS: dict[str, Method] = {
     "euler": ExplicitRungeKutta(tableau.EULER),
@@ -16,6 +16,17 @@ METHODS: dict[str, Method] = {
     "dopri5": ExplicitRungeKutta(tableau.DOPRI5),
     "limex": LinearlyImplicit(),
 }
+
+
+TITLES = {
+    "euler": "Euler",
+    "midpoint": "midpoint rule",
+    "rk4": "Runge-Kutta 4",
+    "bosh3": "Bogacki-Shampine 3(2)",
+    "dopri5": "Dormand-Prince 5(4)",
+    "limex": "linearly implicit Euler, extrapolated",
+}
+"""What a reader of the literature calls each of them."""
 
 
 def get_method(name: str) -> Method:

@@ -31,6 +31,18 @@ document.addEventListener("pointerdown", (event) => {
 document.addEventListener("pointermove", seek);
 document.addEventListener("pointerup", () => (dragged = null));
 
+// a click on a map writes its place into a text box, which the server reads
+document.addEventListener("click", (event) => {
+  const map = event.target.closest?.("[data-map]");
+  const box = map && window.odeform.boxAfter(map)?.querySelector("input");
+  if (!box) return;
+  const area = map.getBoundingClientRect();
+  const across = (event.clientX - area.left) / area.width, up = 1 - (event.clientY - area.top) / area.height;
+  const set = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  set.call(box, `${across.toFixed(4)},${up.toFixed(4)},${map.dataset.map}`);
+  box.dispatchEvent(new Event("input", { bubbles: true }));
+});
+
 // what is drawn as a button presses a hot key; it does not bubble, as the camera would take it for a key that is held
 document.addEventListener("click", (event) => {
   const key = event.target.closest?.("[data-hotkey]")?.dataset.hotkey;

@@ -21,6 +21,10 @@ style.textContent = `
   .odeform-badge.outside { background: #b06a00; }
   .odeform-badge.unknown { background: #b3260c; }
   .odeform-bar { width: 27em; max-width: 100%; }
+  @media (min-width: 75em) {
+    #odeform-view > [data-odeform-view=scale] { position: absolute; right: ${SIDE}px; top: 12px; }
+    #odeform-view > :is([data-odeform-view=caption], [data-odeform-view=trust]) { max-width: calc(100% - 30em); }
+  }
   .odeform-bar svg { display: block; width: 100%; height: 14px; }
   #odeform-view > [data-odeform-view=timeline] {
     position: absolute; left: 12px; right: ${SIDE}px; bottom: 12px; max-width: none; height: 56px; padding: 4px 12px;
@@ -34,6 +38,15 @@ style.textContent = `
   [data-mantine-color-scheme=dark] [data-odeform-view] [data-hotkey] { color: #f0955f; }
   [data-odeform-view] [data-hotkey]:hover { background: color-mix(in srgb, currentColor 14%, transparent); }
   [data-odeform-view] [data-hotkey] svg { display: block; width: 18px; height: 18px; fill: currentColor; }
+  .mantine-Paper-root [style*="letter-spacing"], .mantine-Paper-root input { letter-spacing: 0 !important; }
+  .odeform-range { position: relative; height: 3px; pointer-events: none;
+    margin: calc(-1.15em - 12px) calc(4.5em + 4px) calc(1.15em + 9px) calc(7.6em - 4px); }
+  .odeform-range svg { height: 3px; }
+  .odeform-range b {
+    position: absolute; right: calc(100% + 4px); top: 17px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
+    white-space: nowrap;
+  }
+  [data-mantine-color-scheme=dark] .odeform-range b { color: #f0955f; }
   .odeform-moment { width: 5em; text-align: right; font-variant-numeric: tabular-nums; font-weight: 600; }
   .odeform-track { position: relative; flex: 1; height: 46px; cursor: ew-resize; touch-action: none; min-width: 0; }
   .odeform-track > svg { position: absolute; left: 0; top: 0; width: 100%; height: 32px; overflow: visible; }
@@ -47,8 +60,14 @@ style.textContent = `
   }
   .odeform-track span:first-of-type { transform: none; }
   .odeform-track span.last { transform: translateX(-100%); }
+  .odeform-track span.until { background: var(--mantine-color-body); }
+  @media (max-width: 68em) { .odeform-track span.truth { display: none; } }
   .odeform-track i {
     position: absolute; top: -2px; width: 3px; height: 36px; margin-left: -1.5px; border-radius: 2px; background: #d66030;
+  }
+  @media (max-width: 60em) {
+    #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
+    .odeform-aside, .odeform-wide { display: none !important; }
   }
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }
@@ -68,6 +87,14 @@ const shown = new Map(ORDER.map((name) => {
   return [name, place];
 }));
 
+// The control after the one that holds an element: viser gives text boxes no id.
+window.odeform.boxAfter = (element) => {
+  for (let part = element; part && !part.matches("[role=tabpanel], body"); part = part.parentElement) {
+    if (part.nextElementSibling?.querySelectorAll("input").length === 1) return part.nextElementSibling;
+  }
+  return null;
+};
+
 function mirror() {
   const sources = new Map([...document.querySelectorAll("[data-odeform-view]")]
     .filter((part) => part.parentElement !== layer)
@@ -78,6 +105,8 @@ function mirror() {
   }
   const slider = shown.get("timeline").querySelector("[data-time-slider]")?.dataset.timeSlider;
   document.getElementById(slider)?.closest(".mantine-Paper-root")?.classList.add("odeform-unseen");
+  const map = document.querySelector("[data-map]");
+  if (map) window.odeform.boxAfter(map)?.classList.add("odeform-unseen");
 }
 new MutationObserver((changes) => {
   if (changes.some((change) => !layer.contains(change.target))) mirror();

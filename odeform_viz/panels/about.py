@@ -1,7 +1,11 @@
 """Tells where the scene and the first model come from."""
 
+import re
+
+from odeform.models.names import ALIASES
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
+from odeform_viz.words import constant_text, notes_of
 
 __all__ = ["AboutPanel"]
 
@@ -17,8 +21,16 @@ class AboutPanel(Panel):
 def _about(column: Column) -> str:
     assert column.predictor is not None
     provenance = column.predictor.checkpoint.provenance
-    lines = list(column.source.schema.notes)
-    if fixed := ", ".join(f"{name} {value:.4g}" for name, value in provenance.get("fixed", {}).items()):
+    lines = list(notes_of(column.source.schema))
+    if fixed := ", ".join(constant_text(name, value) for name, value in provenance.get("fixed", {}).items()):
         lines.append(f"Constant: {fixed}.")
-    lines += [f"Made with `{command}`." for command in provenance.get("command", [])]
+    lines += [f"Made with `{_current(command)}`." for command in provenance.get("command", [])]
     return "\n\n".join(lines)
+
+
+def _current(command: str) -> str:
+    """The command with today's name of a family of models."""
+    for older, name in ALIASES.items():
+        if older != "odeform":  # still the family that suits the data
+            command = re.sub(rf"--model {older}(?!\S)", f"--model {name}", command)
+    return command

@@ -1,6 +1,7 @@
 """Shows what is in view: scene, models and shape, what the colours mean, and what is not to scale."""
 
-from html import escape
+import re
+from html import escape, unescape
 from pathlib import Path
 
 from odeform.schema import OBJECT
@@ -11,8 +12,9 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.view import ColorScale, Description, DisplayOptions, Frame
+from odeform_viz.words import model_title, subject_of
 
-__all__ = ["CaptionPanel", "caption_html", "scale_html"]
+__all__ = ["CaptionPanel", "caption_html", "scale_html", "subject_text"]
 
 OF = {
     "displacement": "displacement from the rest shape",
@@ -31,6 +33,11 @@ def caption_html(frame: Frame, options: DisplayOptions) -> str:
     return "".join(lines)
 
 
+def subject_text(frame: Frame) -> str:
+    """What moves and which models show it, without markup."""
+    return unescape(re.sub(r"<[^>]+>", "", _subject(frame)))
+
+
 def scale_html(scale: ColorScale | None, histogram: Floats | None) -> str:
     """Draws the colours of values with quantity and unit, and a histogram (BINS,) of them; empty without a scale."""
     if scale is None:
@@ -45,16 +52,18 @@ def scale_html(scale: ColorScale | None, histogram: Floats | None) -> str:
 
 
 def _subject(frame: Frame) -> str:
-    """Scene, models and shape."""
+    """What moves and how, models, and the shape that was loaded."""
     if not frame.columns:
         return "no column is in view"
-    models = list(dict.fromkeys(c.column.predictor.model for c in frame.columns if c.column.predictor))
-    truth = ["truth"] if frame.truth else []
+    models = list(dict.fromkeys(model_title(c.column.predictor) for c in frame.columns if c.column.predictor))
+    truth = ["simulated truth"] if frame.truth else []
     fit = next((c.column.fit for c in frame.columns if c.column.fit), None)
-    own = frame.columns[0].motion.parameters.get(OBJECT, "the body of the training data")
-    shape = str(own) if fit is None else Path(fit.origin).name or "uploaded shape"
-    names = ", ".join([*([f"model {', '.join(models)}"] if models else []), *truth])
-    return f"<b>{escape(frame.columns[0].motion.schema.scene)}</b> · {escape(names)} · {escape(shape)}"
+    own = str(frame.columns[0].motion.parameters.get(OBJECT, ""))
+    scene, names = frame.columns[0].motion.schema.scene, ", ".join([*models, *truth])
+    shape = "" if fit is None else Path(fit.origin).name or "uploaded shape"
+    moves = subject_of(scene, own if fit is None or not own else shape)
+    of = f" · on {escape(shape)}" if shape and not own else ""
+    return f"<b>{escape(moves)}</b> · {escape(names)}{of}"
 
 
 def _legend(frame: Frame) -> str:

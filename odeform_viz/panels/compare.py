@@ -18,6 +18,7 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 from odeform_viz.user_bodies import user_body_of, with_user_body
+from odeform_viz.words import model_title, origin_title, plain
 
 __all__ = ["ComparePanel", "pinned_label", "sweep", "swept_names"]
 
@@ -29,7 +30,7 @@ def pinned_label(name: str, parameters: Mapping[str, Any], schema: Schema) -> st
     if contacts_of(schema):
         strength = float(np.linalg.norm(vector_of(parameters, "force")))
         return f"{name}: {parameters[OBJECT]}, {strength:.3g} N"
-    return f"{name} at " + ", ".join(f"{p.name} {parameters[p.name]:.3g}" for p in schema.learned)
+    return f"{name} at {plain({p.name: parameters[p.name] for p in schema.learned}, schema)}"
 
 
 def swept_names(schema: Schema) -> tuple[str, ...]:
@@ -70,7 +71,8 @@ class ComparePanel(Panel):
 
     def __init__(self, page: Page) -> None:
         self._page, self._gui, self._columns, self._schema = page, page.server.gui, page.columns, page.schema
-        self._models = {n: str(p) for n, p in bundled_checkpoints().items() if n.startswith(f"{self._schema.scene}/")}
+        names = [name for name in bundled_checkpoints() if name.startswith(f"{self._schema.scene}/")]
+        self._models = {origin_title(name): name for name in names}
         self._boxes: dict[int, viser.GuiCheckboxHandle] = {}
         self._sent: dict[int, bool] = {}  # the value that each box was last set to, by the viewer or by the user
         self._refreshing = threading.Lock()
@@ -92,7 +94,7 @@ class ComparePanel(Panel):
     def _build_add(self) -> None:
         gui = self._gui
         if self._models:
-            self._model = gui.add_dropdown("model", tuple(self._models), hint="bundled checkpoints of this scene")
+            self._model = gui.add_dropdown("model", tuple(self._models), hint="other models of this scene")
             add = gui.add_button("Add model", color="gray")
             add.on_click(lambda _: self._guarded("Model not added", self._add))
         pin = gui.add_button("Pin these parameters", color="gray", hint="add a copy that keeps the present parameters")
@@ -121,7 +123,7 @@ class ComparePanel(Panel):
             raise InputError(f"model: expected one of {', '.join(self._models)}, got {self._model.value!r}")
         predictor = odeform.load(self._models[self._model.value])
         fit, body = self._page.model.fit, user_body_of(self._page.model.predictor)
-        column = Column(predictor.model, predictor, predictor.rest, origin=self._model.value)
+        column = Column(model_title(predictor), predictor, predictor.rest, origin=self._models[self._model.value])
         if body is not None:
             column = with_user_body([column], body)[0]
         elif fit is not None:

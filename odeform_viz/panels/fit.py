@@ -11,37 +11,43 @@ from odeform.identification.observation import View, observe
 from odeform.identification.pushed.identify import identifies_pushes, recorded_points
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Parameters
+from odeform.schema import Parameters, Schema
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.runtime.jobs import Job, fit_parameters, fit_push
+from odeform_viz.words import parameter_title, plain
 
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
 NEXT = "the push that would narrow the widest interval of the body most"
-NO_TRUTH = "Choose a test sequence, open or simulate one: its motion is fitted, not its parameters."
+NO_TRUTH = (
+    "Choose a test sequence above, or open or simulate a motion: the parameters that explain it are then estimated."
+)
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
-EXPLAINED = 1.0  # misfit up to which model and noise explain an observation
+EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 
 
-def describe_identification(found: Identification, truth: Parameters) -> str:
+def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
     """Markdown of estimates with their 90 % intervals, beside the true parameters where they are known."""
+    titles = {p.name: f"{parameter_title(p)} ({p.unit})" if p.unit else parameter_title(p) for p in schema.parameters}
     rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
     for name, one in found.parameters.items():
         true = truth.get(name)
         estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
         known = "" if true is None else f"{true:.3g}"
-        rows.append(f"| {name} | {estimate} | {one.low:.3g}–{one.high:.3g} | {known} |")
+        title = titles.get(name, name.replace("_", " "))
+        rows.append(f"| {title} | {estimate} | {one.low:.3g} to {one.high:.3g} | {known} |")
     explained = (
         "model and noise explain the motion"
         if found.misfit <= EXPLAINED
         else "⚠ **the model does not explain this motion**, and the intervals are wider for it"
     )
-    return "\n".join([*rows, "", f"Misfit {found.misfit:.2g}: {explained}. {found.seconds:.1f} s."])
+    apart = f"Mean square difference from the motion: {found.misfit:.2g} of what is expected"
+    return "\n".join([*rows, "", f"{apart}; {explained}. The search took {found.seconds:.1f} s."])
 
 
 class FitPanel(Panel):
@@ -175,9 +181,11 @@ class _Search:
             return
         parameters, misfit = report
         self.misfits.append(f"{misfit:.3g}")
-        values = ", ".join(f"{name} {value:.3g}" for name, value in parameters.items() if "_" not in name)
+        body = {name: value for name, value in parameters.items() if "_" not in name}  # places are shown
+        values = plain(body, self.page.schema)
         steps = " → ".join(self.misfits[-6:])
-        self.show(f"step {len(self.misfits)}: {values}  \nmisfit {steps}", working=True)
+        text = f"step {len(self.misfits)}: {values}  \ndifference, of what is expected: {steps}"
+        self.show(text, working=True)
         self._place(parameters)
 
     def done(self, found: Identification) -> None:
@@ -185,7 +193,7 @@ class _Search:
         known = self.page.schema.names  # friction has no slider
         estimate = {name: one.value for name, one in found.parameters.items() if name in known}
         self._place(estimate)
-        text = describe_identification(found, self.truth)
+        text = describe_identification(found, self.page.schema, self.truth)
         proposed = {**self.fixed, **found.proposed} if found.proposed else {}
         further = FURTHER.format(found.narrowed) if proposed else ""
         lines = "\n\n".join(filter(None, (text, further, self.note, self.hidden)))
@@ -199,7 +207,7 @@ class _Search:
         """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
         columns, names = self.page.columns, self.page.schema.names
         parameters = {name: value for name, value in parameters.items() if name in names}
-        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True)
+        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True, fitted=True)
         mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
         if mine:
             self.key = mine[0].key

@@ -38,8 +38,10 @@ class LoadPanel(Panel):
     def _chosen(self, event: viser.GuiEvent) -> None:
         if event.client_id is None or self._choice.value == self._shown:
             return
+        title, self._choice.value = self._choice.value, self._shown  # the page that is built anew has a list of its own
         try:
-            self._page.controls.show_load(self._names[self._choice.value])
-        except (InputError, KeyError) as error:
+            if title not in self._names:
+                raise InputError(f"what happens: expected one of {', '.join(self._names)}, got {title!r}")
+            self._page.controls.show_load(self._names[title])
+        except InputError as error:
             self._page.notices.show("Nothing changed", str(error))
-            self._choice.value = self._shown

@@ -4,9 +4,7 @@ from odeform.schema import OBJECT, Parameter
 from odeform_viz.page import Page
 from odeform_viz.user_bodies import user_body_of
 
-__all__ = ["LABELS", "ObjectChoice"]
-
-LABELS = {"young": "stiffness"}
+__all__ = ["ObjectChoice"]
 
 
 class ObjectChoice:

@@ -15,16 +15,16 @@ from odeform.types import Floats
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.panels.object_choice import LABELS, ObjectChoice
+from odeform_viz.panels.object_choice import ObjectChoice
 from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 from odeform_viz.view import Description
+from odeform_viz.words import description_of, known_range, parameter_title, unit_text
 
 __all__ = ["ParameterPanel", "presets", "slider_range"]
 
 NO_PRESET = "–"
 MARGIN = 0.2  # of the trained span, by which a slider reaches beyond it
-MOST_RESETS = 6  # parameters with a button each that resets them
 BINS = 160  # along a slider; training samples in one bin share a mark
 
 
@@ -63,8 +63,11 @@ def presets(schema: Schema) -> dict[str, dict[str, float]]:
     return out
 
 
-def samples_svg(parameter: Parameter, samples: Floats | None, value: float) -> str:
-    """HTML below a slider: the trained range, a mark per training sample, and a warning if `value` is outside."""
+def samples_svg(parameter: Parameter, samples: Floats | None, value: float, known: str = "trained range") -> str:
+    """HTML below a slider: the range that is `known`, a mark per training sample, and a warning if `value` is outside.
+
+    The warning stands under the name of the slider: a line of its own would shove the others while one drags.
+    """
     low, high = slider_range(parameter)
 
     def percent(x: float) -> float:
@@ -77,11 +80,12 @@ def samples_svg(parameter: Parameter, samples: Floats | None, value: float) -> s
         bins = np.unique(np.round((samples - low) / (high - low) * BINS).astype(int))
         marks = "".join(f'<rect x="{100.0 * b / BINS:.2f}%" width="1" y="0" height="5" fill="#4a6a8c"/>' for b in bins)
     if not parameter.inside(value):
-        trained = f"{parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
-        warning = f'<div style="color:#b3450c;font-size:0.75em">⚠ outside the trained range, {trained}</div>'
+        end = parameter.high if value > parameter.high else parameter.low
+        far = f"outside the {known}, {parameter.low:.3g} to {parameter.high:.3g} {unit_text(parameter.unit)}"
+        warning = f'<b title="{far}" aria-label="{far}">⚠ {known.replace("range", "to")} {end:.3g}</b>'
     return (
-        f'<div style="margin:-0.2em 4.5em 0.1em 7.6em"><svg width="100%" height="5" style="display:block">{band}{marks}'
-        f"</svg>{warning}</div>"
+        f'<div class="odeform-range"><svg width="100%" height="5" style="display:block">{band}{marks}</svg>'
+        f"{warning}</div>"
     )
 
 
@@ -117,8 +121,7 @@ class ParameterPanel(Panel):
             )
             self._handled_preset = self._preset.value
             self._preset.on_update(self._choose)
-            names = [p.name for p in self._schema.parameters]
-            reset = self._gui.add_button_group("reset", ("all", *(names if len(names) <= MOST_RESETS else ())))
+            reset = self._gui.add_button_group("reset", ("all",), hint="to the defaults")
             reset.on_click(self._reset)
         page.controls.parameters, page.controls.set_parameters = self.parameters, self.set
         if self._body is not None:
@@ -133,12 +136,13 @@ class ParameterPanel(Panel):
 
     def _add_slider(self, parameter: Parameter) -> None:
         low, high = slider_range(parameter)
-        name, hint, marks = LABELS.get(parameter.name, parameter.name), parameter.description, None
+        name, unit = parameter_title(parameter), unit_text(parameter.unit)
+        hint, marks = description_of(self._schema, parameter), None
         if parameter.role != "body":
-            hint += f"; trained range {parameter.low:.3g} to {parameter.high:.3g} {parameter.unit}"
+            hint += f"; {known_range(self._schema)} {parameter.low:.3g} to {parameter.high:.3g} {unit}"
             marks = tuple((end, f"{end:.3g}") for end in (parameter.low, parameter.high))
         slider = self._gui.add_slider(
-            f"{name} ({parameter.unit})" if parameter.unit else name,
+            f"{name} ({unit})" if unit else name,
             min=round(low, 4),
             max=round(high, 4),
             step=slider_step(low, high),
@@ -211,18 +215,18 @@ class ParameterPanel(Panel):
 
     async def _reset(self, event: viser.GuiEvent) -> None:
         # likewise
-        name, own = event.target.value, {} if self._body is None else self._body.own
-        defaults = {**{p.name: p.default for p in self._schema.parameters}, **own}
-        self.set(defaults if name == "all" else {n: v for n, v in defaults.items() if n == name})
+        own = {} if self._body is None else self._body.own
+        self.set({**{p.name: p.default for p in self._schema.parameters}, **own})
 
     def _refresh(self) -> None:
         """Let the preset and the marks below the sliders follow the sliders."""
         values = self._values()
         self._on_event_loop(self._refresh_preset)
-        known = self._schema.parameters if self._body is None else (*self._body.parameters, *self._schema.parameters)
+        own = () if self._body is None else self._body.parameters
+        known, parameters = known_range(self._schema), (*own, *self._schema.parameters)
         for name, strip in self._strips.items():
-            parameter = next(p for p in known if p.name == name)
-            set_content(strip, samples_svg(parameter, self._samples.get(name), values[name]))
+            parameter = next(p for p in parameters if p.name == name)
+            set_content(strip, samples_svg(parameter, self._samples.get(name), values[name], known))
 
     def _refresh_preset(self) -> None:
         if self._preset.value != self._handled_preset:

@@ -12,6 +12,7 @@ from odeform_viz.panels.timeline import Marks, moment_css, timeline_html
 from odeform_viz.pushing import acting_times
 from odeform_viz.state import PageState
 from odeform_viz.view import Description, shown_until
+from odeform_viz.words import known_window
 
 __all__ = ["PlaybackPanel"]
 
@@ -19,6 +20,10 @@ PREVIOUS, NEXT = "prev", "next"  # frame
 SPEEDS = {"real time": 1.0, "1/2": 0.5, "1/5": 0.2, "1/10": 0.1, "1/20": 0.05, "1/50": 0.02}
 USUAL = 0.2  # of real time, or slower:
 LEAST = 3.0  # s that the trained window takes
+AFTER = {
+    "trained": "after the trained window, the motion is extrapolated",
+    "measured": "how far the motion is off was measured up to there",
+}
 QUIET = 0.3  # s after a drag; times that the clock had set have arrived by then
 
 
@@ -29,6 +34,7 @@ class PlaybackPanel(Panel):
         self._page, self._clock, self._window = page, page.clock, page.schema.window
         self._seeks = 0  # by the user; finding a peak takes a while, and a later seek cancels it
         self._confirming: asyncio.TimerHandle | None = None
+        self._known = known_window(page.schema)
         start, stop = self._window.start, self._window.stop
         gui = page.server.gui
         with gui.add_folder("Time"):
@@ -38,8 +44,8 @@ class PlaybackPanel(Panel):
                 max=round(shown_until(self._window), 4),
                 step=0.0005,
                 initial_value=start,
-                marks=((start, f"{start:g}"), (stop, f"trained until {stop:g} s")),
-                hint="after the trained window, the motion is extrapolated",
+                marks=((start, f"{start:g}"), (stop, f"{self._known} until {stop:g} s")),
+                hint=AFTER[self._known],
             )
             self._time.on_update(self._dragged)
             page.controls.time_slider = self._time._impl.uuid
@@ -134,7 +140,7 @@ class PlaybackPanel(Panel):
     def _draw(self) -> None:
         slider, playing = self._page.controls.time_slider, self._clock.playing
         content = timeline_html(
-            self._window, slider, self._marks, playing, str(self._speed.value), bool(self._loop.value)
+            self._window, slider, self._marks, playing, str(self._speed.value), bool(self._loop.value), self._known
         )
         set_content(self._timeline, in_view("timeline", content))
 

@@ -16,16 +16,17 @@ from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.panels.object_choice import LABELS
 from odeform_viz.pushing import ShownPush, contacts_of, push_excess, surface_of
 from odeform_viz.state import PageState
 from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import Description
+from odeform_viz.words import known_range, known_window, parameter_title
 
 __all__ = ["PushPanel"]
 
 MARGIN = 1.5  # times the strongest trained force: the end of the slider
 WIDEST = 60.0  # degrees of each tilt
+STRAIGHT, BACK = "no tilt", "defaults"
 HINT = "Click the body to choose where {what}. Drag the ball at the arrow's tail to change the force."
 
 
@@ -53,10 +54,10 @@ class PushPanel(Panel):
             self._up = self._add_tilt(gui, "tilt up (°)", "off the inward normal, along the surface and upwards")
             self._side = self._add_tilt(gui, "tilt sideways (°)", "off the inward normal, along the surface")
             self._body = {
-                p.name: gui.add_slider(f"{LABELS.get(p.name, p.name)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)
+                p.name: gui.add_slider(f"{parameter_title(p)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)
                 for p in self._of_body()
             }
-            buttons = gui.add_button_group("set", ("no tilt", "first one"), hint="the direction, or the whole push")
+            buttons = gui.add_button_group("set to", (STRAIGHT, BACK), hint="the direction, or all of these sliders")
             buttons.on_click(self._clicked)
         for control in (self._object, self._strength, self._up, self._side, *self._body.values()):
             control.on_update(lambda _: page.wake())
@@ -225,7 +226,7 @@ class PushPanel(Panel):
             self._object.visible = len(self._schema.objects) > 1 and not self._page.model.loaded
             self._strength.max = MARGIN * strongest
             of = "of the sphere on the body" if self._sphere else "peak of the pulse"
-            self._strength.hint = f"{of}; trained range {weakest:g} to {strongest:g} N"
+            self._strength.hint = f"{of}; {known_range(self._schema)} {weakest:g} to {strongest:g} N"
             shown = (round(push.strength, 3), round(math.degrees(push.up), 1), round(math.degrees(push.side), 1))
             self._object.value = name
             for slider, value in zip((self._strength, self._up, self._side), shown, strict=True):
@@ -241,15 +242,15 @@ class PushPanel(Panel):
         with self._lock:
             parameters = self._parameters
             push = push_from(parameters, self._surface)
-        excess = push_excess(push, self._forces())
+        excess = push_excess(push, self._forces(), known_window(self._schema))
         parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
-        warning = f"⚠ **extrapolated**: {parts}  \n" if excess else ""
+        warning = f"⚠ **beyond what is known**: {parts}  \n" if excess else ""
         set_content(self._text, warning + HINT.format(what="the sphere pushes" if self._sphere else "it is kicked"))
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
         # a coroutine runs soon where the message arrives, before a drag that follows it
         with self._lock:
-            if event.target.value == "first one":
+            if event.target.value == BACK:
                 self._parameters = self._defaults(str(self._parameters[OBJECT]))
             else:
                 push = push_from(self.parameters(), self._surface)

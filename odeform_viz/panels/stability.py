@@ -3,17 +3,19 @@
 import threading
 from collections.abc import Callable
 
-import numpy as np
-
+from odeform.errors import InputError
+from odeform.stress.stability import StabilityMap
 from odeform_viz.page import Page, Panel
-from odeform_viz.runtime.jobs import MAPPED, Job, stability_image
+from odeform_viz.panels.stability_svg import map_html, place_of
+from odeform_viz.runtime.jobs import Job, map_stability
 
 __all__ = ["StabilityPanel"]
 
 EXPLAINED = (
-    "The deformation of the body for parameters outside the trained range (framed) and times after the trained window, "
-    f"from {MAPPED * MAPPED} motions of three times that window."
+    "How far the body deforms for parameters inside and outside the trained range, within the trained window and after "
+    "it. Takes about 20 s."
 )
+FOUND = "From {} motions. White frame: the trained range. Click a place to go there; sliders stop at their ends."
 
 
 class StabilityPanel(Panel):
@@ -23,10 +25,11 @@ class StabilityPanel(Panel):
     def needed(cls, page: Page) -> bool:
         if page.schema.objects:
             return False  # each has ranges of its own, and contacts lie on surfaces: there are no corners to map
-        return bool(page.model.origin)  # the other process loads the checkpoint by its name
+        # the other process loads the checkpoint by its name
+        return bool(page.model.origin) and len(page.schema.learned) > 1
 
     def __init__(self, page: Page) -> None:
-        gui, self._origin = page.server.gui, page.model.origin
+        gui, self._origin, self._page = page.server.gui, page.model.origin, page
         self._lock = threading.Lock()
         self._text = gui.add_markdown(EXPLAINED)
         self._button = gui.add_button("Map stability")
@@ -34,8 +37,12 @@ class StabilityPanel(Panel):
         self._bar = gui.add_progress_bar(0.0, visible=False)
         self._cancel = gui.add_button("Cancel the map", color="gray", visible=False)
         self._cancel.on_click(lambda _: self.close())
-        self._image = gui.add_image(np.full((1, 1, 3), 255, dtype=np.uint8), format="png", visible=False)
-        self._work: Callable[..., np.ndarray] = stability_image
+        self._map = gui.add_html("", visible=False)
+        # the page hides it: a click on the map writes into it
+        self._place = gui.add_text("place on the map", "", visible=False)
+        self._place.on_update(lambda _: self._go())
+        self._found: StabilityMap | None = None
+        self._work: Callable[..., StabilityMap] = map_stability
         self._job: Job | None = None
 
     def close(self) -> None:
@@ -60,10 +67,26 @@ class StabilityPanel(Panel):
     def _progress(self, fraction: float) -> None:
         self._bar.value = 100.0 * fraction
 
-    def _done(self, image: np.ndarray) -> None:
-        self._bar.visible = self._cancel.visible = self._text.visible = False
-        self._image.image = image
-        self._image.visible = True
+    def _done(self, found: StabilityMap) -> None:
+        self._found = found
+        self._bar.visible = self._cancel.visible = False
+        self._text.content = FOUND.format(found.solved)
+        first, second = self._page.schema.learned[:2]
+        self._place.visible = True  # before the map: clicks look for it
+        self._map.content = map_html(found, (first, second))
+        self._map.visible = True
+
+    def _go(self) -> None:
+        if self._found is None or not self._place.value:
+            return
+        first, second = self._page.schema.learned[:2]
+        try:
+            values, time = place_of(self._place.value, self._found, (first, second))
+            self._page.controls.set_parameters(values)
+        except (InputError, ValueError, IndexError) as error:
+            self._page.notices.show("Not gone there", str(error))
+            return
+        self._page.pause_at(time)
 
     def _failed(self, message: str) -> None:
         self._show(working=False)

@@ -12,6 +12,7 @@ from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.pushing import describe_push, first_push, outside_of_push
 from odeform_viz.view import ColumnFrame, Description, Frame
+from odeform_viz.words import known_range
 
 __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
@@ -46,16 +47,19 @@ def badge_of(frame: Frame) -> Badge:
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
             return Badge("unknown", f"not modelled: only t = {only:.3g} s is predicted, and shown")
+    schema = models[0].motion.schema
     outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
     if models[0].motion.extrapolates(frame.request.time):
         outside.insert(0, "time")
-    where = f"extrapolated: {', '.join(outside)} outside the trained range" if outside else ""
+    where = f"extrapolated: {', '.join(outside)} outside the {known_range(schema)}" if outside else ""
     if untrained := [c for c in models if c.untrained]:
         known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
         text = "; ".join(filter(None, ("shape not trained", where)))
         return Badge("outside" if known else "unknown", text, expected)
-    if load_of_scene(models[0].motion.schema.scene) is not None:
-        return Badge("unknown", "; ".join(filter(None, ("mechanics alone, not corrected by data", where))), expected)
+    if load_of_scene(schema.scene) is not None:
+        # amber: what moves it is modelled, and no data say how well under this load
+        text = "; ".join(filter(None, ("mechanics: only its contacts were fitted", where)))
+        return Badge("outside", text, expected)
     if any(c.changed for c in models):
         where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
         return Badge("unknown", where, expected)

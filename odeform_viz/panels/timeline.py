@@ -29,8 +29,11 @@ class Marks:
     truth_end: float | None = None
 
 
-def timeline_html(window: Window, slider: str, marks: Marks | None, playing: bool, speed: str, loop: bool) -> str:
-    """Buttons that press hot keys, and the track, which moves the slider of that id."""
+def timeline_html(
+    window: Window, slider: str, marks: Marks | None, playing: bool, speed: str, loop: bool, known: str = "trained"
+) -> str:
+    """Buttons that press hot keys, and the track, which moves the slider of that id; `known` says what ends with the
+    window."""
     play = _button("K", _icon("pause" if playing else "play"), "pause" if playing else "play")
     steps = (
         _button("0", _icon("0"), "go to the start", wide=True)
@@ -43,7 +46,7 @@ def timeline_html(window: Window, slider: str, marks: Marks | None, playing: boo
     again = _button("R", "loop" if loop else "once", "play again and again, or once", wide=True)
     return (
         f'<div class="odeform-buttons">{steps}</div><div class="odeform-moment"></div>'
-        f"{_track(window, slider, marks)}"
+        f"{_track(window, slider, marks, known)}"
         f'<div class="odeform-buttons">{pace}{again}</div>'
     )
 
@@ -66,7 +69,7 @@ def _icon(name: str) -> str:
     return f'<svg viewBox="0 0 24 24"><path d="{ICONS[name]}"/></svg>'
 
 
-def _track(window: Window, slider: str, marks: Marks | None) -> str:
+def _track(window: Window, slider: str, marks: Marks | None, known: str) -> str:
     end = shown_until(window)
 
     def at(time: float) -> float:
@@ -76,7 +79,7 @@ def _track(window: Window, slider: str, marks: Marks | None) -> str:
         f'<rect class="ground" width="{WIDTH}" height="{HEIGHT}"/>',
         f'<rect class="beyond" x="{at(window.stop):.1f}" width="{WIDTH - at(window.stop):.1f}" height="{HEIGHT}"/>',
     ]
-    labels = [(0.0, f"{window.start:g} s", ""), (at(window.stop), f"trained until {window.stop:g} s", "")]
+    labels = [(0.0, f"{window.start:g} s", ""), (at(window.stop), f"{known} until {window.stop:g} s", "until")]
     if marks is not None:
         parts.append(f'<path class="shape" d="{_profile(marks.curves)}"/>')
         parts += [
@@ -87,14 +90,14 @@ def _track(window: Window, slider: str, marks: Marks | None) -> str:
             x = at(min(marks.truth_end, end))
             parts.append(f'<path class="mark" d="M{x:.1f} 0V{HEIGHT}"/>')
             if abs(x - at(window.stop)) > 0.12 * WIDTH:
-                labels.append((x, f"truth until {marks.truth_end:.3g} s", ""))
+                labels.append((x, f"truth until {marks.truth_end:.3g} s", "truth"))
     labels.append((WIDTH, f"{end:.3g} s", "last"))
     texts = "".join(
         f'<span class="{kind}" style="left:{100.0 * x / WIDTH:.1f}%">{text}</span>' for x, text, kind in labels
     )
     return (
         f'<div class="odeform-track" data-time-slider="{slider}" data-start="{window.start:g}" data-stop="{end:g}" '
-        'title="grey: the deformation; orange, below: a force acts; orange, above: after the trained window">'
+        f'title="grey: the deformation; orange, below: a force acts; orange, above: after what was {known}">'
         f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" preserveAspectRatio="none">{"".join(parts)}</svg>{texts}<i></i></div>'
     )
 

@@ -27,7 +27,10 @@ from odeform_viz.user_bodies import (
 __all__ = ["UserBodyPanel"]
 
 TRAINED = "The trained bodies. A mesh with any defects, or points or splats of a solid, can be pushed as well."
-WORKING = "**{}** is being filled with tetrahedra and laid on the floor. This takes some seconds."
+WORKING = (
+    "**{}** is being filled with tetrahedra and laid on the floor. It takes five seconds on an idle machine, and "
+    "longer beside other work."
+)
 
 
 class UserBodyPanel(Panel):
@@ -42,6 +45,7 @@ class UserBodyPanel(Panel):
             hint = f"a mesh, points or Gaussian splats of one solid body, up to {MOST_POINTS:,} points"
             self._load = gui.add_upload_button("Load a shape...", color="gray", hint=hint)
             self._load.on_upload(lambda event: self._upload(take_upload(event)))
+            self._bar = gui.add_progress_bar(100.0, visible=False, animated=True)  # how far it is is not known
             self._cancel = gui.add_button("Cancel", color="gray", visible=False)
             self._cancel.on_click(serialized(self._give_up))
             self._back = gui.add_button("Back to the trained bodies", color="gray", visible=False)
@@ -117,11 +121,13 @@ class UserBodyPanel(Panel):
         self._page.columns_changed()
 
     def _working(self, text: str) -> None:
-        self._text.content, self._cancel.visible, self._load.visible = text, True, False
+        self._text.content, self._load.visible = text, False
+        self._bar.visible = self._cancel.visible = True
         self._teaching.show(None)
 
     def _show(self) -> None:
         body = user_body_of(self._page.model.predictor)
         self._text.content = TRAINED if body is None else describe_user_body(body)
-        self._back.visible, self._cancel.visible, self._load.visible = body is not None, False, True
+        self._back.visible, self._load.visible = body is not None, True
+        self._bar.visible = self._cancel.visible = False
         self._teaching.show(body)

@@ -6,7 +6,7 @@ import viser.transforms as vtf
 
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import Floats, Mesh, Points, Pose
+from odeform.types import Floats, GaussianSplats, Mesh, Points, Pose
 from odeform_viz.colors import Color
 from odeform_viz.columns import Column
 from odeform_viz.pushing import ShownPush, push_shown
@@ -18,6 +18,7 @@ from odeform_viz.rendering.obstacles import ObstacleView
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.push import Pull, PushView
 from odeform_viz.rendering.refined import refined
+from odeform_viz.rendering.shadow import FloorShadow
 from odeform_viz.rendering.shapes import show_shape
 from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions
 
@@ -57,6 +58,9 @@ class ColumnView:
         self._refined = refined(coarse, fine) if coarse and fine else None
         drawn = self._refined.mesh if self._refined else column.geometry
         self._shape = show_shape(server, f"{self.root}/body", drawn, color, shadow=on_floor)
+        self._shadow = None
+        if not on_floor and isinstance(column.geometry, GaussianSplats):
+            self._shadow = FloorShadow(server, f"{self.root}/ground/shadow", self._rest)
         self._glyphs = GlyphView(server, f"{self.root}/ground", self._rest)
         self._obstacles = ObstacleView(server, f"{self.root}/ground")
         self._push_view = PushView(server, f"{self.root}/ground", f"{self.root}/body", pull)
@@ -120,6 +124,8 @@ class ColumnView:
         step = 0.5 * INVISIBLE / self._extent
         self._body.wxyz = np.round(vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz / step) * step
         self._body.position = frame.pose[:3, 3] + self._shift
+        if self._shadow is not None:
+            self._shadow.show(self.centre(frame))
         points = self._deformed(frame, options.exaggeration)
         if self._refined is not None and points is not None:
             points = self._refined.points(points)

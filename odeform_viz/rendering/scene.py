@@ -24,7 +24,7 @@ from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, F
 
 __all__ = ["SceneView"]
 
-OVERLAID = 0.45  # opacity of all but the first of columns that overlap
+OVERLAID = 0.45  # opacity of columns that overlap, but for the truth, or the first where there is none
 ENDED = 0.25  # opacity of a truth that is over
 
 
@@ -88,7 +88,9 @@ class SceneView:
                 view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
                 values = coloring.values.get(shown.column.key) if coloring else None
                 colors = colors_of(values, coloring.scale) if coloring and values is not None else None
-                view.show(shown, options, self._look(shown, options, index, colors))
+                view.show(
+                    shown, options, self._look(shown, options, shown is (frame.truth or frame.columns[0]), colors)
+                )
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
                 view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
@@ -99,12 +101,15 @@ class SceneView:
         if self._pick is not None:
             self._pickable = tuple(self._drawn_body(shown, options) for shown in frame.columns)
 
-    def _look(self, shown: ColumnFrame, options: DisplayOptions, index: int, colors: Colors | None) -> Look:
-        """Bodies are of clay; those that overlap, or belong to a sweep, have the colors of their curves."""
+    def _look(self, shown: ColumnFrame, options: DisplayOptions, solid: bool, colors: Colors | None) -> Look:
+        """Bodies are of clay; those that overlap, or belong to a sweep, have the colors of their curves.
+
+        Of those that overlap one is `solid`, and is seen through the others.
+        """
         if shown.ended:
             return Look(None, ENDED, options.wireframe, TRUTH)
         own = options.overlay or shown.column.rank is not None
-        opacity = OVERLAID if options.overlay and index else None
+        opacity = OVERLAID if options.overlay and not solid else None
         return Look(colors, opacity, options.wireframe, color_of(shown.column) if own else None)
 
     def _drawn_body(self, shown: ColumnFrame, options: DisplayOptions) -> "_DrawnBody":

@@ -11,8 +11,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.identification.identify import Identification
@@ -24,6 +22,7 @@ from odeform.types import Geometry, MotionSequence, Times
 if TYPE_CHECKING:
     from odeform.figure import Source
     from odeform.identification.pushed.evidence import Evidence
+    from odeform.stress.stability import StabilityMap
 
 __all__ = [
     "JOB",
@@ -34,16 +33,16 @@ __all__ = [
     "fit_push",
     "make_figure",
     "make_user_body",
+    "map_stability",
     "refine_model",
     "simulate_lessons",
     "simulate_motion",
     "simulate_user_body",
-    "stability_image",
 ]
 
 JOB = "odeform-job"  # the name of the processes
 POLITE = 10  # added to the niceness of long work
-MAPPED = 13  # values of each parameter in a map; with more it takes minutes
+MAPPING = 15.0  # s of work on a map of stability; starting the process takes some more
 Report = Callable[[Any], None]
 """Called with the progress of the work: the fraction that is done, 0 to 1, or what else the work says it is."""
 
@@ -279,13 +278,12 @@ def fit_push(report: Report, predictor: Predictor, seen: "Evidence", known: dict
     return identify_push(predictor, seen, known, progress=lambda *step: report(step), propose=True)
 
 
-def stability_image(report: Report, checkpoint: str) -> np.ndarray:
-    """The stability plot of a model, (H, W, 3) pixels: where it is stable, within the trained window and beyond."""
+def map_stability(report: Report, checkpoint: str) -> "StabilityMap":
+    """Maps where a model is stable, within the trained window and beyond."""
     from odeform.models.registry import load_continuous
-    from odeform.stress.stability import map_image, stability_map
+    from odeform.stress.stability import refined_map
 
-    plot = stability_map(load_continuous(checkpoint), count=MAPPED, moments=(0.5, 1.0, 3.0), report=report)
-    return np.asarray(map_image(plot))
+    return refined_map(load_continuous(checkpoint), MAPPING, report=report)
 
 
 def make_figure(report: Report, sources: "Sequence[tuple[str, Source]]", times: Times) -> bytes:

@@ -3,9 +3,10 @@
 import io
 
 import numpy as np
+import pytest
 from PIL import Image
 
-from odeform.formats.picture_files import DESCRIPTION, png_bytes, webp_bytes
+from odeform.formats.picture_files import DESCRIPTION, FFMPEG, mp4_bytes, png_bytes, webp_bytes
 
 NOTES = ("mass = 7 kg is outside the trained range", "t = 2 s is extrapolated")
 SAID = "mass = 7 kg is outside the trained range. t = 2 s is extrapolated"
@@ -31,3 +32,10 @@ def test_a_film_has_its_frames_and_duration_and_says_what_is_outside() -> None:
         shown = np.asarray(film.convert("RGB")).astype(int)  # the duration is known once the frame is decoded
         assert np.abs(shown - _plain(red)).max() < 12
         assert film.info["duration"] == 40
+
+
+@pytest.mark.skipif(FFMPEG is None, reason="needs ffmpeg on the PATH")
+def test_a_film_for_slides_is_an_mp4_that_says_what_is_outside() -> None:
+    film = mp4_bytes([_plain(10)[:19], _plain(240)[:19]], 0.04, NOTES)
+    assert film[4:8] == b"ftyp"
+    assert SAID.encode() in film

@@ -8,6 +8,7 @@ import pytest
 from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.solver import integrate as solver
 from odeform.solver.integrate import SolverSettings, integrate
+from odeform.solver.registry import TITLES
 from odeform.solver.solution import Status
 from odeform.types import Floats
 
@@ -48,8 +49,8 @@ def test_fixed_steps_take_over(method: str) -> None:
     motion = solve(stiff, quality, 0.1)
     stats = motion.stats
     assert stats.status == "fixed steps"
-    assert stats.solver.startswith("rk4, h = 10 ms")
-    assert f"{method}, tol 1e-06 failed at t = {alone.end:.3f} s: step limit reached" in stats.solver
+    assert stats.solver.startswith("Runge-Kutta 4, steps of 10 ms")
+    assert f"{TITLES[method]}, tolerance 1e-06 failed at t = {alone.end:.3f} s: step limit reached" in stats.solver
     assert stats.evaluations > alone.evaluations
     assert stats.solver_error_mm is None
     assert motion.last_good == np.inf
@@ -80,7 +81,7 @@ def test_where_fixed_steps_fail_too_the_last_good_state_stays() -> None:
 def test_fixed_steps_that_fail_have_nothing_to_fall_back_on() -> None:
     motion = solve(pole, FIXED, 5.0)
     assert motion.stats.status == "non-finite state"
-    assert motion.stats.solver == "rk4, h = 10 ms"
+    assert motion.stats.solver == "Runge-Kutta 4, steps of 10 ms"
 
 
 @pytest.mark.parametrize(

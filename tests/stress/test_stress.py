@@ -29,7 +29,7 @@ from odeform.stress import cases as cases_module
 from odeform.stress import consistency, convergence, physics, solvers, stress
 from odeform.stress.cases import Case, extreme_cases, methods_of, shapes
 from odeform.stress.check import Check
-from odeform.stress.stability import map_image, stability_map
+from odeform.stress.stability import map_image, refined_map, stability_map
 
 EXPLICIT = ("euler", "midpoint", "rk4", "bosh3", "dopri5")
 REFINED, FINER = (12, 16, 48), (3, 4, 6)  # within the asymptotic range of all methods
@@ -227,6 +227,20 @@ def test_spin_is_energy() -> None:
     # the first tenth: all of the potential energy over the lowest point
     potential = 0.5 * 9.81**2 * 0.2**2
     assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
+
+
+@pytest.mark.usefixtures("unchecked")
+def test_a_map_without_time_is_the_coarsest_and_the_same(model: LatentModel) -> None:
+    fractions: list[float] = []
+    found = refined_map(model, 0.0, scale=1.0, moments=(0.5, 1.0), report=fractions.append)
+    assert found.solved == 9
+    assert len(fractions) == 9
+    known = stability_map(model, scale=1.0, count=3, moments=(0.5, 1.0))
+    assert np.allclose(found.values * found.largest, known.values * known.largest)
+    assert np.array_equal(found.sound, known.sound)
+    finer = refined_map(model, 60.0, scale=1.0, moments=(0.5, 1.0))
+    assert finer.solved == 17 * 17
+    assert np.allclose(finer.values[:, ::8, ::8] * finer.largest, found.values * found.largest)
 
 
 @pytest.mark.usefixtures("unchecked")

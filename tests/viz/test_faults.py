@@ -72,7 +72,7 @@ def test_a_killed_fit_is_reported_and_can_be_started_again(dropped: View, monkey
     monkeypatch.setattr(fit, "fit_parameters", endless_fit)
     for _ in range(2):
         client.click("Fit to the truth")
-        assert client.until(lambda: "misfit 3" in client.text())
+        assert client.until(lambda: "of what is expected: 3" in client.text())
         _kill(app.panel(FitPanel)._job)
         assert client.until(lambda: f"**The fit failed**: {KILLED}" in client.text())
         assert client.until(lambda: client.controls["Fit to the truth"].visible)
@@ -85,7 +85,7 @@ def test_the_fit_of_a_closed_tab_goes_on_for_others_and_leaves_nothing(dropped: 
         other.click("Fit to the truth")
         assert client.until(lambda: client.controls["Cancel the fit"].visible)
         other.vanish()
-    assert client.until(lambda: "Misfit" in client.text())
+    assert client.until(lambda: "Mean square difference" in client.text())
     assert client.until(lambda: client.controls["Set sliders to the estimate"].visible)
     job = app.panel(FitPanel)._job
     assert job is not None

@@ -46,6 +46,8 @@ def test_a_page_plays_the_motion_at_its_own_speed(motion: Motion) -> None:
     moved = {time for time, message in played["messages"] if message.get("name", "").endswith("/body")}
     assert moved >= set(TIMES[1:])
     assert "force 180 N" in page
+    assert "<title>ball, kicked · ODeform</title>" in page
+    assert "0 to 0.3 s, lengths in metres" in page
     assert "force = 180 N is outside the trained range, 10 to 160 N" in page
 
 

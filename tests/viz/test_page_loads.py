@@ -14,7 +14,9 @@ from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform_viz.app import App
 from odeform_viz.columns import Column, columns_under
+from odeform_viz.page import Page
 from odeform_viz.panels.load import LoadPanel
+from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.push import PushPanel
 from odeform_viz.panels.stability import StabilityPanel
 from odeform_viz.panels.summary import badge_of
@@ -39,7 +41,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
     app, client = serve(column)
     for load, control in (
         ("drop", "height (m)"),
-        ("throw", "spin_y (rad/s)"),
+        ("throw", "spin y (rad/s)"),
         ("kick", "force (N)"),
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
@@ -87,8 +89,8 @@ def test_nothing_is_claimed_of_a_load_that_was_not_measured(serve: Any, column: 
     app.show_load("drop")
     assert client.until(lambda: _shows(app, "object-drop"))
     badge = badge_of(app.presenter.frame)
-    assert badge.level == "unknown"
-    assert "not corrected by data" in badge.text
+    assert badge.level == "outside"
+    assert "only its contacts were fitted" in badge.text
     assert badge.expected == "error not known"
 
 
@@ -110,6 +112,26 @@ def test_a_recording_is_of_one_scene(serve: Any, column: Column, tmp_path: Path)
     assert app.session.schema.scene == "contact-force"
 
 
+def test_a_page_that_cannot_be_built_leaves_the_one_before(
+    serve: Any, column: Column, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, client = serve(column)
+    build = ParameterPanel.__init__
+
+    def broken(self: ParameterPanel, page: Page) -> None:
+        build(self, page)
+        raise RuntimeError("no such slider")
+
+    monkeypatch.setattr(ParameterPanel, "__init__", broken)
+    client.set("what happens", "Drop it")
+    assert client.until(lambda: any("no such slider" in str(text) for text in client.notifications))
+    assert app.session.schema.scene == "contact-force"
+    assert client.until(lambda: _shows(app, "contact-force") and "force (N)" in client.controls)
+    monkeypatch.undo()
+    client.set("what happens", "Drop it")
+    assert client.until(lambda: _shows(app, "object-drop"))
+
+
 def test_pages_of_other_models_do_not_ask(serve: Any) -> None:
     kick = odeform.load("kick")
     app, _ = serve(Column("rolling", kick, kick.rest))
@@ -126,7 +148,7 @@ def tab(column: Column) -> Iterator[Tab]:
 def test_a_choice_in_the_browser_builds_the_page_anew(tab: Tab) -> None:
     before = tab.settled()
     tab.choose("what happens", "Throw it")
-    assert tab.says("spin_y")
+    assert tab.says("spin y")
     assert until(lambda: _shows(tab.app, "object-throw"))
     assert tab.changes(before)
     tab.choose("what happens", "Push it with a sphere")

@@ -16,7 +16,7 @@ from odeform_viz.columns import Column
 
 pytestmark = [pytest.mark.slow, needs_chromium]
 
-IN_VIEW = {"caption": "kick", "trust": "inside the trained range", "timeline": "trained until 1 s"}
+IN_VIEW = {"caption": "ball, kicked", "trust": "inside the trained range", "timeline": "trained until 1 s"}
 MOMENT = "getComputedStyle(document.querySelector('#odeform-view .odeform-moment'), '::after').content"
 
 

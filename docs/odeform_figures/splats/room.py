@@ -29,7 +29,7 @@ DAY, SUNSHINE = 0.92, np.array([0.52, 0.47, 0.36])
 
 
 def room(radius: float, rng: np.random.Generator) -> Surfels:
-    """Makes the room, with the shadow of a ball of `radius` m on the floor."""
+    """Makes the room, with a finer floor around a ball of `radius` m. No shadow is baked: it would stay."""
     return joined_surfels([_floor(radius, rng), *_walls(), _window(), *_skirting()])
 
 
@@ -70,7 +70,7 @@ def _floor(radius: float, rng: np.random.Generator) -> Surfels:
     pitch = np.stack([length, np.full(len(x), 0.01)], axis=1)
     # a little below the ball, so that no region around it contains any of the floor
     wood = OAK * _boards(x, y, rng)
-    return tiles(-1e-3 * Z, X, Y, np.stack([x, y], axis=1), pitch, wood * _floor_light(x, y, radius))
+    return tiles(-1e-3 * Z, X, Y, np.stack([x, y], axis=1), pitch, wood * _floor_light(x, y))
 
 
 def _boards(x: Floats, y: Floats, rng: np.random.Generator) -> Points:
@@ -91,12 +91,9 @@ def _boards(x: Floats, y: Floats, rng: np.random.Generator) -> Points:
     return (tone * grain * edge)[:, None] * (1.0 + warmth[:, None] * np.array([1.0, 0.2, -1.5]))
 
 
-def _floor_light(x: Floats, y: Floats, radius: float) -> Points:
-    """(N, 3) color factors: darker corners, the shadow of the ball, and sunlight."""
-    square = (x**2 + y**2) / radius**2
-    # shadow of a sphere on the floor under an even sky, and the contact shadow
-    shadow = 1.0 - 0.56 * (1.0 + square) ** -1.5 - 0.18 * np.exp(-25.0 * square)
-    even = _corner(HIGH[0] - x) * _corner(HIGH[1] - y) * shadow
+def _floor_light(x: Floats, y: Floats) -> Points:
+    """(N, 3) color factors: darker corners, and sunlight."""
+    even = _corner(HIGH[0] - x) * _corner(HIGH[1] - y)
     return DAY * even[:, None] + SUNSHINE * _sunlit(x, y)[:, None]
 
 

@@ -15,7 +15,7 @@ from odeform_viz.rendering.checkerboard import checkerboard_parts
 __all__ = ["drag_while_fitting"]
 
 MOMENT = {True: 0.3, False: 0.02}  # s at which bodies are deformed, by whether they fall first
-DONE = "Misfit"  # in the text of a fit that is done
+DONE = "Mean square difference"  # in the text of a fit that is done
 
 
 def drag_while_fitting(model: Predictor, truth: Column, messages: int) -> dict[str, float]:

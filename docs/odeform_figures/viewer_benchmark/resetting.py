@@ -60,7 +60,7 @@ def reset(visitors: Visitors, rest: float = 3.0) -> None:
 def _defaults(app: App) -> dict[str, str]:
     """Values of the controls that set parameters."""
     objects = app.session.schema.objects
-    pushed = {"object": objects[0], "set": "first one"} if objects else {}
+    pushed = {"object": objects[0], "set to": "defaults"} if objects else {}
     return {"reset": "all", **pushed, "test sequence": "none"}
 
 

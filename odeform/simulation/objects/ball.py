@@ -42,7 +42,8 @@ MATERIAL = Material(young=0.13e6, poisson=0.3, viscosity=19.0, friction=0.5, con
 NOTES = (
     "The wall is 0.29 of the radius or more: too thick for thin-shell theory, bending and stretching follow "
     "E h^3 / (12 (1 - nu^2)) and E h by definition of the scene.",
-    "Losses are those of a lining of fixed viscosity, so that mass and bending act apart and not by their ratio alone.",
+    "The wall loses energy by a viscosity that does not depend on its stiffness, so that mass and bending stiffness "
+    "have effects of their own.",
 )
 
 FIXED = {

@@ -11,7 +11,7 @@ Stubbed = tuple[App, LoopbackClient]
 
 
 def test_scene_model_and_shape_are_named(stubbed: Stubbed) -> None:
-    assert "<b>stub</b> · model stub · the body of the training data" in stubbed[1].text()
+    assert "<b>stub</b> · stub" in stubbed[1].text()
 
 
 def test_exaggeration_and_the_scale_are_stated(stubbed: Stubbed) -> None:

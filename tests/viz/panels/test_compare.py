@@ -29,15 +29,15 @@ def _labels(app: App) -> list[str]:
 
 def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
     app, client = kicked
-    client.set("model", "kick/pod-rbf")
+    client.set("model", "POD + RBF")
     client.click("Add model")
     assert client.until(lambda: "/world/column_1/body/part_0" in client.nodes)
-    assert _labels(app) == ["odeform", "pod-rbf"]
-    assert client.controls["pod-rbf"].value is True
+    assert _labels(app) == ["odeform", "POD + RBF"]
+    assert client.controls["POD + RBF"].value is True
     client.set("model", "nonsense")
     client.click("Add model")
     assert client.until(lambda: any("model: expected one of" in said for said in client.notifications))
-    assert _labels(app) == ["odeform", "pod-rbf"]
+    assert _labels(app) == ["odeform", "POD + RBF"]
 
 
 @pytest.mark.slow
@@ -95,7 +95,7 @@ def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
 
 
 def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
-    rival, asked = load("kick/pod-rbf"), []
+    rival, asked = load("POD + RBF"), []
     solve = rival.solve
     rival.solve = lambda *given, **named: (asked.append(1), solve(*given, **named))[1]  # pyright: ignore
     app, client = serve(Column("odeform", kick, kick.rest), Column("rival", rival, rival.rest))

@@ -11,6 +11,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.identification.identify import Identification, Identified
 from odeform.models.registry import load
+from odeform.simulation.scenes.registry import get_scene
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import MOST, Column
@@ -55,7 +56,7 @@ def test_estimates_stand_beside_the_truth_and_go_to_the_sliders(dropped: View) -
     assert found is not None
     for name, true in ENTRY.parameters.items():
         assert found[name] == pytest.approx(true, rel=0.02)
-        assert f"| {name} |" in client.text()
+        assert f"| {name} (" in client.text()
     client.click(USE)
     assert client.until(lambda: app.panel(ParameterPanel).parameters() == pytest.approx(dict(found)))
 
@@ -81,7 +82,7 @@ def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.
     _open(app, client)
     monkeypatch.setattr(fit, "fit_parameters", endless)
     client.click(START)
-    assert client.until(lambda: "misfit 3" in client.text())
+    assert client.until(lambda: "of what is expected: 3" in client.text())
     panel = app.panel(FitPanel)
     assert panel._job is not None
     if how == "cancel":
@@ -94,7 +95,7 @@ def test_a_search_ends_when_it_is_not_needed(dropped: View, monkeypatch: pytest.
     assert not panel._job.running
     panel._job._process.join(60.0)
     assert not panel._job._process.is_alive()
-    assert client.until(lambda: "misfit" not in client.text())
+    assert client.until(lambda: "of what is expected" not in client.text())
     assert not client.controls[USE].visible
 
 
@@ -121,9 +122,11 @@ def test_a_search_that_fails_says_why(dropped: View, monkeypatch: pytest.MonkeyP
 
 def test_what_is_not_determined_is_not_given_as_a_number() -> None:
     sure, vague = Identified(0.7, 0.69, 0.71, True, 0.1, 0.01), Identified(0.3, 0.1, 0.9, False, 0.0, 1.3)
-    text = describe_identification(Identification({"mass": sure, "bending": vague}, 3.0, 1.0), {"mass": 0.72})
-    assert "| mass | **0.7** | 0.69–0.71 | 0.72 |" in text
-    assert "| bending | not identifiable | 0.1–0.9 |  |" in text
+    found = Identification({"mass": sure, "bending": vague, "friction": sure}, 3.0, 1.0)
+    text = describe_identification(found, get_scene("kick").schema, {"mass": 0.72})
+    assert "| mass (kg) | **0.7** | 0.69 to 0.71 | 0.72 |" in text
+    assert "| bending (N m) | not identifiable | 0.1 to 0.9 |  |" in text
+    assert "| friction | **0.7** | 0.69 to 0.71 |  |" in text
     assert "the model does not explain this motion" in text
 
 

@@ -7,6 +7,7 @@ import pytest
 from odeform.models.base import Predictor
 from odeform.models.frontier import cheapest_within_error
 from odeform.models.registry import load
+from odeform.solver.registry import TITLES
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import Column
@@ -29,7 +30,7 @@ def test_an_error_chooses_the_cheapest_setting_that_keeps_to_it(
     for point in (useful[0], useful[len(useful) // 2], useful[-1]):
         client.set("at most (mm)", 1.001 * point.solver_error_mm)
         assert client.until(lambda point=point: chosen(app) == point.quality.to_json())
-    assert client.until(lambda: kick.frontier[-1].quality.method in client.text())
+    assert client.until(lambda: TITLES[kick.frontier[-1].quality.method] in client.text())
     assert client.controls["at most (mm)"].visible
     assert not client.controls["at most (ms)"].visible
 
@@ -46,6 +47,7 @@ def test_a_longer_time_never_chooses_a_coarser_setting(kicked: tuple[App, Loopba
         places.append(settings.index(chosen(app)))
     assert places == sorted(places)
     assert (places[0], places[-1]) == (0, len(settings) - 1)
+    assert client.until(lambda: "ms on this machine, as measured" in client.text())
 
 
 def test_a_state_restores_the_setting(kicked: tuple[App, LoopbackClient], kick: Predictor) -> None:

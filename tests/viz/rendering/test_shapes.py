@@ -9,6 +9,7 @@ import viser
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, PointCloud
 from odeform_viz.rendering.look import Look
+from odeform_viz.rendering.shadow import FloorShadow
 from odeform_viz.rendering.shapes import show_shape
 
 COLOR = (206, 78, 26)
@@ -64,3 +65,15 @@ def test_splats_cast_the_shadow_of_an_invisible_hull(server: viser.ViserServer, 
     if shadow:
         assert hull.cast_shadow
         assert b'"alphaMode":"BLEND"' in hull.glb_data
+
+
+def test_splats_in_a_captured_scene_have_a_shadow_that_follows_them(server: viser.ViserServer) -> None:
+    points = 0.1 * np.random.default_rng(0).normal(size=(500, 3)).astype(np.float32) + np.float32([0.0, 0.0, 0.3])
+    shadow = FloorShadow(server, "/shadow", points)
+    splats = server.scene.get_handle_by_name("/shadow")
+    assert isinstance(splats, viser.GaussianSplatHandle)
+    shadow.show(np.array([0.4, -0.2, 0.3]))
+    assert tuple(splats.position[:2]) == pytest.approx((0.4, -0.2))
+    near = np.array(splats.buffer)
+    shadow.show(np.array([0.4, -0.2, 0.8]))
+    assert not np.array_equal(near, np.array(splats.buffer))

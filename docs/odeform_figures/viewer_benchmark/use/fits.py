@@ -6,7 +6,7 @@ from odeform_viz.panels.truth import NONE
 __all__ = ["choose_truth", "fit"]
 
 START, CANCEL, USE = "Fit to the truth", "Cancel the fit", "Set sliders to the estimate"
-DONE, STEP = "Misfit", "misfit"  # in the text of the panel
+DONE, STEP = "Mean square difference", "of what is expected: "  # in the text of the panel
 
 
 def fit(visitors: Visitors) -> None:
