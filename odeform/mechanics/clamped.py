@@ -101,7 +101,7 @@ class ClampedBody:
 
     @cached_property
     def free(self) -> Ints:
-        """Indices of the coordinates that may move."""
+        """Finds the indices (C,) of the coordinates that may move."""
         return np.flatnonzero(np.repeat(~self.held, 3))
 
     @cached_property

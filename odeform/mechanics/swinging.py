@@ -93,7 +93,7 @@ class SwingingBody:
         return found
 
     def energy(self, q: Floats) -> float:
-        """J, elastic and of the load."""
+        """J, elastic and of the load, at amplitudes (R,)."""
         terms = self.terms(q)[0]
         return float(0.5 * self.stiffer * terms @ self.products @ terms - self.load @ q)
 

@@ -112,7 +112,7 @@ def refined_map(
                 second.name: second.denormalise(float(units[cell[0]])),
             }
             known[cell] = _cell(predictor, given, times)
-            report(min(spent / seconds, 1.0))
+            report(min(spent / seconds, 1.0) if seconds > 0.0 else 1.0)
     at = np.array(list(known))
     shown = np.stack(np.meshgrid(*2 * [np.arange(0, count, step)], indexing="ij"), axis=-1)
     nearest = np.atleast_1d(KDTree(at).query(shown.reshape(-1, 2))[1])

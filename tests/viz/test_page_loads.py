@@ -45,7 +45,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("kick", "force (N)"),
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
-        ("slope", "angle (deg)"),
+        ("slope", "angle (°)"),
         ("push", "force (N)"),
     ):
         app.show_load(load)

@@ -44,7 +44,7 @@ def test_labels_say_that_a_ball_is_shown(checkpoint: str, tmp_path: Path) -> Non
     file = tmp_path / "body.ply"
     trimesh.Trimesh(CORNERS, TETRAHEDRON, process=False).export(file)
     (column,) = make_columns(checkpoint, (), str(file))
-    assert column.label == "released"
+    assert column.label == "authors' network"
     assert np.allclose(column.geometry.points, CORNERS), "as it is, not scaled to a ball"
 
 

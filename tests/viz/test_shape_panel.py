@@ -26,7 +26,7 @@ from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
 from odeform_viz.view import DisplayOptions, ViewRequest
 
-BALL, REST = 24_000, 27_482  # splats of the bundled scene
+BALL, REST, SHADOW = 24_000, 27_482, 3  # splats of the bundled scene
 
 
 @pytest.fixture
@@ -74,7 +74,9 @@ def test_the_still_part_is_sent_once_for_all_columns(
         view.publish(session.frame(replace(request, time=time)), DisplayOptions(), None)
     assert sorted(made) == [
         ("/world/column_0/body/splats", BALL),
+        ("/world/column_0/ground/shadow", SHADOW),
         ("/world/column_1/body/splats", BALL),
+        ("/world/column_1/ground/shadow", SHADOW),
         ("/world/still/splats", REST),
     ]
     assert {handle.name for handle in moved} == {name for name, count in made if count == BALL}

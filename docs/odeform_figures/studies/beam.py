@@ -152,6 +152,7 @@ def _measured(study: _Study) -> dict[str, float]:
 
 
 def main() -> None:
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", type=Path)
     parser.add_argument("--weight", type=float, default=0.0, help="grams on the upper edge of the tip")

@@ -32,13 +32,19 @@ class Evidence(Protocol):
     """An observation of T frames."""
 
     @property
-    def times(self) -> Times: ...
+    def times(self) -> Times:
+        """(T,) s, of the observations."""
+        ...
 
     @property
-    def noise_mm(self) -> float: ...
+    def noise_mm(self) -> float:
+        """Standard deviation of each coordinate."""
+        ...
 
     @property
-    def camera_free(self) -> bool: ...
+    def camera_free(self) -> bool:
+        """Whether it is not known from where the body is seen."""
+        ...
 
     def compared(self, surface: Frames, slopes: Floats, camera: Camera) -> Residuals:
         """Compares predicted surfaces (T, S, 3) m and their slopes (F, T, S, 3) m."""
@@ -86,6 +92,7 @@ class Known:
         return np.einsum("nc,...nci->...ni", self.barycentric, surface[..., self.faces[self.face], :])
 
     def compared(self, surface: Frames, slopes: Floats, camera: Camera) -> Residuals:
+        """Compares points with predicted surfaces (T, S, 3) m and their slopes (F, T, S, 3) m."""
         predicted, changes = self._on(surface), self._on(slopes)
         values = [1e3 * (row - there).ravel() for row, there in zip(self.positions, predicted, strict=True)]
         along = [1e3 * changes[:, index].reshape(len(changes), -1) for index in range(len(values))]
@@ -110,6 +117,7 @@ class Cloud:
         _check(self.times, self.points, self.noise_mm)
 
     def compared(self, surface: Frames, slopes: Floats, camera: Camera) -> Residuals:
+        """Compares clouds, along normals of the nearest faces, with surfaces (T, S, 3) m and slopes (F, T, S, 3) m."""
         out = Residuals([], [], [])
         for index, observed in enumerate(self.points):
             seen = camera.points(observed)

@@ -62,7 +62,7 @@ def test_a_pinned_column_stays_while_the_sliders_go_on(kicked: Kicked, kick: Pre
     client.set("mass (kg)", 0.6)
     client.click("Pin these parameters")
     assert client.until(lambda: len(app.columns.all) == 2)
-    assert _labels(app)[1].startswith("odeform at mass 0.6, bending")
+    assert _labels(app)[1].startswith("odeform at mass 0.6 kg, bending")
     assert client.until(lambda: app.presenter.settled and len(_frame(app).columns) == 2)
     client.set("mass (kg)", 0.9)
     moved = client.wait_vertices("/world/column_0/body/part_0")
@@ -95,7 +95,7 @@ def test_a_sweep_stands_alone_and_goes_again(kicked: Kicked) -> None:
 
 
 def test_only_what_is_shown_is_computed(serve: Serve, kick: Predictor) -> None:
-    rival, asked = load("POD + RBF"), []
+    rival, asked = load("kick/pod-rbf"), []
     solve = rival.solve
     rival.solve = lambda *given, **named: (asked.append(1), solve(*given, **named))[1]  # pyright: ignore
     app, client = serve(Column("odeform", kick, kick.rest), Column("rival", rival, rival.rest))
