@@ -27,6 +27,7 @@ from odeform_viz.user_bodies import (
 __all__ = ["UserBodyPanel"]
 
 TRAINED = "The trained bodies. A mesh with any defects, or points or splats of a solid, can be pushed as well."
+BREAK = "_\u200b"  # names of files are long, and the panel is narrow
 WORKING = (
     "**{}** is being filled with tetrahedra and laid on the floor. It takes five seconds on an idle machine, and "
     "longer beside other work."
@@ -127,7 +128,7 @@ class UserBodyPanel(Panel):
 
     def _show(self) -> None:
         body = user_body_of(self._page.model.predictor)
-        self._text.content = TRAINED if body is None else describe_user_body(body)
+        self._text.content = TRAINED if body is None else describe_user_body(body).replace("_", BREAK)
         self._back.visible, self._load.visible = body is not None, True
         self._bar.visible = self._cancel.visible = False
         self._teaching.show(body)
