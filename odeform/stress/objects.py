@@ -104,7 +104,7 @@ def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]
     """`draws` pushes and the checks over them, as JSON; the seed fixes everything but times."""
     model = _opened(checkpoint)
     rows = list(enumerate(draws_of(model.schema, draws, seed)))
-    found = parallel_map("pushes", partial(_watched_from, checkpoint), rows, batch_size=BATCH)
+    found = parallel_map("motions", partial(_watched_from, checkpoint), rows, batch_size=BATCH)
     load = load_of_scene(model.schema.scene)
     depth = FLAT if load else max(part.validity.limits.depth for part in model.parts.values())
     checks = {
