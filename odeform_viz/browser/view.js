@@ -67,7 +67,7 @@ style.textContent = `
   }
   @media (max-width: 60em) {
     #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
-    .odeform-aside, .odeform-wide { display: none !important; }
+    .odeform-aside { display: none !important; }
   }
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }

@@ -103,7 +103,7 @@ def test_whole_motions(tab: Tab, drop: Predictor, suffix: str, tmp_path: Path) -
 def test_a_screenshot(tab: Tab, tmp_path: Path) -> None:
     with Image.open(_saved(tab, "Screenshot (.png)", tmp_path)) as picture:
         assert picture.format == "PNG"
-        assert picture.size[1] > 200
+        assert picture.size[1] > 150  # what plots and timeline leave of a low window
         assert np.asarray(picture.convert("RGB")).std() > 3.0
 
 
