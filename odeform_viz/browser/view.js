@@ -67,7 +67,8 @@ style.textContent = `
   }
   @media (max-width: 60em) {
     #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
-    .odeform-aside { display: none !important; }
+    .odeform-aside, .odeform-track span.until { display: none !important; }
+    .odeform-buttons, .odeform-buttons > a { gap: 0; padding: 0 2px; margin: 0; }
   }
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }
