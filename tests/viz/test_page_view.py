@@ -31,7 +31,7 @@ def test_caption_badge_and_timeline_are_in_view_whatever_the_tab(tab: Tab) -> No
         for place, text in (
             ("caption", "kick"),
             ("trust", "inside the trained range"),
-            ("timeline", "trained until 1 s"),
+            ("timeline", "speed"),
         ):
             shown = tab.page.locator(f"#odeform-view > [data-odeform-view={place}]")
             assert until(lambda shown=shown, text=text: text in shown.inner_text())
