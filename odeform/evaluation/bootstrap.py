@@ -11,7 +11,7 @@ CONFIDENCE = 0.95
 DRAWS, SEED = 4000, 0
 FEWEST = 2  # motions, of fewer there is no interval
 
-Motions = tuple[Float[np.ndarray, " motions"], Float[np.ndarray, " motions"]]
+Motions = tuple[Float[np.ndarray, " _motions"], Float[np.ndarray, " _motions"]]  # groups differ in number
 """The sum of squares in mm^2 over the frames of each motion, and the number of its frames."""
 
 
