@@ -55,6 +55,10 @@ class Load:
     """s: how long a force acts at a contact that one chooses on the surface of the body on the floor, with parameters
     `contact_x` to `_z` and `force_x` to `_z`; None for a load under which it begins in the air."""
 
+    held: bool = False
+    """Whether a patch of the body is held: it deforms as its own modulus and damping say, and not as what was fitted to
+    impacts, which makes up for what modes leave out there."""
+
     @property
     def flies(self) -> bool:
         """Whether the body begins in the air, and not where it rests on the floor."""

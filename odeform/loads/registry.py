@@ -18,6 +18,7 @@ LOADS: dict[str, str] = {
     "wall": "odeform.loads.wall:LOAD",
     "step": "odeform.loads.step:LOAD",
     "slope": "odeform.loads.slope:LOAD",
+    "hold": "odeform.loads.hold:LOAD",
 }
 """Load name to "module:attribute", imported when the load is first asked for."""
 

@@ -7,9 +7,10 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.geometry.contact import SurfacePoint
 from odeform.loads.obstacle import Obstacle
+from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Mesh, Perpoint, Points, Rotations, Vector
 
-__all__ = ["Flight", "Pulse", "Situation", "beginning_outside", "pulse_strength"]
+__all__ = ["Clamp", "Flight", "Pulse", "Situation", "beginning_outside", "patch_weights", "pulse_strength"]
 
 TOUCH = 2e-3  # m that a body may begin inside an obstacle: how it gives way under its weight is not looked at
 
@@ -50,10 +51,29 @@ class Pulse:
     def weights(self, points: Points, masses: Perpoint, middle: Vector) -> Perpoint:
         """Computes (N,) the fractions of the force on points (N, 3) m that stand for `masses` (N,) kg, around `middle`
         (3,) m; they sum to 1."""
-        away = ((points - middle) ** 2).sum(axis=1)
-        # relative to the nearest one, which is loaded however far away it is
-        weights = masses * np.exp((away.min() - away) / self.radius**2)
-        return weights / weights.sum()
+        return patch_weights(points, masses, middle, self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Clamp:
+    """Springs and dampers, both ways, that hold a patch of the surface where its points begin."""
+
+    vertex: int
+    """The vertex of the surface in the middle of the patch."""
+    radius: float
+    """m: the stiffness falls with the distance from the middle as a Gaussian of this width."""
+    sink: float
+    """m by which the whole weight of the body would displace a patch that does not turn."""
+    damping: float
+    """s: of the dampers, relative to the springs."""
+
+    def stiffness(self, points: Points, masses: Perpoint, mass: float) -> Perpoint:
+        """Computes (N,) N/m of each axis at vertices (N, 3) m of a body at rest, which stand for `masses` (N,) kg.
+
+        That of all is what carries a body of `mass` kg.
+        """
+        weights = patch_weights(points, masses, points[self.vertex], self.radius)
+        return mass * GRAVITY / self.sink * weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +83,7 @@ class Situation:
     flight: Flight | None = None
     """None for a body that begins at rest on the floor."""
     pulse: Pulse | None = None
+    clamp: Clamp | None = None
     obstacles: tuple[Obstacle, ...] = ()
     """What the body meets besides the floor. All situations of a load have as many."""
 
@@ -74,6 +95,15 @@ def beginning_outside(rest: Mesh, flight: Flight, obstacles: tuple[Obstacle, ...
     if inside > TOUCH:
         raise InputError(f"distance: expected a body that begins outside the {name}, got {inside:.2g} m inside it")
     return Situation(flight, obstacles=obstacles)
+
+
+def patch_weights(points: Points, masses: Perpoint, middle: Vector, radius: float) -> Perpoint:
+    """Computes (N,) shares of points (N, 3) m that stand for `masses` (N,), in a patch around `middle` (3,) m whose
+    weight falls as a Gaussian of `radius` m; they sum to 1."""
+    away = ((points - middle) ** 2).sum(axis=1)
+    # relative to the nearest one, which has a share however far away it is
+    weights = masses * np.exp((away.min() - away) / radius**2)
+    return weights / weights.sum()
 
 
 def pulse_strength(time: float | Floats, duration: float) -> Floats:

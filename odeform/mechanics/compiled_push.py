@@ -61,6 +61,11 @@ class Constants(NamedTuple):
     patch_rows: ndarray  # (B, 6, K)
     patch_forces: ndarray  # (B, 3) N
     patch_pulse: float  # s, 0 without a patch
+    hold_points: ndarray  # (B, 3, H) m, with H = 0 for bodies that nothing holds
+    hold_rows: ndarray  # (B, 6, H, K)
+    hold_stiffness: ndarray  # (B, H) N/m
+    hold_places: ndarray  # (B, H, 3) m
+    hold_damping: float  # s
 
 
 @compiled
@@ -252,6 +257,36 @@ def _near(c, b, z, size, pushed, step, chosen, gaps, what):
 
 @compiled
 @no_type_check
+def _turned(motion, square, once, twice, turned):
+    """Sets the rotation of a sample, once it has moved."""
+    t0, t1, t2 = motion[3], motion[4], motion[5]
+    rest = 1.0 - twice * square
+    turned[0, 0], turned[0, 1] = rest + twice * t0 * t0, twice * t0 * t1 - once * t2
+    turned[0, 2] = twice * t0 * t2 + once * t1
+    turned[1, 0], turned[1, 1] = twice * t0 * t1 + once * t2, rest + twice * t1 * t1
+    turned[1, 2] = twice * t1 * t2 - once * t0
+    turned[2, 0], turned[2, 1] = twice * t0 * t2 - once * t1, twice * t1 * t2 + once * t0
+    turned[2, 2] = rest + twice * t2 * t2
+
+
+@compiled
+@no_type_check
+def _moves(a0, a1, a2, place, turned, rows, i, size, out):
+    """Sets how fast sample i moves along an axis of the body, by the velocities."""
+    out[0], out[1], out[2] = a0, a1, a2
+    out[3] = place[1] * a2 - place[2] * a1
+    out[4] = place[2] * a0 - place[0] * a2
+    out[5] = place[0] * a1 - place[1] * a0
+    b0 = a0 * turned[0, 0] + a1 * turned[1, 0] + a2 * turned[2, 0]
+    b1 = a0 * turned[0, 1] + a1 * turned[1, 1] + a2 * turned[2, 1]
+    b2 = a0 * turned[0, 2] + a1 * turned[1, 2] + a2 * turned[2, 2]
+    r0, r1, r2 = rows[0, i], rows[1, i], rows[2, i]
+    for k in range(size):
+        out[6 + k] = b0 * r0[k] + b1 * r1[k] + b2 * r2[k]
+
+
+@compiled
+@no_type_check
 def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps):
     """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
     points, rows = c.points[b], c.rows[b]
@@ -285,29 +320,34 @@ def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
             for row in range(3):
                 for axis in range(3):
                     axes[row, axis] = scale * half[row] * half[axis] - (sign if row == axis else 0.0)
-        t0, t1, t2 = motion[3], motion[4], motion[5]
-        rest = 1.0 - twice * square
-        turned[0, 0], turned[0, 1] = rest + twice * t0 * t0, twice * t0 * t1 - once * t2
-        turned[0, 2] = twice * t0 * t2 + once * t1
-        turned[1, 0], turned[1, 1] = twice * t0 * t1 + once * t2, rest + twice * t1 * t1
-        turned[1, 2] = twice * t1 * t2 - once * t0
-        turned[2, 0], turned[2, 1] = twice * t0 * t2 - once * t1, twice * t1 * t2 + once * t0
-        turned[2, 2] = rest + twice * t2 * t2
+        _turned(motion, square, once, twice, turned)
         for row in range(3):
-            a0, a1, a2 = axes[row, 0], axes[row, 1], axes[row, 2]
             out = jacobian[j, row]
-            out[0], out[1], out[2] = a0, a1, a2
-            out[3] = place[1] * a2 - place[2] * a1
-            out[4] = place[2] * a0 - place[0] * a2
-            out[5] = place[0] * a1 - place[1] * a0
-            b0 = a0 * turned[0, 0] + a1 * turned[1, 0] + a2 * turned[2, 0]
-            b1 = a0 * turned[0, 1] + a1 * turned[1, 1] + a2 * turned[2, 1]
-            b2 = a0 * turned[0, 2] + a1 * turned[1, 2] + a2 * turned[2, 2]
-            r0, r1, r2 = rows[0, i], rows[1, i], rows[2, i]
-            for k in range(size):
-                out[6 + k] = b0 * r0[k] + b1 * r1[k] + b2 * r2[k]
+            _moves(axes[row, 0], axes[row, 1], axes[row, 2], place, turned, rows, i, size, out)
             if pushed:
-                out[6 + size] = 0.0 if j < floor else -(a0 * guide[0] + a1 * guide[1] + a2 * guide[2])
+                out[6 + size] = 0.0 if j < floor else -(
+                    axes[row, 0] * guide[0] + axes[row, 1] * guide[1] + axes[row, 2] * guide[2]
+                )
+
+
+@compiled
+@no_type_check
+def _hold(c, b, z, size, jacobian, away):
+    """Linearise the springs that hold a patch about a state, in axes of the body; see `odeform.mechanics.holding`."""
+    points, rows, places = c.hold_points[b], c.hold_rows[b], c.hold_places[b]
+    motion, place, turned = np.empty(6), np.empty(3), np.empty((3, 3))
+    for i in range(points.shape[1]):
+        _turn(rows, i, z, size, motion)
+        square, once, twice = _bent(points, i, motion, place)
+        _turned(motion, square, once, twice, turned)
+        d0, d1, d2 = places[i, 0] - z[0], places[i, 1] - z[1], places[i, 2] - z[2]
+        for axis in range(3):
+            row, out = 3 * i + axis, jacobian[3 * i + axis]
+            away[row] = place[axis] - (z[3 + axis] * d0 + z[6 + axis] * d1 + z[9 + axis] * d2)
+            for k in range(len(out)):
+                out[k] = 0.0
+            a0, a1, a2 = (1.0 if axis == 0 else 0.0), (1.0 if axis == 1 else 0.0), (1.0 if axis == 2 else 0.0)
+            _moves(a0, a1, a2, place, turned, rows, i, size, out)
 
 
 @compiled
@@ -449,6 +489,16 @@ def _along(row, v):
 
 @compiled
 @no_type_check
+def _add(row, weight, width, matrix):
+    """Adds the weighted product of a row of the Jacobian with itself to the lower half of a matrix."""
+    for i in range(width):
+        scaled, out = weight * row[i], matrix[i]
+        for k in range(i + 1):
+            out[k] += scaled * row[k]
+
+
+@compiled
+@no_type_check
 def _drag(c, b, j, i, floor, force, r1, r2):
     """Friction by the speed of sliding under a normal force, N s/m."""
     limit = (c.floor_friction if j < floor else c.push_friction) * force
@@ -457,7 +507,7 @@ def _drag(c, b, j, i, floor, force, r1, r2):
 
 @compiled
 @no_type_check
-def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, matrix, out):
+def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, springs, away, matrix, out):
     """The state after one step of first order, which ends at a time; false where it cannot be solved for."""
     width = 6 + size + (1 if pushed else 0)
     v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
@@ -468,6 +518,11 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
     for _ in range(2):
         _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
         _copy(momentum, right)
+        for j in range(len(away)):
+            row, active = springs[j], step * c.hold_stiffness[b, j // 3]
+            _add(row, active * (step + c.hold_damping), width, matrix)
+            for k in range(width):
+                right[k] -= active * away[j] * row[k]
         for j in range(count):
             n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
             r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
@@ -512,18 +567,21 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
 def _step(c, b, z, pushed, time, step, out, work):
     """The state after a step of second order from a time on; returns its error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, whole, half, matrix = work
+    chosen, gaps, what, jacobian, springs, away, whole, half, matrix = work
     floor, count = _near(c, b, z, size, pushed, step, chosen, gaps, what)
     good, begin = True, z
     # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
     for part in range(3):
         if part != 1:
             _contacts(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps)
+            _hold(c, b, begin, size, springs, away)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
             end = out
         last = time + (0.5 * step if part == 1 else step)
-        good &= _implicit(c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, matrix, end)
+        good &= _implicit(
+            c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, springs, away, matrix, end
+        )
         if part == 1:
             begin = half
     if not good:
@@ -595,6 +653,8 @@ def _work(c):
         np.empty(max(c.points.shape[2], most)),
         np.empty(most, np.int64),
         np.empty((most, 3, width)),
+        np.empty((3 * c.hold_points.shape[2], width)),
+        np.empty(3 * c.hold_points.shape[2]),
         np.empty(state),
         np.empty(state),
         np.empty((width, width)),
@@ -676,7 +736,7 @@ def follow(c, b, control, times, states, slopes, rates, tried):
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, _, _, matrix = _work(c)
+    chosen, gaps, what, jacobian, springs, away, _, _, matrix = _work(c)
     start = 13 + size
     for row in range(len(rows)):
         b, z, pushed = rows[row], states[row], times[row] < c.pulse
@@ -688,6 +748,11 @@ def slope_of(c, rows, times, states, out):
         _free(c, b, z, size, pushed, times[row], v, momentum, rate)
         for k in range(size):
             rate[6 + k] -= c.relaxation * c.eigenvalues[b, k] * v[6 + k]
+        _hold(c, b, z, size, springs, away)
+        for j in range(len(away)):
+            pull = c.hold_stiffness[b, j // 3] * (away[j] + c.hold_damping * _along(springs[j], v))
+            for k in range(width):
+                rate[k] -= pull * springs[j, k]
         for j in range(count):
             n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
             r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)

@@ -6,12 +6,13 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from odeform.loads.situation import Pulse
+from odeform.loads.situation import Clamp, Pulse
 from odeform.mechanics.body import ReducedBody
+from odeform.mechanics.holding import Hold, patch_of
 from odeform.mechanics.obstacles import Obstacles
 from odeform.types import Floats, Ints, Vector, Vectors
 
-__all__ = ["WIDTHS", "Patch", "Push", "kicked", "make_push", "no_push"]
+__all__ = ["WIDTHS", "Patch", "Push", "held", "kicked", "make_push", "no_push"]
 
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
@@ -77,12 +78,15 @@ class Push:
     """A force besides that of the sphere."""
     obstacles: Obstacles | None = None
     """What the support may touch besides the floor."""
+    hold: Hold | None = None
+    """Springs that hold a patch of it."""
 
     def some(self, rows: Ints) -> "Push":
         """The pushes `rows` (R,)."""
         each = {name: getattr(self, name)[rows] for name in PARTS}
         patch = None if self.patch is None else self.patch.some(rows)
-        return replace(self, **each, patch=patch, obstacles=self.obstacles and self.obstacles.some(rows))
+        others = {"obstacles": self.obstacles, "hold": self.hold}
+        return replace(self, **each, patch=patch, **{k: v and v.some(rows) for k, v in others.items()})
 
     @cached_property
     def over(self) -> "Push":
@@ -135,6 +139,15 @@ def kicked(body: ReducedBody, soft: int, middle: Vector, pulse: Pulse) -> Push:
     return replace(_without_sphere(body, modes, eigenvalues, soft), patch=patch)
 
 
+def held(body: ReducedBody, soft: int, clamp: Clamp) -> Push:
+    """A body that a clamp holds. The `soft` softest modes are among the directions of deformation; the others are what
+    forces of the clamp do to the rest of its modes."""
+    patch, soft = patch_of(body, clamp), min(soft, len(body.eigenvalues))
+    modes, eigenvalues = _attached(body.eigenvalues, soft, patch.loads[None, soft:])
+    hold = Hold.of(body, patch, modes[0], clamp.damping)
+    return replace(_without_sphere(body, modes, eigenvalues, soft), hold=hold)
+
+
 def _without_sphere(body: ReducedBody, modes: Floats, eigenvalues: Floats, soft: int) -> Push:
     """One body that moves in directions (1, M, K)."""
     support = body.support
@@ -164,10 +177,16 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     for load, patch, loaded, count in zip(loads, patches, around, counts, strict=True):
         for axis in range(3):
             load[:, axis] = (patch[:, :count] @ body.surface.rows[axis].take(loaded[:count], axis=0))[:, soft:].T
-    loads = loads.reshape(batch, len(stiff), -1)
+    return _attached(body.eigenvalues, soft, loads.reshape(batch, len(stiff), -1))
+
+
+def _attached(squares: Floats, soft: int, loads: Float[np.ndarray, "batch stiff loads"]) -> tuple[Floats, Floats]:
+    """(B, M, K) and (B, K): the `soft` softest of modes with squared frequencies (M,), and what `loads` on the other
+    modes do to these."""
+    stiff, batch = squares[soft:], len(loads)
     local = np.linalg.qr(loads / stiff[:, None])[0]
     eigenvalues, turn = np.linalg.eigh(local.transpose(0, 2, 1) @ (stiff[:, None] * local))
-    modes = np.zeros((batch, len(body.eigenvalues), soft + eigenvalues.shape[1]))
+    modes = np.zeros((batch, len(squares), soft + eigenvalues.shape[1]))
     modes[:, range(soft), range(soft)] = 1.0
     modes[:, soft:, soft:] = local @ turn
-    return modes, np.concatenate([np.broadcast_to(body.eigenvalues[:soft], (batch, soft)), eigenvalues], axis=1)
+    return modes, np.concatenate([np.broadcast_to(squares[:soft], (batch, soft)), eigenvalues], axis=1)

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 from odeform.compiling import compiles
 from odeform.mechanics.flat import flat_slopes, packed, unpacked
 from odeform.mechanics.floor import GRAVITY
+from odeform.mechanics.holding import no_hold
 from odeform.mechanics.push import Patch, Push
 from odeform.mechanics.step import Mechanics, Steps
 from odeform.mechanics.touching import most_contacts
@@ -107,6 +108,7 @@ class CompiledBodies:
         solid, floor, stands = mechanics.body.solid, mechanics.floor, push.support
         batch, size = push.eigenvalues.shape
         patch = push.patch or Patch(np.zeros((batch, 3)), np.zeros((batch, 6, size)), np.zeros((batch, 3)), 0.0)
+        hold = push.hold or no_hold(batch, size)
         spread = np.full(6 + push.eigenvalues.shape[1], 1.0 / solid.mass)
         spread[:3], spread[3:6] = 1.0, np.diag(solid.inertia) / solid.mass
         stiffness, grip = parameters.push_stiffness * push.masses, parameters.push_regularisation * push.masses
@@ -146,6 +148,11 @@ class CompiledBodies:
             patch_rows=patch.rows,
             patch_forces=patch.forces,
             patch_pulse=patch.duration,
+            hold_points=hold.points,
+            hold_rows=hold.rows,
+            hold_stiffness=hold.stiffness,
+            hold_places=hold.places,
+            hold_damping=hold.damping,
         )
 
     @property

@@ -18,7 +18,8 @@ from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.push import Push
 from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State, apart, extrapolated
-from odeform.mechanics.touching import Near, Touching, bent
+from odeform.mechanics.touching import Near, Touching
+from odeform.mechanics.warping import bent
 from odeform.types import Floats
 
 __all__ = ["Mechanics", "Projectile", "Rest", "Steps"]
@@ -106,7 +107,7 @@ class Steps:
         parameters, solid = mechanics.parameters, mechanics.body.solid
         batch, size = push.eigenvalues.shape
         self._solid, self._relaxation, self._forces = solid, mechanics.relaxation, push.forces
-        self._patch = push.patch
+        self._patch, self._hold = push.patch, push.hold
         self._eigenvalues, self._preload = parameters.stiffness * push.eigenvalues, preload
         self._masses = np.concatenate([np.full(3, solid.mass), np.zeros(3), np.ones(size), [mechanics.projectile.mass]])
         self._stiffness = np.zeros((batch, len(self._masses)))
@@ -150,6 +151,8 @@ class Steps:
         rate[:, inner] -= self._relaxation * self._eigenvalues * local[:, inner]
         rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
         rate += self._patched(state, np.asarray(time)[None])[0]
+        if self._hold is not None:
+            rate += self._hold.at(state).forces(local)
         matrix = np.zeros((*local.shape, local.shape[1]))
         self._add_masses(matrix, self._masses[: local.shape[1]])
         return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
@@ -162,8 +165,11 @@ class Steps:
         momentum, size = momentum + step * (rate + self._patched(state, ends)), velocity.shape[1]
         masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]
         contacts, velocity = near.contacts(state), velocity[None]
+        springs = None if self._hold is None else self._hold.at(state).resistance(step)
         for _ in range(SWEEPS):
             matrix, impulse = contacts.resistance(velocity, step)
+            if springs is not None:
+                matrix, impulse = matrix + springs[0], impulse + springs[1]
             self._add_masses(matrix, masses)
             velocity = _solved(matrix, momentum + impulse)
         return state.moved(_turned(velocity, state.rotation.swapaxes(-1, -2)), step)

@@ -13,10 +13,10 @@ from odeform.mechanics.obstacles import Obstacles
 from odeform.mechanics.push import Push
 from odeform.mechanics.rotations import skew
 from odeform.mechanics.state import State
-from odeform.mechanics.warping import Turning
+from odeform.mechanics.warping import bent
 from odeform.types import Floats, Ints, Rotations
 
-__all__ = ["Near", "Touching", "bent", "most_contacts"]
+__all__ = ["Near", "Touching", "most_contacts"]
 
 MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
 PUSH = 64  # contacts with the projectile that are followed: thin parts wrap around it
@@ -153,14 +153,6 @@ class Touching:
             real.append(close)
             counts.append((obstacle, some.shape[1]))
         return np.concatenate(chosen, axis=1), np.concatenate(real, axis=1), tuple(counts)
-
-
-def bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
-    """How much samples (B, 3, S) turn, and where they are, in m from the mass centre, for rows (B, 6, S, K)."""
-    batch, _, samples, size = rows.shape
-    motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)
-    turning = Turning(motion[:, 3:])
-    return turning, points + turning.warped(motion[:, :3])
 
 
 def _heights(place: Floats, level: Floats, state: State) -> Float[np.ndarray, "batch samples"]:

@@ -9,9 +9,10 @@ from jaxtyping import Float
 from scipy.sparse import csr_array
 
 from odeform.mechanics.rotations import skew
+from odeform.mechanics.state import State
 from odeform.types import Faces, Floats, Points
 
-__all__ = ["Turning", "surface_turns"]
+__all__ = ["Turning", "bent", "surface_turns"]
 
 SMALL = 1e-9  # rad, in place of 0 / 0
 AFTER, BEFORE = [1, 2, 0], [2, 0, 1]  # of each axis, in a cross product
@@ -59,3 +60,11 @@ class Turning:
         out += skew(once * turns)
         out.reshape(*turns.shape[:-1], 9)[..., ::4] += 1.0 - twice * self._squares.swapaxes(-1, -2)
         return out
+
+
+def bent(points: Floats, rows: Floats, state: State) -> tuple[Turning, Float[np.ndarray, "batch 3 samples"]]:
+    """How much samples (B, 3, S) turn, and where they are, in m from the mass centre, for rows (B, 6, S, K)."""
+    batch, _, samples, size = rows.shape
+    motion = (rows.reshape(batch, 6 * samples, size) @ state.modes[..., None]).reshape(batch, 6, samples)
+    turning = Turning(motion[:, 3:])
+    return turning, points + turning.warped(motion[:, :3])

@@ -6,10 +6,10 @@ import numpy as np
 
 from odeform.geometry.rigid import best_rigid
 from odeform.geometry.solids.tetrahedra import inside_out
-from odeform.loads.situation import Flight, Pulse, Situation, pulse_strength
+from odeform.loads.situation import Clamp, Flight, Pulse, Situation, pulse_strength
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.soft_object import SoftObject
-from odeform.simulation.stepping import Rest, run
+from odeform.simulation.stepping import Body, Rest, run
 from odeform.types import Floats, Frames, Points, Times
 
 __all__ = ["STEP", "released", "simulate_situation"]
@@ -45,7 +45,7 @@ def simulate_situation(
         GuardedBody(body, item.points, item.elements) if solid else body,
         until,
         rate,
-        _force(item, situation.pulse),
+        _force(item, situation, body),
         rest=REST if rests else None,
         report=lambda now: report(now / until),
     )
@@ -67,10 +67,14 @@ def released(item: SoftObject, flight: Flight | None) -> tuple[Points, Points]:
     return arms + np.array([0.0, 0.0, height]), flight.velocity + np.cross(flight.spin, arms)
 
 
-def _force(item: SoftObject, pulse: Pulse | None) -> Callable[[float], Floats | None]:
-    """(N, 3) N at the nodes over time."""
-    if pulse is None:
-        return lambda _: None
+def _force(item: SoftObject, situation: Situation, body: Body) -> Callable[[float], Floats | None]:
+    """(N, 3) N at the nodes over time, besides weight and contacts."""
+    if situation.pulse is not None:
+        return _kicking(item, situation.pulse)
+    return _holding(item, situation.clamp, body) if situation.clamp is not None else lambda _: None
+
+
+def _kicking(item: SoftObject, pulse: Pulse) -> Callable[[float], Floats | None]:
     count = item.surface_count
     weights = np.zeros(len(item.points))
     weights[:count] = pulse.weights(
@@ -78,3 +82,16 @@ def _force(item: SoftObject, pulse: Pulse | None) -> Callable[[float], Floats | 
     )
     load = weights[:, None] * pulse.force
     return lambda time: float(pulse_strength(time, pulse.duration)) * load if time < pulse.duration else None
+
+
+def _holding(item: SoftObject, clamp: Clamp, body: Body) -> Callable[[float], Floats]:
+    count, out = item.surface_count, np.zeros_like(item.points)
+    stiffness = clamp.stiffness(item.settled[:count], item.weights, item.mass)[:, None]
+    begun = body.positions[:count]
+
+    def force(_: float) -> Floats:
+        moved = body.positions[:count] - begun + clamp.damping * body.velocities[:count]
+        out[:count] = -stiffness * moved
+        return out
+
+    return force

@@ -12,9 +12,10 @@ from odeform.checkpoint import Checkpoint
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
 from odeform.loads.situation import Flight, Situation
-from odeform.mechanics.flat import parts_of, start_of
+from odeform.mechanics.flat import parts_of, start_of, unpacked
+from odeform.mechanics.holding import Hold
 from odeform.mechanics.obstacles import Obstacles
-from odeform.mechanics.push import PARTS, Push, kicked, no_push
+from odeform.mechanics.push import PARTS, Push, held, kicked, no_push
 from odeform.mechanics.step import Mechanics
 from odeform.mechanics.warping import Turning
 from odeform.schema import Schema
@@ -58,14 +59,20 @@ class LoadedBody:
         push = _together([self._acted(situation) for situation in situations])
         push = replace(push, obstacles=Obstacles.of([situation.obstacles for situation in situations], self.anchor))
         resting = self.mechanics.start(push)
-        starts = [
-            row if situation.flight is None else self._flying(situation.flight, push.eigenvalues.shape[1])
-            for row, situation in zip(resting, situations, strict=True)
-        ]
-        return Beginning(push, np.stack(starts), 0.0, all(situation.flight is None for situation in situations))
+        starts = np.stack(
+            [
+                row if situation.flight is None else self._flying(situation.flight, push.eigenvalues.shape[1])
+                for row, situation in zip(resting, situations, strict=True)
+            ]
+        )
+        if push.hold is not None:
+            push = replace(push, hold=push.hold.begun(unpacked(starts, False)))
+        return Beginning(push, starts, 0.0, all(situation.flight is None for situation in situations))
 
     def _acted(self, situation: Situation) -> Push:
         pulse = situation.pulse
+        if situation.clamp is not None:
+            return held(self.mechanics.body, self.soft, situation.clamp)
         if pulse is None:
             return no_push(self.mechanics.body, self.soft)
         return kicked(self.mechanics.body, self.soft, pulse.place.point - self.anchor, pulse)
@@ -98,7 +105,8 @@ def _together(pushes: Sequence[Push]) -> Push:
     if patch is not None:
         names = ("points", "rows", "forces")
         patch = replace(patch, **{name: np.concatenate([getattr(p, name) for p in patches]) for name in names})
-    return replace(first, **parts, patch=patch)
+    hold = None if first.hold is None else Hold.together([push.hold for push in pushes if push.hold is not None])
+    return replace(first, **parts, patch=patch, hold=hold)
 
 
 def under_load(checkpoint: Checkpoint, load: Load) -> Checkpoint:

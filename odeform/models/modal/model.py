@@ -129,6 +129,8 @@ class ModalModel(Model):
         falls = self._flies or (self.load is not None and config.get("kicked_as") == "impact")
         law = config.get("impact", config["law"]) if falls else config["law"]
         self.contact_parameters, self.pulse = ContactParameters.from_json(law), float(config["pulse_s"])
+        if self.load is not None and self.load.held:
+            self.contact_parameters = replace(self.contact_parameters, stiffness=1.0, damping=1.0)
         self.projectile = Projectile(**config["projectile"])
         shift, deformation = config["largest"]
         self._largest, self._flat_on = (float(shift), float(deformation)), None

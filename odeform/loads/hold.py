@@ -1,0 +1,54 @@
+"""Load `hold`: a body is held in the air by a patch of its surface, hangs from it and swings."""
+
+import numpy as np
+
+from odeform.errors import InputError
+from odeform.loads.arrow import Arrow
+from odeform.loads.drop import PARAMETERS, WINDOW, height_of, turn_of
+from odeform.loads.load import Load
+from odeform.loads.situation import Clamp, Flight, Situation
+from odeform.schema import Parameter, Parameters
+from odeform.types import Mesh, Points, Vector
+
+__all__ = ["LOAD"]
+
+RADIUS = 0.12  # of the body's size: that of the patch
+SINK, DAMPING = 5e-4, 2e-3  # m and s, of the springs
+LENGTH = 0.25  # of the body's size: the arrow that points at the patch
+
+
+def _towards(parameters: Parameters) -> Vector:
+    """(3,) the unit vector from the middle of the resting body towards where it is held."""
+    around, up = (np.radians(float(parameters[name])) for name in ("held_around", "held_up"))
+    if not np.isfinite([around, up]).all():
+        raise InputError("held_around, held_up: expected finite angles in degrees")
+    return np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+
+
+def held_vertex(points: Points, parameters: Parameters) -> int:
+    """The vertex of a resting body (N, 3) m that is nearest to a place far away in the direction asked for."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    far = 0.5 * (low + high) + float((high - low).max()) * _towards(parameters)
+    return int(((points - far) ** 2).sum(axis=1).argmin())
+
+
+def situation(rest: Mesh, parameters: Parameters) -> Situation:
+    """The body in the air, held."""
+    flight = Flight(height_of(parameters), turn_of(parameters))
+    radius = RADIUS * float(np.ptp(rest.points, axis=0).max())
+    return Situation(flight, clamp=Clamp(held_vertex(rest.points, parameters), radius, SINK, DAMPING))
+
+
+LOAD = Load(
+    name="hold",
+    title="Hold it",
+    parameters=(
+        Parameter("held_around", "deg", -180.0, 180.0, 0.0, description="where it is held: around the body, from x to y"),
+        Parameter("held_up", "deg", -90.0, 90.0, 60.0, description="where it is held: up from its middle"),
+        *PARAMETERS,
+    ),
+    window=WINDOW,
+    until=2.0,
+    situation=situation,
+    held=True,
+)

@@ -1,0 +1,140 @@
+"""Springs both ways that hold a patch of a body where it began."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from odeform.loads.situation import Clamp
+from odeform.mechanics.body import ReducedBody, spread
+from odeform.mechanics.rotations import skew
+from odeform.mechanics.state import State
+from odeform.mechanics.warping import bent
+from odeform.types import Floats, Ints, Points
+
+__every_ = ["HELD", "Hold", "Patch", "no_hold", "patch_of"]
+
+HELD = 40  # points of a patch that springs hold
+LEAST = 0.02  # of the largest stiffness of a sample, below which it is left out
+EACH = ("points", "rows", "stiffness", "places")
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """What of a body's surface is held."""
+
+    samples: Ints
+    """(H,) samples of the surface of the body."""
+    stiffness: Float[np.ndarray, " held"]
+    """(H,) N/m of each, along each axis."""
+    loads: Float[np.ndarray, "modes loads"]
+    """What forces on the patch, even ones and ones that grow along it, do to the modes of the body."""
+
+
+def patch_of(body: ReducedBody, clamp: Clamp) -> Patch:
+    """The samples of a body's surface that stand for those that a clamp holds."""
+    surface, mass = body.surface, body.solid.mass
+    every = clamp.stiffness(surface.points, surface.masses, mass)
+    inside = np.flatnonzero(every > LEAST * every.max())
+    points = surface.points[inside]
+    chosen = spread(points, HELD, int(every[inside].argmax()))
+    owner = KDTree(points[chosen]).query(points)[1]
+    stiffness = np.bincount(owner, every[inside], len(chosen))
+    weights = every[inside] / every[inside].sum()
+    return Patch(inside[chosen], stiffness * (every.sum() / stiffness.sum()), _loads(body, inside, points, weights))
+
+
+def _loads(body: ReducedBody, inside: Ints, points: Points, weights: Floats) -> Floats:
+    """(M, 9): forces along each axis, even ones and ones that grow along the patch in two directions."""
+    arms = points - weights @ points
+    along = np.linalg.svd(np.sqrt(weights)[:, None] * arms, full_matrices=False)[2][:2]
+    grows = np.stack([np.ones(len(points)), *(along @ arms.T)])
+    rows = body.surface.rows[:3, inside]  # (3, N, M)
+    return np.einsum("gn,anm->mga", weights * grows, rows).reshape(rows.shape[2], -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """Springs and dampers that hold H points of each of B bodies."""
+
+    points: Float[np.ndarray, "batch 3 held"]
+    """m at rest, from the mass centre."""
+    rows: Float[np.ndarray, "batch 6 held directions"]
+    """Displacements there by the directions of deformation, as in `odeform.mechanics.push.Push`."""
+    stiffness: Float[np.ndarray, "batch held"]
+    """N/m along each axis."""
+    places: Float[np.ndarray, "batch held 3"]
+    """m in axes of the scene, from where the mass centre rests: where they are held."""
+    damping: float
+    """s: of the dampers, relative to the springs."""
+
+    @classmethod
+    def of(cls, body: ReducedBody, patch: Patch, modes: Floats, damping: float) -> "Hold":
+        """One body in directions (M, K) of deformation, held where it is when all its coordinates are zero."""
+        samples = patch.samples
+        rows = np.stack([row.take(samples, axis=0) @ modes for row in body.surface.rows])
+        points = body.surface.points[samples]
+        return cls(np.ascontiguousarray(points.T)[None], rows[None], patch.stiffness[None], points[None], damping)
+
+    @classmethod
+    def together(cls, holds: Sequence["Hold"]) -> "Hold":
+        """Several bodies as a batch."""
+        each = {name: np.concatenate([getattr(hold, name) for hold in holds]) for name in EACH}
+        return replace(holds[0], **each)
+
+    def some(self, rows: Ints) -> "Hold":
+        """Those of the bodies `rows` (R,)."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in EACH})
+
+    def begun(self, state: State) -> "Hold":
+        """The same springs, without stress in a state."""
+        return replace(self, places=self._places(state))
+
+    def _places(self, state: State) -> Float[np.ndarray, "batch held 3"]:
+        _, place = bent(self.points, self.rows, state)
+        return (state.rotation @ place).swapaxes(1, 2) + state.shift[:, None]
+
+    def at(self, state: State) -> "Held":
+        """The springs, linearised about a state, in axes of the bodies."""
+        turning, place = bent(self.points, self.rows, state)
+        batch, _, held = place.shape
+        out = np.zeros((batch, held, 3, state.velocity.shape[1]))
+        out[..., :3] = np.eye(3)
+        out[..., 3:6] = skew(-place.swapaxes(1, 2))
+        np.matmul(turning.rotations, self.rows[:, :3].swapaxes(1, 2), out=out[..., 6 : state.body])
+        away = place.swapaxes(1, 2) - (self.places - state.shift[:, None]) @ state.rotation
+        stiffness = np.repeat(self.stiffness, 3, axis=1)
+        return Held(out.reshape(batch, 3 * held, -1), away.reshape(batch, -1), stiffness, self.damping)
+
+
+def no_hold(batch: int, directions: int) -> Hold:
+    """Bodies that nothing holds."""
+    rows = np.zeros((batch, 6, 0, directions))
+    return Hold(np.zeros((batch, 3, 0)), rows, np.zeros((batch, 0)), np.zeros((batch, 0, 3)), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """R springs along axes of B bodies, linearised."""
+
+    jacobian: Float[np.ndarray, "batch rows velocities"]
+    """How fast each grows, by the velocities of the body in its own axes."""
+    away: Float[np.ndarray, "batch rows"]
+    """m, how long it is."""
+    stiffness: Float[np.ndarray, "batch rows"]
+    """N/m."""
+    damping: float
+
+    def resistance(self, step: Float[np.ndarray, "#steps #batch 1"]) -> tuple[Floats, Floats]:
+        """Returns what they add to the matrix (H, B, V, V) in kg and to the momentum (H, B, V) of each of H steps."""
+        stiff = self.stiffness[..., None] * self.jacobian
+        square = self.jacobian.swapaxes(1, 2) @ stiff
+        pull = -(self.away[:, None] @ stiff)[:, 0]
+        return (step * (step + self.damping))[..., None] * square, step * pull
+
+    def forces(self, velocity: Float[np.ndarray, "batch velocities"]) -> Float[np.ndarray, "batch velocities"]:
+        """Returns what they add to the rate of the momentum, at these velocities."""
+        speed = (self.jacobian @ velocity[..., None])[..., 0]
+        return -((self.stiffness * (self.away + self.damping * speed))[:, None] @ self.jacobian)[:, 0]
