@@ -44,6 +44,7 @@ HAPPENS = {
     "wall": "thrown at a wall",
     "step": "thrown on a step",
     "slope": "dropped on a slope",
+    "hold": "held",
 }
 SCENES = {"kick": "ball, kicked", "mass-elastic": "ball, dropped"}
 CONSTANTS = {

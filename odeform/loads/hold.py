@@ -1,5 +1,7 @@
 """Load `hold`: a body is held in the air by a patch of its surface, hangs from it and swings."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from odeform.errors import InputError
@@ -15,6 +17,9 @@ __all__ = ["LOAD"]
 RADIUS = 0.12  # of the body's size: that of the patch
 SINK, DAMPING = 5e-4, 2e-3  # m and s, of the springs
 LENGTH = 0.25  # of the body's size: the arrow that points at the patch
+
+
+HEIGHT = replace(PARAMETERS[0], default=0.3)
 
 
 def _towards(parameters: Parameters) -> Vector:
@@ -39,16 +44,37 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
     return Situation(flight, clamp=Clamp(held_vertex(rest.points, parameters), radius, SINK, DAMPING))
 
 
+def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
+    """An arrow that points from outside at the patch, as long as it is held."""
+    turn, points = turn_of(parameters), np.asarray(start.points, dtype=float)
+    resting = points @ turn
+    vector = -LENGTH * float(np.ptp(resting, axis=0).max()) * (turn @ _towards(parameters))
+    return (Arrow(points[held_vertex(resting, parameters)] - vector, vector, "held", 0.0, np.inf),)
+
+
 LOAD = Load(
     name="hold",
     title="Hold it",
     parameters=(
-        Parameter("held_around", "deg", -180.0, 180.0, 0.0, description="where it is held: around the body, from x to y"),
-        Parameter("held_up", "deg", -90.0, 90.0, 60.0, description="where it is held: up from its middle"),
-        *PARAMETERS,
+        Parameter("held_around", "deg", -180.0, 180.0, 0.0, description="where it is held: around, from x to y"),
+        Parameter("held_up", "deg", -90.0, 90.0, 30.0, description="where it is held: up from its middle"),
+        HEIGHT,
+        *PARAMETERS[1:],
     ),
     window=WINDOW,
-    until=2.0,
+    until=3.0,
     situation=situation,
+    presets={
+        "by its side": {"held_up": 0.0},
+        "from above": {"held_up": 90.0},
+        "like a pendulum": {"held_up": 60.0, "turn_y": -60.0},
+        "upside down": {"held_up": -60.0, "turn_x": 180.0},
+        "it touches the floor": {"held_up": 0.0, "height": 0.05},
+    },
+    notes=(
+        "The body begins in the air, without stress. Springs and dampers hold a patch of its surface, an eighth of its "
+        "size wide, where it begins.",
+    ),
+    arrows=arrows,
     held=True,
 )

@@ -325,8 +325,8 @@ def _contacts(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
             out = jacobian[j, row]
             _moves(axes[row, 0], axes[row, 1], axes[row, 2], place, turned, rows, i, size, out)
             if pushed:
-                out[6 + size] = 0.0 if j < floor else -(
-                    axes[row, 0] * guide[0] + axes[row, 1] * guide[1] + axes[row, 2] * guide[2]
+                out[6 + size] = (
+                    0.0 if j < floor else -(axes[row, 0] * guide[0] + axes[row, 1] * guide[1] + axes[row, 2] * guide[2])
                 )
 
 

@@ -42,7 +42,7 @@ class Impact:
     vertices: Frames
     weights: Perpoint
     first: int
-    """Index of the frame of the first contact; 0 of a body that begins on the floor."""
+    """Index of the frame of the first contact; 0 of a body that begins on the floor, or is held."""
 
     def size(self, frames: int) -> float:
         """RMS displacement in m since the first contact, over that many frames and one."""
@@ -57,7 +57,7 @@ def impacts_of(sequences: Iterable[MotionSequence], rate: float, load: Load) -> 
         known = sequence.frames(float(sequence.times[-1]), rate)
         vertices = known.vertices.astype(float)
         gaps = [vertices[:, :, 2], *(one.met(vertices)[0] for one in load.obstacles(sequence.parameters))]
-        first = int((np.min(gaps, axis=(0, 2)) < TOUCHES).argmax())
+        first = 0 if load.held else int((np.min(gaps, axis=(0, 2)) < TOUCHES).argmax())
         found.append(Impact(sequence.parameters, known.times, vertices, sequence.weights, first))
     return found
 
