@@ -60,6 +60,7 @@ def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
 LOAD = Load(
     name="throw",
     title="Throw it",
+    happened="thrown",
     parameters=(
         *PARAMETERS,
         velocity("x", -1.5, 1.5, 1.0),
