@@ -54,7 +54,7 @@ def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
     if speed == 0.0:
         return ()
     middle = 0.5 * (start.points.min(axis=0) + start.points.max(axis=0)).astype(float)
-    return (Arrow(middle, SHOWN * vector, f"{speed:.1f} m/s", 0.0, SHOWN),)
+    return (Arrow(middle, SHOWN * vector, f"{speed:.1f} m/s", 0.0, SHOWN, leaves=True),)
 
 
 LOAD = Load(

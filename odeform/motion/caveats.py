@@ -11,7 +11,8 @@ __all__ = ["caveats"]
 
 def caveats(motion: Motion, times: Times) -> tuple[str, ...]:
     """One sentence each: a shape that was not trained, parameters and (T,) `times` in seconds outside the trained
-    range (under a load, that in which errors were measured), and where the motion is clamped because it is not physically possible. Empty if there is none of them."""
+    range (under a load, that in which errors were measured), and where the motion is clamped because it is not
+    physically possible. Empty if there is none of them."""
     return (
         *_shape(motion),
         *_parameters(motion),

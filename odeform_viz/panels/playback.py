@@ -74,6 +74,8 @@ class PlaybackPanel(Panel):
         self._page.on_event_loop(self._follow_clock)
 
     def restore(self, state: PageState) -> None:
+        self._speed.value = next((name for name, speed in SPEEDS.items() if speed == state.speed), self._speed.value)
+        self._loop.value = state.loop
         self.jump(state.time)
 
     def toggle(self) -> None:

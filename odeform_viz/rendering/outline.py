@@ -29,7 +29,7 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
 
 
 def outline_of(shown: ColumnFrame, axes: Axes, travels: bool) -> Box:
-    """The box of the body within the trained window, of what acts on it, and of the middle of obstacles, which are wide.
+    """The box of the body within the trained window, of what acts on it, and of the middle of obstacles.
 
     Where it goes along the floor counts if it `travels` through the view, and not if the view follows it.
     """

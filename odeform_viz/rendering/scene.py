@@ -25,7 +25,6 @@ from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, F
 
 __all__ = ["SceneView"]
 
-OVERLAID = 0.45  # opacity of columns that overlap, but for the truth, or the first where there is none
 ENDED = 0.25  # opacity of a truth that is over
 
 
@@ -84,14 +83,13 @@ class SceneView:
             framing = self._frame_columns(frame, row, options, together)
             self._update_views(frame)
             self._stage.show(frame, discs)
+            first = next((c for c in frame.columns if c.column.truth is None), None)
             for shown in frame.columns:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
                 view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
                 values = coloring.values.get(shown.column.key) if coloring else None
                 colors = colors_of(values, coloring.scale) if coloring and values is not None else None
-                view.show(
-                    shown, options, self._look(shown, options, shown is (frame.truth or frame.columns[0]), colors)
-                )
+                view.show(shown, options, self._look(shown, options, shown is first, colors))
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
                 view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
@@ -105,13 +103,13 @@ class SceneView:
     def _look(self, shown: ColumnFrame, options: DisplayOptions, solid: bool, colors: Colors | None) -> Look:
         """Bodies are of clay; those that overlap, or belong to a sweep, have the colors of their curves.
 
-        Of those that overlap one is `solid`, and is seen through the others.
+        Two surfaces in one place would cover each other in patches: of bodies that overlap only one is `solid`, and
+        the others are drawn as dots on it.
         """
         if shown.ended:
             return Look(None, ENDED, options.wireframe, TRUTH)
-        own = options.overlay or shown.column.rank is not None
-        opacity = OVERLAID if options.overlay and not solid else None
-        return Look(colors, opacity, options.wireframe, color_of(shown.column) if own else None)
+        tint = color_of(shown.column) if options.overlay or shown.column.rank is not None else None
+        return Look(colors, None, options.wireframe, tint, dots=options.overlay and not solid)
 
     def _drawn_body(self, shown: ColumnFrame, options: DisplayOptions) -> "_DrawnBody":
         view = self._views[shown.column.key][1]
