@@ -24,8 +24,6 @@ from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions
 
 __all__ = ["ColumnView"]
 
-DOT, DOTS = 0.014, 400  # sizes of a body, across a point that is drawn of it; points, about
-
 
 class ColumnView:
     """A frame that carries the rigid pose, and in it a shape whose points carry the deformation.
@@ -59,9 +57,7 @@ class ColumnView:
         coarse = column.geometry if column.truth and isinstance(column.geometry, Mesh) else None
         self._refined = refined(coarse, fine) if coarse and fine else None
         drawn = self._refined.mesh if self._refined else column.geometry
-        self._surface = server.scene.add_frame(f"{self.root}/body/surface", show_axes=False)
-        self._shape = show_shape(server, f"{self.root}/body/surface", drawn, color, shadow=on_floor)
-        self._dots: viser.PointCloudHandle | None = None
+        self._shape = show_shape(server, f"{self.root}/body", drawn, color, shadow=on_floor)
         self._shadow = None
         if not on_floor and isinstance(column.geometry, GaussianSplats):
             self._shadow = FloorShadow(server, f"{self.root}/ground/shadow", self._rest)
@@ -131,24 +127,10 @@ class ColumnView:
         if self._shadow is not None:
             self._shadow.show(self.centre(frame))
         points = self._deformed(frame, options.exaggeration)
-        self._show_dots(self._rest if points is None else points, look.dots)
         if self._refined is not None and points is not None:
             points = self._refined.points(points)
         self._shape.show(points, frame.covariances, look)
         self._show_ghost(options.ghost)
-
-    def _show_dots(self, points: Points, visible: bool) -> None:
-        """Show some of the points (N, 3) m in place of the surface, or the surface again."""
-        points = points[:: max(len(points) // DOTS, 1)]
-        if visible and self._dots is None:
-            node, size = f"{self.root}/body/dots", DOT * self._extent
-            self._dots = self._server.scene.add_point_cloud(
-                node, points, self._color, point_size=size, point_shape="circle", precision="float32"
-            )
-        if self._dots is not None:
-            self._surface.visible, self._dots.visible = not visible, visible
-            if visible:
-                self._dots.points = points
 
     def _deformed(self, frame: ColumnFrame, exaggeration: float) -> Points | None:
         """The body before its pose, (N, 3) m; None at rest."""

@@ -131,7 +131,7 @@ class SceneView:
         reasons = (row, shapes, together, options.viewport, frame.still is None)
         if frame.columns and self._framed != reasons:
             axes = Axes.beside(direction_of(frame.columns[0]))
-            outlines = [outline_of(c, axes, travels=together and bool(obstacles_of(c.motion))) for c in frame.columns]
+            outlines = [outline_of(c, axes, together and bool(obstacles_of(c.motion))) for c in frame.columns]
             box, extent = _around(outlines), max(map(self._size, frame.columns))
             level = frame.still is not None
             self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level)
