@@ -23,7 +23,7 @@ class Arrow:
     rises: bool = False
     """Whether its strength is sin^2 of its time, from none to that of the label and back; otherwise it is constant."""
     leaves: bool = False
-    """Whether its start is carried by the body, as that of a velocity is; otherwise its end is, where a force acts."""
+    """Whether it starts in the middle of the body, as a velocity does; otherwise it ends at it, where a force acts."""
 
     def strength(self, time: float) -> float:
         """The part of the label's strength that acts at `time` in seconds."""

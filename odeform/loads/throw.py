@@ -13,7 +13,7 @@ from odeform.types import Mesh, Vector
 __all__ = ["LOAD", "SPINS", "arrows", "flight_of", "velocity"]
 
 FASTEST, MOST_SPIN = 20.0, 200.0  # m/s and rad/s
-SHOWN = 0.1  # s of the way that the arrow of the velocity is long
+SHOWN = 0.06  # s of the way that the arrow of the velocity is long
 
 
 def velocity(axis: str, low: float, high: float, default: float) -> Parameter:

@@ -82,7 +82,7 @@ class GlyphView:
 
 @dataclass(frozen=True, eq=False)
 class _Attached:
-    """An arrow, one end of which is held by the points of a body that are nearest to it."""
+    """An arrow that ends at the points of a body that are nearest to its head, or leaves the middle of all."""
 
     arrow: Arrow
     carriers: Int[np.ndarray, " carriers"]
@@ -91,7 +91,9 @@ class _Attached:
 
     @classmethod
     def to(cls, rest: Points, arrow: Arrow) -> "_Attached":
-        end = np.asarray(arrow.start if arrow.leaves else arrow.start + arrow.vector, dtype=float)
+        if arrow.leaves:  # given where a motion begins, which may be turned and in the air
+            return cls(arrow, np.arange(len(rest)), np.zeros(3))
+        end = np.asarray(arrow.start + arrow.vector, dtype=float)
         carriers = np.argpartition(np.linalg.norm(rest - end, axis=1), min(CARRIERS, len(rest)) - 1)[:CARRIERS]
         return cls(arrow, carriers, end - rest[carriers].mean(axis=0))
 

@@ -86,7 +86,7 @@ def test_a_velocity_leaves_the_middle_of_a_body_that_begins_turned(
 ) -> None:
     x = np.array([1.0, 0.0, 0.0])
     middle = REST.mean(axis=0).astype(float)
-    toy = replace(kick.SCENE, glyphs=lambda *_: (Arrow(middle, x, "1 m/s", 0.0, 1.0, leaves=True),))
+    toy = replace(kick.SCENE, glyphs=lambda *_: (Arrow(middle + 2.0 * x, x, "1 m/s", 0.0, 1.0, leaves=True),))
     monkeypatch.setattr(glyphs, "find_scene", lambda _: toy)
     view, pose = GlyphView(server, "/body", REST), np.eye(4)
     pose[:3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
