@@ -11,7 +11,7 @@ from odeform.motion.rest import rests_from
 from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until
+from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until, shown_until
 
 __all__ = ["StatusPanel", "describe_column"]
 
@@ -75,7 +75,7 @@ def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
         last = motion.last_good
         later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
         lines.append(f"⚠ **{status}**{later}")
-    stop = motion.stop_at(time) or (motion.first_stop() if settled else None)
+    stop = motion.stop_at(time) or (motion.first_stop(shown_until(motion.schema.window)) if settled else None)
     return lines if stop is None else [*lines, f"⚠ {stop}"]
 
 
