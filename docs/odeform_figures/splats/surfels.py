@@ -8,7 +8,7 @@ from odeform.types import SH0, Floats, GaussianSplats, Points, Vector, Vectors
 
 __all__ = ["COVER", "Surfels", "grid", "joined_surfels", "splats_of", "tiles"]
 
-THICKNESS = 4e-4  # m, one standard deviation
+THICKNESS = 2e-4  # m, one standard deviation
 COVER = 0.62  # standard deviations a pitch: neighbours overlap until no gap shows
 OPACITY = 0.97
 
