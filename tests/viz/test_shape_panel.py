@@ -205,8 +205,8 @@ def test_too_many_points_are_refused_or_thinned_out_with_a_word(
     monkeypatch.setattr("odeform_viz.fitting.MOST_POINTS", 45_000)
     fit = shape_from("volleyball", kick.rest)
     assert len(fit.source.points) == 45_000
-    assert "the 45,000 most visible of 51,482 splats" in describe_fit(fit, "volleyball", None)
-    cloud = PointCloud(np.random.default_rng(0).normal(size=(30_001, 3)))
+    assert "the 45,000 most visible of 53,978 splats" in describe_fit(fit, "volleyball", None)
+    cloud = PointCloud(np.random.default_rng(0).normal(size=(45_001, 3)))
     monkeypatch.setattr("odeform_viz.fitting.read_shape", lambda _: (cloud, None))
-    with pytest.raises(ValueError, match="30,001 points; expected at most 45,000"):
+    with pytest.raises(ValueError, match="45,001 points; expected at most 45,000"):
         shape_from("cloud.ply", kick.rest)
