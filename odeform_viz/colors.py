@@ -38,7 +38,7 @@ BACKGROUND: Color = (188, 190, 186)
 """The part of a scene that does not move."""
 RANKS: tuple[Color, ...] = ((46, 5, 149), (127, 3, 167), (190, 50, 119), (229, 107, 92), (251, 167, 56))
 """Ordered colors, of equal perceptual steps (plasma): for columns that differ in one ordered parameter."""
-CLAY: Color = (240, 235, 228)
+CLAY: Color = (226, 214, 199)
 """The material of bodies without colors of their own."""
 ACTING: Color = (60, 66, 78)
 """What acts and cannot be dragged."""

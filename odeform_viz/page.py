@@ -171,7 +171,8 @@ class Page:
 
     def save(self) -> bytes:
         """Returns the state of the page as a file."""
-        return state_to_json(capture(self.schema.scene, self.request(), self.options()))
+        clock = self.clock
+        return state_to_json(capture(self.schema.scene, self.request(), self.options(), clock.speed, clock.loop))
 
     def restore(self, data: bytes) -> Sequence[str]:
         """Move everything to a saved state; returns notes of what it could not hold.
@@ -181,7 +182,7 @@ class Page:
         state = self.workspace.confined(state_from_json(data, self.schema.scene))
         columns = columns_of(state, self.schema)
         if state.shape and any(takes_user_bodies(c.predictor) for c in columns if c.predictor):
-            columns = with_user_body(columns, read_user_body(state.shape["origin"]))
+            columns = with_user_body(columns, read_user_body(state.shape["origin"], state.shape.get("material")))
         elif state.shape:
             fit = fit_from_json(state.shape, self.body)
             columns = [replace(c, geometry=fit.geometry, fit=fit) if c.predictor else c for c in columns]

@@ -11,9 +11,11 @@ from odeform.errors import InputError
 from odeform.io import parse_json
 from odeform.models.base import Predictor
 from odeform.schema import Schema
+from odeform.simulation.objects.materials import material_name
 from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import fit_to_json
 from odeform_viz.recording.provenance import origin_of
+from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import COLOR_BY, DisplayOptions, ViewRequest
 
 __all__ = ["PageState", "capture", "columns_of", "state_from_json", "state_to_json"]
@@ -28,7 +30,8 @@ class PageState:
     """Plain values of one page: slider values, display options, and the columns by their origin.
 
     A column is `{"origin", "label", "pinned", "shown", "truth"}`, of a checkpoint or of a sequence DATASET/NAME; in a
-    sweep it has a `"rank"` too. `shape` is `{"origin", "region", "place"}` of a loaded shape.
+    sweep it has a `"rank"` too. `shape` is `{"origin", "region", "place"}` of a loaded shape; a soft body has its
+    `"material"` too, as `material_of` reads it.
     """
 
     scene: str
@@ -40,12 +43,18 @@ class PageState:
     display: DisplayOptions = field(default_factory=DisplayOptions)
     notes: tuple[str, ...] = ()
     """Says in words what could not be saved."""
+    speed: float | None = None
+    """Of playing, in times real time; None for the page's own."""
+    loop: bool = True
 
 
-def capture(scene: str, request: ViewRequest, display: DisplayOptions) -> PageState:
+def capture(
+    scene: str, request: ViewRequest, display: DisplayOptions, speed: float | None = None, loop: bool = True
+) -> PageState:
     """The state that `request` and `display` describe. What is in no file cannot be saved; the notes say so."""
     truth = next((c for c in request.columns if c.truth), None)
     fit = next((c.fit for c in request.columns if c.fit), None)
+    body = next((b for c in request.columns if (b := user_body_of(c.predictor))), None)
     notes = []
     if truth and not truth.origin:
         notes.append("The truth is not from a data set and was not saved.")
@@ -63,8 +72,11 @@ def capture(scene: str, request: ViewRequest, display: DisplayOptions) -> PageSt
         for c in request.columns
         if c.predictor or c.origin
     )
-    shape = fit_to_json(fit) if fit and fit.origin else None
-    return PageState(scene, request.parameters, request.time, request.quality, columns, shape, display, tuple(notes))
+    material = {} if body is None else {"material": material_name(body.item.material)}
+    shape = {**fit_to_json(fit), **material} if fit and fit.origin else None
+    return PageState(
+        scene, request.parameters, request.time, request.quality, columns, shape, display, tuple(notes), speed, loop
+    )
 
 
 def columns_of(state: PageState, schema: Schema) -> list[Column]:
@@ -101,6 +113,9 @@ def state_to_json(state: PageState) -> bytes:
         "ghost": display.ghost,
         "wireframe": display.wireframe,
         "follow": display.follow,
+        "momentary": display.momentary,
+        "speed": state.speed,
+        "loop": state.loop,
         "notes": state.notes,
     }
     return json.dumps(raw, indent=1).encode()
@@ -132,7 +147,7 @@ def _display(raw: dict[str, Any]) -> DisplayOptions:
     if colors not in COLOR_BY or not 1.0 <= exaggeration <= 10.0:
         raise InputError(f"state: expected colors {', '.join(COLOR_BY)}, got {colors!r}, exaggeration {exaggeration}")
     display = DisplayOptions(color_by=colors, exaggeration=exaggeration)
-    boxes = {name: raw.pop(name) for name in ("overlay", "follow", "ghost", "wireframe") if name in raw}
+    boxes = {name: raw.pop(name) for name in ("overlay", "follow", "ghost", "wireframe", "momentary") if name in raw}
     return replace(display, **{name: bool(value) for name, value in boxes.items()})
 
 
@@ -151,7 +166,9 @@ def _check(state: PageState, scene: str) -> None:
         rank = column.get("rank", 0.0)
         if not isinstance(rank, int | float) or not 0.0 <= rank <= 1.0:
             raise InputError(f"state: column {column['label']}: expected a rank from 0 to 1, got {rank}")
-    if state.shape is not None and set(state.shape) != set(SHAPE_KEYS):
+    if state.speed is not None and not (math.isfinite(state.speed) and state.speed > 0.0):
+        raise InputError(f"state: expected a speed above zero, got {state.speed}")
+    if state.shape is not None and set(state.shape) - {"material"} != set(SHAPE_KEYS):
         raise InputError(f"state: shape: expected {', '.join(SHAPE_KEYS)}")
     if not isinstance(state.quality, str):
         raise InputError(f"state: expected the name of a quality, got {state.quality}")

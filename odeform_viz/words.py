@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import known_as, load_of_scene
 from odeform.models.base import Predictor
 from odeform.schema import Parameter, Schema
 from odeform.simulation.scenes.registry import find_scene
@@ -11,7 +11,6 @@ __all__ = [
     "constant_text",
     "description_of",
     "known_range",
-    "known_window",
     "model_title",
     "notes_of",
     "origin_title",
@@ -37,15 +36,6 @@ MODELS = {
     "released": "authors' network",
 }
 PARAMETERS = {"young": "stiffness"}
-HAPPENS = {
-    "drop": "dropped",
-    "throw": "thrown",
-    "kick": "kicked",
-    "wall": "thrown at a wall",
-    "step": "thrown on a step",
-    "slope": "dropped on a slope",
-    "hold": "held",
-}
 SCENES = {"kick": "ball, kicked", "mass-elastic": "ball, dropped"}
 CONSTANTS = {
     "young": "Young's modulus",
@@ -87,12 +77,7 @@ def origin_title(name: str) -> str:
 def known_range(schema: Schema) -> str:
     """What the range of a parameter is: that of the training data, or, under a load for which nothing was trained, that
     in which errors were measured."""
-    return "trained range" if load_of_scene(schema.scene) is None else "measured range"
-
-
-def known_window(schema: Schema) -> str:
-    """What ends with the window: "trained" or, under a load, "measured"."""
-    return "trained" if load_of_scene(schema.scene) is None else "measured"
+    return f"{known_as(schema.scene)} range"
 
 
 def subject_of(scene: str, body: str) -> str:
@@ -100,7 +85,7 @@ def subject_of(scene: str, body: str) -> str:
     if not body:
         return SCENES.get(scene, scene)
     load = load_of_scene(scene)
-    what = "pushed" if load is None else HAPPENS.get(load.name, load.title.lower())
+    what = "pushed" if load is None else load.happened or load.title.lower()
     return f"{body}, {what}"
 
 

@@ -55,7 +55,7 @@ SHOWN = 4  # test sequence of each pushed object
 STAGE = (0, 20, 1080, 560)  # px: where two bodies stand side by side
 MOMENT = 0.012  # s; the kicked ball is deformed then
 # which `kick/gp` lets sink into the floor
-SINKING = {"mass (kg)": 1.392, "bending (N m)": 0.475, "force (N)": 86.8, "elevation (rad)": 0.196}
+SINKING = {"mass (kg)": 1.38, "bending (N m)": 0.365, "force (N)": 101.0, "elevation (rad)": 0.585}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
 
 
@@ -162,6 +162,9 @@ def _stopped(view: View) -> None:
         view.set(label, value)
     view.show(1.5)
     view.wait(lambda: view.app.presenter.settled)
+    frame = view.app.presenter.frame
+    assert frame is not None
+    assert frame.columns[0].stop_at(1.5), "the picture is of a motion that is stopped"
 
 
 def _compare(view: View) -> None:

@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--truth",
         metavar="DATASET/NAME",
-        help="stored or simulated sequence: predict its motion, and write errors against it (.csv)",
+        help="stored or simulated sequence: predict its motion, with errors against it (.csv, or a figure)",
     )
     parser.add_argument(
         "--sweep",
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> None:
 
     predictor = load(args.checkpoint)
     times = predictor.schema.window.times if args.times is None else parse_times(args.times)
-    _require_new(motion_files(args.out, len(times), args.truth is not None), args.force)
+    _require_new(motion_files(args.out, len(times), bool(args.truth and not args.sweep)), args.force)
     settings = parse_settings(args.set)
     if args.sweep:
         write_figure(args, predictor, settings, times, _shape)

@@ -8,7 +8,7 @@ from typing import Any
 
 from odeform.cli.options import parse_settings
 from odeform.errors import InputError, counted
-from odeform.figure import Source, column_bytes, figure_page, interpolated, parse_sweeps
+from odeform.figure import Source, column_bytes, figure_page, interpolated, parse_sweeps, truth_error
 from odeform.geometry.shape import FittedShape
 from odeform.io import atomic_write
 from odeform.models.base import Predictor
@@ -25,20 +25,25 @@ def write_figure(
 ) -> None:
     """Writes the figure of `args`, whose shape `shape_of` reads, and says how far it is from the model.
 
-    Raises `InputError` for a name that does not end in .html, a truth, and what a figure does not take.
+    With `--truth`, other parameters are those of the sequence. Raises `InputError` for a name that does not end in
+    .html, a truth that is not under the sliders, and what a figure does not take.
     """
     if Path(args.out).suffix.lower() != ".html":
         raise InputError(f"--sweep: expected --out FILE.html, got {args.out}")
-    if args.truth:
-        raise InputError("--sweep: has no truth to compare with at most parameters; leave out --truth")
+    from odeform.simulation.recorded import read_truth  # slow to import
+
     ranges: Mapping[str, str] = parse_settings(args.sweep, "--sweep")
-    fixed = predictor.schema.expanded(settings)
+    truth, fixed = read_truth(args.truth) if args.truth else None, predictor.schema.expanded(settings)
+    if truth is not None:
+        fixed = {**{k: v for k, v in predictor.schema.known(truth.setting).items() if k not in ranges}, **fixed}
     sweeps = parse_sweeps(predictor.schema, ranges, tuple(fixed))
     predictor, fit, fixed = shape_of(args, predictor, fixed)
     fixed = {name: value for name, value in fixed.items() if name not in ranges}
     source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality)
     column = interpolated(predictor.model, source, times, column_bytes(1), _report)
-    page = figure_page([column])
+    if truth is not None and truth_error(column, truth) is None:
+        raise InputError(f"--truth {args.truth}: expected a sequence of this scene with parameters under the sliders")
+    page = figure_page([column], truth)
     atomic_write(Path(args.out), page)
     error = column.error
     print(

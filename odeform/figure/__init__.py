@@ -10,6 +10,7 @@ from odeform.figure.grid import FigureColumn, interpolated
 from odeform.figure.page import MOST_COLUMNS, column_bytes, figure_page
 from odeform.figure.sampling import Source
 from odeform.figure.sweep import Sweep, parse_sweeps
+from odeform.figure.truth import truth_error
 
 __all__ = [
     "MOST_COLUMNS",
@@ -21,4 +22,5 @@ __all__ = [
     "figure_page",
     "interpolated",
     "parse_sweeps",
+    "truth_error",
 ]

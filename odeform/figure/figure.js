@@ -339,7 +339,7 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 class Camera {
   constructor() {
-    Object.assign(this, { azimuth: -1.15, elevation: 0.3, distance: 4.2 * figure.size, target: [0, 0, 0], pan: [0, 0, 0] });
+    Object.assign(this, { azimuth: figure.columns[0].azimuth - 1.15, elevation: 0.3, distance: 4.2 * figure.size, target: [0, 0, 0], pan: [0, 0, 0] });
   }
 
   get toward() {
@@ -428,7 +428,7 @@ function main() {
       value.textContent = `${number(at)} ${sweep.unit}`;
       const inside = at >= sweep.trained[0] * (1 - 1e-6 * Math.sign(sweep.trained[0])) && at <= sweep.trained[1] * (1 + 1e-6 * Math.sign(sweep.trained[1]));
       value.classList.toggle("outside", !inside);
-      value.title = inside ? "" : `outside of what was trained: ${number(sweep.trained[0])} to ${number(sweep.trained[1])} ${sweep.unit}`;
+      value.title = inside ? "" : `outside of what was ${figure.known}: ${number(sweep.trained[0])} to ${number(sweep.trained[1])} ${sweep.unit}`;
     };
     Object.assign(slider, { min: 0, max: 1, step: "any", value: places[axis] });
     slider.setAttribute("aria-label", sweep.name);
@@ -439,6 +439,24 @@ function main() {
     });
     told();
     $("sliders").append(row);
+  });
+  // a truth is known at one place of the sliders
+  const compared = columns.filter((column) => column.truth), truth = $("truth");
+  const tellTruth = () => {
+    const frame = Math.round((state.time - figure.start) / figure.step);
+    const known = compared.filter(({ axes, truth: { places: at } }) => at.every((x, k) => Math.abs(x - places[axes[k]]) < 1e-3));
+    const said = known.map(({ label, truth: { rmse_mm: errors } }) =>
+      `${columns.length > 1 ? `${label}: ` : ""}${errors[frame] === null ? "no truth at this time" : `${errors[frame].toFixed(2)} mm from the truth (RMSE)`}`);
+    truth.lastChild.textContent = said.join(", ");
+    truth.firstChild.hidden = known.length > 0;
+  };
+  truth.hidden = !compared.length;
+  truth.firstChild.addEventListener("click", () => {
+    compared.forEach(({ axes, truth: { places: at } }) => at.forEach((x, k) => {
+      const slider = $("sliders").children[axes[k]].querySelector("input");
+      slider.value = x;
+      slider.dispatchEvent(new Event("input"));
+    }));
   });
   columns.forEach((column) => {
     const label = document.createElement("div");
@@ -533,6 +551,7 @@ function main() {
         camera.target = [column.middle[0], column.middle[1], figure.low + 0.85 * lift].map((x, d) => x + camera.pan[d]);
         drawing.column(i, column, all[i], camera, colors);
       });
+      if (compared.length) tellTruth();
       state.shown = false;
       state.frames += 1;
     }

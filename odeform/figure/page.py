@@ -14,7 +14,10 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.figure.grid import FigureColumn
 from odeform.figure.sweep import Sweep
+from odeform.figure.truth import truth_error
+from odeform.loads.registry import known_as
 from odeform.motion.caveats import caveats
+from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT
 from odeform.types import Arrays
 
@@ -30,8 +33,10 @@ def column_bytes(columns: int) -> int:
     return (MOST_BYTES - BESIDE) // columns
 
 
-def figure_page(columns: Sequence[FigureColumn]) -> bytes:
+def figure_page(columns: Sequence[FigureColumn], truth: RecordedMotion | None = None) -> bytes:
     """The page of one to four columns of one scene, with a slider for each parameter that any of them sweeps.
+
+    With a `truth`, it shows the error of each model against it where the sliders have its parameters.
 
     Raises `InputError` where there is none.
     """
@@ -42,7 +47,7 @@ def figure_page(columns: Sequence[FigureColumn]) -> bytes:
     title = f"{columns[0].label} · {schema.scene}" if len(columns) == 1 else schema.scene
     page = (files("odeform.figure") / "figure.html").read_text(encoding="utf-8")
     script = (files("odeform.figure") / "figure.js").read_text(encoding="utf-8")
-    data = json.dumps(_data(columns, sweeps), ensure_ascii=True).replace("<", "\\u003c")
+    data = json.dumps(_data(columns, sweeps, truth), ensure_ascii=True).replace("<", "\\u003c")
     subtitle, notes = (
         escape(_subtitle(columns, sweeps)),
         "".join(f"<p>{escape(note)}</p>" for note in _notes(columns, sweeps)),
@@ -51,7 +56,7 @@ def figure_page(columns: Sequence[FigureColumn]) -> bytes:
     return filled.encode()
 
 
-def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> dict[str, Any]:
+def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep], truth: RecordedMotion | None) -> dict[str, Any]:
     first, around = columns[0], columns[0].source.predictor.surroundings
     names = [sweep.name for sweep in sweeps]
     return {
@@ -63,17 +68,27 @@ def _data(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> dict[str,
         "floor": None if around is None else around.floor,
         "low": _low(first),
         "cell": _cell(columns),
+        "known": known_as(first.source.predictor.schema.scene),
         "columns": [
             {
                 "label": column.label,
                 "counts": column.table.counts,
                 "axes": [names.index(sweep.name) for sweep in column.source.sweeps],
                 "azimuth": column.body.azimuth,
+                "truth": _compared(column, truth),
                 "arrays": _encoded({**column.body.arrays(), **column.table.arrays()}),
             }
             for column in columns
         ],
     }
+
+
+def _compared(column: FigureColumn, truth: RecordedMotion | None) -> dict[str, Any] | None:
+    found = None if truth is None else truth_error(column, truth)
+    if found is None:
+        return None
+    errors = [round(error, 4) if math.isfinite(error) else None for error in found.rmse_mm.tolist()]
+    return {"places": found.places.tolist(), "rmse_mm": errors}
 
 
 def _slider(sweep: Sweep) -> dict[str, Any]:
@@ -139,7 +154,8 @@ def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str
     notes = [_column_note(column, len(columns) > 1) for column in columns]
     outside = [s.name for s in sweeps if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
     if outside:
-        notes.append(f"* {', '.join(outside)}: partly outside of what was trained.")
+        known = known_as(columns[0].source.predictor.schema.scene)
+        notes.append(f"* {', '.join(outside)}: partly outside of what was {known}.")
     # of a shape that was not trained, and of times after the window
     notes += dict.fromkeys(f"{note}." for c in columns for note in caveats(c.source.middle, c.times))
     return notes

@@ -22,6 +22,8 @@ class Arrow:
     end: float
     rises: bool = False
     """Whether its strength is sin^2 of its time, from none to that of the label and back; otherwise it is constant."""
+    leaves: bool = False
+    """Whether it starts in the middle of the body, as a velocity does; otherwise it ends at it, where a force acts."""
 
     def strength(self, time: float) -> float:
         """The part of the label's strength that acts at `time` in seconds."""

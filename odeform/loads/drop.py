@@ -54,6 +54,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 LOAD = Load(
     name="drop",
     title="Drop it",
+    happened="dropped",
     parameters=PARAMETERS,
     window=WINDOW,
     until=2.0,

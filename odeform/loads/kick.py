@@ -60,6 +60,7 @@ FORCE = STRONGER * 25.0
 LOAD = Load(
     name="kick",
     title="Kick it",
+    happened="kicked",
     parameters=(
         *_three(
             "contact",

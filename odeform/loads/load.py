@@ -47,6 +47,8 @@ class Load:
     """Values worth seeing, by a name for people; defaults for what they leave out."""
     notes: tuple[str, ...] = ()
     """Remarks for people."""
+    happened: str = ""
+    """What stands behind the name of the body, as in "dropped"; the title where it is empty."""
     arrows: Callable[[Mesh, Parameters], tuple[Arrow, ...]] = _no_arrows
     """`arrows(start, parameters)` are what a viewer draws at the body where its motion begins."""
     obstacles: Callable[[Parameters], tuple[Obstacle, ...]] = _no_obstacles

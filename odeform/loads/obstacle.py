@@ -47,6 +47,8 @@ class Obstacle:
     """(3,) m: the lowest and the highest corner of what is drawn of it."""
     turn: Rotations = field(default_factory=lambda: np.eye(3))
     """(3, 3), of which the columns are its axes."""
+    name: str = "obstacle"
+    """What people call it."""
 
     def met(self, points: Float[np.ndarray, "*points 3"]) -> tuple[Floats, Floats]:
         """Signed distances (...,) m of points (..., 3) m, negative inside, and the outward normals (..., 3) there."""
@@ -74,7 +76,9 @@ class Obstacle:
         return Mesh((self.place + corners @ self.turn.T).astype(np.float32), FACES)
 
 
-def half_space(place: Vector, normal: Vector, wide: tuple[float, float], long: tuple[float, float]) -> Obstacle:
+def half_space(
+    place: Vector, normal: Vector, wide: tuple[float, float], long: tuple[float, float], name: str = "obstacle"
+) -> Obstacle:
     """Everything behind the plane through `place` (3,) m whose outward `normal` (3,) has no part along y.
 
     Drawn is a plate of it: from and to, in m along y, and in m along the plane across y.
@@ -82,7 +86,7 @@ def half_space(place: Vector, normal: Vector, wide: tuple[float, float], long: t
     along = np.cross([0.0, 1.0, 0.0], normal)
     turn = np.stack([along, [0.0, 1.0, 0.0], normal], axis=1)
     plate = np.array([long[0], wide[0], -THICK]), np.array([long[1], wide[1], 0.0])
-    return Obstacle(np.asarray(place, dtype=float), -FAR, np.array([np.inf, np.inf, 0.0]), plate, turn)
+    return Obstacle(np.asarray(place, dtype=float), -FAR, np.array([np.inf, np.inf, 0.0]), plate, turn, name)
 
 
 THICK = 0.02  # m, of the plate that is drawn of a half space

@@ -6,7 +6,7 @@ from pathlib import Path
 from odeform.errors import InputError
 from odeform.loads.load import SCENES_OF_LOADS, Load
 
-__all__ = ["LOADS", "PUSH", "get_load", "known_loads", "load_of_scene", "register_load", "split_load"]
+__all__ = ["LOADS", "PUSH", "get_load", "known_as", "known_loads", "load_of_scene", "register_load", "split_load"]
 
 PUSH = "push"
 """What happens in the scene `contact-force`, for which models are trained: a sphere pushes."""
@@ -57,3 +57,9 @@ def load_of_scene(scene: str) -> Load | None:
     """The load that acts in the scene of that name; None in other scenes."""
     name = scene.removeprefix(SCENES_OF_LOADS)
     return get_load(name) if name != scene and name in {*LOADS, *_registered} else None
+
+
+def known_as(scene: str) -> str:
+    """What a scene's ranges and its window are those of: "trained", or, under a load, of which no motions were trained,
+    "measured"."""
+    return "trained" if load_of_scene(scene) is None else "measured"

@@ -34,7 +34,7 @@ def slope(distance: float, angle: float) -> Obstacle:
     """Falls along x at an angle in rad, and meets the floor at x = distance m."""
     normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
     up = (distance + UP) / math.cos(angle)
-    return half_space(np.array([distance, 0.0, 0.0]), normal, (-WIDE, WIDE), (-up, 0.0))
+    return half_space(np.array([distance, 0.0, 0.0]), normal, (-WIDE, WIDE), (-up, 0.0), "slope")
 
 
 def flight_over(rest: Points, parameters: Parameters) -> Flight:
@@ -66,6 +66,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 LOAD = Load(
     name="slope",
     title="Let it slide down a slope",
+    happened="let down on a slope",
     parameters=(
         Parameter("angle", "deg", 10.0, 40.0, 30.0, description="of the slope, which falls along x"),
         DISTANCE,

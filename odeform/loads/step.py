@@ -22,7 +22,8 @@ HEIGHT = Parameter("height", "m", 0.18, 0.4, 0.25, description="of the lowest po
 def step(distance: float, rise: float) -> Obstacle:
     """A box on the floor that begins at x = distance m."""
     low, high = np.array([0.0, -WIDE, -BELOW]), np.array([DEEP, WIDE, rise])
-    return Obstacle(np.array([distance, 0.0, 0.0]), low, high, (np.array([0.0, -WIDE, 0.0]), high))
+    shown = np.array([0.0, -WIDE, 0.0]), high
+    return Obstacle(np.array([distance, 0.0, 0.0]), low, high, shown, name="step")
 
 
 def rise_of(parameters: Parameters) -> float:
@@ -50,6 +51,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 LOAD = Load(
     name="step",
     title="Throw it onto a step",
+    happened="thrown onto a step",
     parameters=(
         DISTANCE,
         Parameter("rise", "m", 0.03, 0.15, 0.08, description="height of the step"),

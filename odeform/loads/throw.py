@@ -13,7 +13,7 @@ from odeform.types import Mesh, Vector
 __all__ = ["LOAD", "SPINS", "arrows", "flight_of", "velocity"]
 
 FASTEST, MOST_SPIN = 20.0, 200.0  # m/s and rad/s
-SHOWN = 0.1  # s of the way that the arrow of the velocity is long
+SHOWN = 0.06  # s of the way that the arrow of the velocity is long
 
 
 def velocity(axis: str, low: float, high: float, default: float) -> Parameter:
@@ -54,12 +54,13 @@ def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
     if speed == 0.0:
         return ()
     middle = 0.5 * (start.points.min(axis=0) + start.points.max(axis=0)).astype(float)
-    return (Arrow(middle, SHOWN * vector, f"{speed:.1f} m/s", 0.0, SHOWN),)
+    return (Arrow(middle, SHOWN * vector, f"{speed:.1f} m/s", 0.0, SHOWN, leaves=True),)
 
 
 LOAD = Load(
     name="throw",
     title="Throw it",
+    happened="thrown",
     parameters=(
         *PARAMETERS,
         velocity("x", -1.5, 1.5, 1.0),

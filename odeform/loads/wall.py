@@ -28,7 +28,8 @@ def distance_of(parameters: Parameters) -> float:
 
 def wall(distance: float) -> Obstacle:
     """Everything at x >= distance m."""
-    return half_space(np.array([distance, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]), (-WIDE, WIDE), (0.0, HIGH))
+    place, normal = np.array([distance, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0])
+    return half_space(place, normal, (-WIDE, WIDE), (0.0, HIGH), "wall")
 
 
 def obstacles(parameters: Parameters) -> tuple[Obstacle, ...]:
@@ -44,6 +45,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 LOAD = Load(
     name="wall",
     title="Throw it against a wall",
+    happened="thrown against a wall",
     parameters=(
         DISTANCE,
         *PARAMETERS,

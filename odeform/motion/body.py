@@ -40,10 +40,12 @@ class CheckedBody:
             deformation = np.sqrt(np.square(predicted[:, POSE:]).sum(axis=1)) / space.largest[1]
             y = space.bounded(predicted, windows)
             heights, rotation, shift = self._at(y)
+            inside = None
             if obstacles:
                 places = _local(self.few, y) @ rotation.swapaxes(-1, -2) + (shift + space.anchor)[:, None]
-                heights = np.minimum(heights, np.min([one.met(places)[0].min(axis=1) for one in obstacles], axis=0))
-            return Sample(heights, deformation, rotation @ self._centre + shift + space.anchor)
+                gaps = np.min([one.met(places)[0].min(axis=1) for one in obstacles], axis=0)
+                heights, inside = np.minimum(heights, gaps), gaps < heights
+            return Sample(heights, deformation, rotation @ self._centre + shift + space.anchor, inside)
 
     def lowest(self, predicted: Float[np.ndarray, "times y"]) -> Times:
         """Computes the heights (T,) in metres of the lowest point, at predictions (T, 6 + K) within the trained

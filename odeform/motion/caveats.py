@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from odeform.loads.registry import known_as
 from odeform.motion.base import Motion
 from odeform.types import Times
 
@@ -10,7 +11,8 @@ __all__ = ["caveats"]
 
 def caveats(motion: Motion, times: Times) -> tuple[str, ...]:
     """One sentence each: a shape that was not trained, parameters and (T,) `times` in seconds outside the trained
-    range, and where the motion is clamped because it is not physically possible. Empty if there is none of them."""
+    range (under a load, that in which errors were measured), and where the motion is clamped because it is not
+    physically possible. Empty if there is none of them."""
     return (
         *_shape(motion),
         *_parameters(motion),
@@ -28,10 +30,10 @@ def _shape(motion: Motion) -> list[str]:
 
 
 def _parameters(motion: Motion) -> list[str]:
-    trained = {p.name: p for p in motion.schema.parameters}
+    ranges, known = {p.name: p for p in motion.schema.parameters}, known_as(motion.schema.scene)
     return [
-        f"{name} = {motion.parameters[name]:g} {p.unit} is outside the trained range, {p.low:g} to {p.high:g} {p.unit}"
-        for name, p in trained.items()
+        f"{name} = {motion.parameters[name]:g} {p.unit} is outside the {known} range, {p.low:g} to {p.high:g} {p.unit}"
+        for name, p in ranges.items()
         if name in motion.outside
     ]
 
@@ -54,7 +56,7 @@ def _times(motion: Motion, times: Times) -> list[str]:
     still = f"; soon after {end:.3g} s it stands still" if float(np.max(times)) > end else ""
     which = f"{later} of {len(times)} frames are" if len(times) > 1 else f"t = {float(times[0]):.4g} s is"
     return [
-        f"{which} outside the trained window, {window.start:g} to {window.stop:g} s: "
+        f"{which} outside the {known_as(motion.schema.scene)} window, {window.start:g} to {window.stop:g} s: "
         f"there the motion is extrapolated{still}"
     ]
 

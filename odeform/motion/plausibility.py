@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from odeform.motion.limits import Limits
 from odeform.motion.recent import Recent
@@ -29,12 +29,13 @@ CHUNK = 44  # grid times after the window that are checked at once
 COARSE = 16  # times in the window at which the energy is looked up
 RECENT = 4  # results that are kept: pose, points and gradient of a time are evaluated one after the other
 
-VALID, NON_FINITE, SUNK, DEFORMED, DRIVEN = range(5)
+VALID, NON_FINITE, SUNK, DEFORMED, DRIVEN, INSIDE = range(6)
 REASONS = {
     NON_FINITE: "it is not finite",
     SUNK: "it sinks into the floor",
     DEFORMED: "it deforms more than the body can",
     DRIVEN: "it gains energy",
+    INSIDE: "it sinks into the {}",
 }
 
 
@@ -43,12 +44,14 @@ class Sample:
     """A motion at T times, as the model predicts it.
 
     `lowest` (T,) is the height of the lowest point of the trained body in metres, `deformation` (T,) its RMS
-    deformation relative to the largest trained one, `centre` (T, 3) the position of its centre in metres.
+    deformation relative to the largest trained one, `centre` (T, 3) the position of its centre in metres. `inside` (T,)
+    says whether the lowest point is one inside an obstacle, which counts as low as it is deep; None without obstacles.
     """
 
     lowest: Floats
     deformation: Floats
     centre: Float[np.ndarray, "times 3"]
+    inside: Bool[np.ndarray, " times"] | None = None
 
 
 @dataclass(frozen=True)
@@ -69,9 +72,12 @@ class Stop:
 class PlausibilityCheck:
     """Times at which a motion is valid, and the times that are shown in place of others."""
 
-    def __init__(self, limits: Limits, window: Window, sample: Callable[[Times], Sample]) -> None:
-        """`sample` evaluates the motion at (T,) seconds of the model's clock, in any order and without this check."""
-        self._limits, self._window, self.sample = limits, window, sample
+    def __init__(
+        self, limits: Limits, window: Window, sample: Callable[[Times], Sample], obstacle: str = "obstacle"
+    ) -> None:
+        """`sample` evaluates the motion at (T,) seconds of the model's clock, in any order and without this check;
+        `obstacle` is what people call that in its way."""
+        self._limits, self._window, self.sample, self._obstacle = limits, window, sample, obstacle
         self._step = 1.0 / (FINER * window.rate)
         self._steps = 0  # after the window, up to which the motion is known to be valid
         self._end: Stop | None = None
@@ -142,7 +148,7 @@ class PlausibilityCheck:
             faults = self._faults(times[1:])
             first = int((faults != VALID).argmax())
             begin, end, fault = float(times[first]), float(times[first + 1]), int(faults[first])
-        return Stop(begin, REASONS.get(fault, ""))
+        return Stop(begin, REASONS.get(fault, "").format(self._obstacle))
 
     def _after_window(self, until: float) -> Stop | None:
         """The end of the motion, if it is before `until`."""
@@ -207,4 +213,6 @@ def faults_of(sample: Sample, limits: Limits) -> Ints:
         out[finite & (sample.deformation > limits.deformation)] = DEFORMED
         if limits.floor is not None:
             out[finite & (sample.lowest < limits.floor - limits.depth + SLACK)] = SUNK
+    if sample.inside is not None:
+        out[(out == SUNK) & sample.inside] = INSIDE
     return out

@@ -54,7 +54,8 @@ class ReducedMotion(Motion):
         def sample(times: Times) -> Sample:
             return body.sample(trajectory.reduced(times), window.passed(times), obstacles)
 
-        return PlausibilityCheck(self.validity.limits, window, sample)
+        name = " or ".join(dict.fromkeys(obstacle.name for obstacle in obstacles))
+        return PlausibilityCheck(self.validity.limits, window, sample, name)
 
     @property
     def stats(self) -> SolveStats:

@@ -48,7 +48,7 @@ class CameraPanel(Panel):
         display = state.display
         self._colors.value, self._exaggeration.value = display.color_by, display.exaggeration
         self._ghost.value, self._wireframe.value = display.ghost, display.wireframe
-        self._follow.value = display.follow
+        self._follow.value, self._momentary.value = display.follow, display.momentary
 
     def _options(self) -> DisplayOptions:
         exaggeration = float(self._exaggeration.value)

@@ -25,7 +25,8 @@ class FigureButton:
             "sliders", tuple(self._choices), hint="of the figure, besides that of the time"
         )
         hint = (
-            "a page for others: the visible models under sliders, without a server; takes up to a minute for each model"
+            "a page for others: the visible models under sliders, with their error where a truth is in view; "
+            "takes up to a minute for each model"
         )
         self._button = gui.add_button("Figure (.html)", color="gray", hint=hint)
         self._button.on_click(lambda event: self._start(event.client))
@@ -62,7 +63,8 @@ class FigureButton:
                 self._show(working=False)
                 client.send_file_download(NAME, page, save_immediately=True)
 
-            self._job = Job(self._work, (sources, times), done, self._failed, self._progress)
+            truth = next((c.truth for c in self._page.columns.all if c.visible and c.truth), None)
+            self._job = Job(self._work, (sources, times, truth), done, self._failed, self._progress)
             self._job.start()
 
     def _show(self, working: bool) -> None:

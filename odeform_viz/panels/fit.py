@@ -42,6 +42,9 @@ def describe_identification(found: Identification, schema: Schema, truth: Parame
         known = "" if true is None else f"{true:.3g}"
         title = titles.get(name, name.replace("_", " "))
         rows.append(f"| {title} | {estimate} | {one.low:.3g} to {one.high:.3g} | {known} |")
+    for parameter in (p for p in schema.parameters if p.role == "azimuth"):
+        known = f"{float(truth[parameter.name]):.3g}" if parameter.name in truth else ""
+        rows.append(f"| {titles[parameter.name]} | *as given* | | {known} |")
     explained = (
         "model and noise explain the motion"
         if found.misfit <= EXPLAINED

@@ -14,9 +14,9 @@ with models learned from simulations. It is an independent implementation of *OD
 Motion for Shape Deformation with Neural ODEs* by Velikova, Saleh, Kuang and Busam
 ([arXiv:2607.20670](https://arxiv.org/abs/2607.20670)), with models of its own.
 
-**The badge** says whether this moment and these parameters are *inside* of what the model was trained on
-(green), outside of it, *extrapolated* (amber), or *not modelled* (red). The error beside it is measured on
-sequences that were not used for training: nine of ten had a smaller one.
+**The badge** says whether this moment and these parameters are *inside* what the model was trained on
+(green), outside of it or of a kind that was not trained (amber), or *not modelled* (red). The error beside it
+is measured on sequences that were not used for training: nine of ten had a smaller one.
 
 **Every error is a distance**: how far each point of the body is from where a simulation, the *truth*, has it.
 *RMS* is the root of the mean of its square over all points; colours show it point by point. The *solver error*

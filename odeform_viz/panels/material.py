@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from odeform.simulation.objects.materials import CHOICE, material_of
 from odeform_viz.page import Page
-from odeform_viz.panels.callbacks import serialized
+from odeform_viz.panels.callbacks import on_user_change, serialized
 
 __all__ = ["MaterialChoice"]
 
@@ -24,7 +24,7 @@ class MaterialChoice:
         self._density = gui.add_number("density, kg/m³", DENSITY, min=1.0, max=2e4, visible=False)
         self._source = gui.add_markdown("", visible=False)
         self._use = gui.add_button("Use these numbers", color="gray", visible=False)
-        self._name.on_update(lambda _: self._chosen(changed))
+        on_user_change(self._name, lambda: self._chosen(changed))
         self._use.on_click(serialized(changed))
 
     def value(self) -> str | None:
@@ -38,10 +38,21 @@ class MaterialChoice:
         material_of(name)
         return name
 
+    def set(self, name: str | None) -> None:
+        """Show what `value` once returned; the shape is not made again."""
+        self._name.value = AUTOMATIC if name is None else name if name in CHOICE else NUMBERS
+        if self._name.value == NUMBERS:
+            given = material_of(str(name))
+            self._young.value, self._density.value = 1e-3 * given.young, given.density
+        self._show()
+
     def _chosen(self, changed: Callable[[], None]) -> None:
+        self._show()
+        if self._name.value != NUMBERS:
+            changed()
+
+    def _show(self) -> None:
         numbers, known = self._name.value == NUMBERS, CHOICE.get(self._name.value)
         self._young.visible = self._density.visible = self._use.visible = numbers
         self._source.content = f"*{known.source}*" if known else ""
         self._source.visible = known is not None
-        if not numbers:
-            serialized(changed)(None)

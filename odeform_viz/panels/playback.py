@@ -5,6 +5,7 @@ import asyncio
 import viser
 
 from odeform.errors import InputError
+from odeform.loads.registry import known_as
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
@@ -12,7 +13,6 @@ from odeform_viz.panels.timeline import Marks, moment_css, timeline_html
 from odeform_viz.pushing import acting_times
 from odeform_viz.state import PageState
 from odeform_viz.view import Description, shown_until
-from odeform_viz.words import known_window
 
 __all__ = ["PlaybackPanel"]
 
@@ -34,7 +34,7 @@ class PlaybackPanel(Panel):
         self._page, self._clock, self._window = page, page.clock, page.schema.window
         self._seeks = 0  # by the user; finding a peak takes a while, and a later seek cancels it
         self._confirming: asyncio.TimerHandle | None = None
-        self._known = known_window(page.schema)
+        self._known = known_as(page.schema.scene)
         start, stop = self._window.start, self._window.stop
         gui = page.server.gui
         with gui.add_folder("Time"):
@@ -74,6 +74,8 @@ class PlaybackPanel(Panel):
         self._page.on_event_loop(self._follow_clock)
 
     def restore(self, state: PageState) -> None:
+        self._speed.value = next((name for name, speed in SPEEDS.items() if speed == state.speed), self._speed.value)
+        self._loop.value = state.loop
         self.jump(state.time)
 
     def toggle(self) -> None:

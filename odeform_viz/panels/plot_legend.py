@@ -14,7 +14,7 @@ __all__ = ["ENLARGE", "legend_html", "values_html"]
 ENLARGE = "B"  # the hot key of the size of the plots
 STYLE = "padding:0 0.8em 0.3em;font:11px/1.5 sans-serif;color:var(--mantine-color-text)"
 QUIET = "opacity:0.65"
-CUT = "The axes fit the trained window. ↑ marks what is cut off after it."
+CUT = "The axes fit the time before the orange part. ↑ marks what is cut off in it."
 
 
 def legend_html(lines: Sequence[Line], time: float, large: bool) -> str:

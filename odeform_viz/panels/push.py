@@ -10,6 +10,7 @@ import viser
 from odeform.errors import InputError
 from odeform.geometry.contact import CONE, nearest_on, touching_centre
 from odeform.geometry.push import Push, push_of
+from odeform.loads.registry import known_as
 from odeform.schema import OBJECT, Parameter
 from odeform.simulation.contacts import contact_parameters, push_from
 from odeform.types import Mesh, Vector
@@ -20,7 +21,7 @@ from odeform_viz.pushing import ShownPush, contacts_of, push_excess, surface_of
 from odeform_viz.state import PageState
 from odeform_viz.user_bodies import user_body_of
 from odeform_viz.view import Description
-from odeform_viz.words import known_range, known_window, parameter_title
+from odeform_viz.words import known_range, parameter_title
 
 __all__ = ["PushPanel"]
 
@@ -242,7 +243,7 @@ class PushPanel(Panel):
         with self._lock:
             parameters = self._parameters
             push = push_from(parameters, self._surface)
-        excess = push_excess(push, self._forces(), known_window(self._schema))
+        excess = push_excess(push, self._forces(), known_as(self._schema.scene))
         parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
         warning = f"⚠ **beyond what is known**: {parts}  \n" if excess else ""
         set_content(self._text, warning + HINT.format(what="the sphere pushes" if self._sphere else "it is kicked"))

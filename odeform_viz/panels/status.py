@@ -8,9 +8,10 @@ from odeform.models.base import Predictor
 from odeform.models.error_band import FEWEST
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.rest import rests_from
+from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until
+from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until, shown_until
 
 __all__ = ["StatusPanel", "describe_column"]
 
@@ -27,7 +28,7 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
         lines.append(f"solver {stats.solver} · {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms")
-        lines.append(_solver_error(stats) if settled else "solver error: …")
+        lines.append(_solver_error(stats, shown.motion.schema.window) if settled else "solver error: …")
     else:
         lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.1f} ms")
     if shown.error is not None:
@@ -41,10 +42,10 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     return "  \n".join(lines)
 
 
-def _solver_error(stats: SolveStats) -> str:
+def _solver_error(stats: SolveStats, window: Window) -> str:
     if stats.solver_error_mm is None:
         return "solver error: unknown"
-    return f"solver error: RMS {stats.solver_error_mm:.2g} mm over the trained window, against a finer solution"
+    return f"solver error: RMS {stats.solver_error_mm:.2g} mm until {window.stop:g} s, against a finer solution"
 
 
 def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[str]:
@@ -74,7 +75,7 @@ def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
         last = motion.last_good
         later = f": showing the last good state, t = {last:.3f} s" if math.isfinite(last) else ""
         lines.append(f"⚠ **{status}**{later}")
-    stop = motion.stop_at(time) or (motion.first_stop() if settled else None)
+    stop = motion.stop_at(time) or (motion.first_stop(shown_until(motion.schema.window)) if settled else None)
     return lines if stop is None else [*lines, f"⚠ {stop}"]
 
 

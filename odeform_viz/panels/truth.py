@@ -23,6 +23,7 @@ from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_user_body
 from odeform_viz.user_bodies import simulated_item
 from odeform_viz.view import Description
+from odeform_viz.words import constant_text, plain
 
 __all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
@@ -43,7 +44,7 @@ def entry_label(entry: Entry, schema: Schema) -> str:
         strength = float(np.linalg.norm(vector_of(entry.parameters, "force")))
         values = f"{entry.parameters[OBJECT]}, {strength:.3g} N"
     else:
-        values = ", ".join(f"{p.name} {entry.parameters[p.name]:.3g}" for p in schema.learned)
+        values = plain({p.name: entry.parameters[p.name] for p in schema.learned}, schema)
     return f"{entry.name.rsplit('_', 1)[-1].lstrip('0') or '0'}: {values}"
 
 
@@ -52,9 +53,9 @@ def physics_difference(trained: Mapping[str, float], simulated: Mapping[str, flo
     names = [name for name in {**trained, **simulated} if trained.get(name) != simulated.get(name)]
 
     def value(physics: Mapping[str, float], name: str) -> str:
-        return f"{physics[name]:.4g}" if name in physics else "none"
+        return constant_text(name, physics[name]) if name in physics else "none"
 
-    return ", ".join(f"{name} {value(simulated, name)} (trained on {value(trained, name)})" for name in names)
+    return ", ".join(f"{value(simulated, name)} (trained on {value(trained, name)})" for name in names)
 
 
 class TruthPanel(Panel):

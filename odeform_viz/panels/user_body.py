@@ -61,6 +61,7 @@ class UserBodyPanel(Panel):
         return predictor is not None and takes_user_bodies(predictor)
 
     def restore(self, state: PageState) -> None:
+        self._material.set((state.shape or {}).get("material"))
         self._show()
 
     def close(self) -> None:

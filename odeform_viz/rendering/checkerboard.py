@@ -9,7 +9,7 @@ from odeform.types import Faces, Floats, Ints, Mesh, Points
 
 __all__ = ["Part", "checkerboard_parts"]
 
-CELLS = 4  # along the longest side of a mesh
+CELLS = 6  # along the longest side of a mesh
 TOLERANCE = 1e-6  # of the mesh's size; vertices this close to a plane count as lying in it
 
 

@@ -172,7 +172,9 @@ class ColumnView:
             if self._push is not None:
                 self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
             elif isinstance(motion, Motion):
-                self._glyphs.show(motion.schema.scene, motion.parameters, time, self.points(frame, options), frame.pose)
+                alone = self._disc is None  # beside others a label would lie over the next body
+                points, scene = self.points(frame, options), motion.schema.scene
+                self._glyphs.show(scene, motion.parameters, time, points, frame.pose, labels=alone)
 
     def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
         """(N, 3) m: the body as it is drawn, before its pose."""

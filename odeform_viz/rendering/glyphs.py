@@ -14,7 +14,7 @@ from odeform_viz.colors import ACTING
 
 __all__ = ["GlyphView"]
 
-CARRIERS = 6  # points of a body that hold the head of an arrow
+CARRIERS = 6  # points of a body that hold an end of an arrow
 SHORTEST = 0.3  # of the length at full strength; it shows where a force acts that has just begun
 
 
@@ -30,8 +30,10 @@ class GlyphView:
         self._shafts: viser.ArrowsHandle | None = None
         self._labels: list[viser.LabelHandle] = []
 
-    def show(self, scene: str, parameters: Mapping[str, float], time: float, points: Points, pose: Pose) -> None:
-        """Show the arrows of a scene that act at `time` s, as strong as they are then.
+    def show(
+        self, scene: str, parameters: Mapping[str, float], time: float, points: Points, pose: Pose, labels: bool = True
+    ) -> None:
+        """Show the arrows of a scene that act at `time` s, as strong as they are then, with `labels` of how strong.
 
         Parameters are in the units of its schema. Arrows touch the body, whose points (N, 3) m `pose` (4, 4) moves.
         """
@@ -42,9 +44,10 @@ class GlyphView:
             self._arrows = tuple(_Attached.to(self._rest, arrow) for arrow in arrows)
         acting = [each for each in self._arrows if each.arrow.begin <= time <= each.arrow.end]
         self._show_shafts([each.placed(time, points, pose) for each in acting])
-        while len(self._labels) > len(acting):
+        labelled = acting if labels else []
+        while len(self._labels) > len(labelled):
             self._labels.pop().remove()
-        for index, each in enumerate(acting):
+        for index, each in enumerate(labelled):
             self._show_label(index, each.placed(time, points, pose)[0], each.label(time))
 
     def _show_shafts(self, arrows: Sequence[tuple[Vector, Vector]]) -> None:
@@ -79,23 +82,26 @@ class GlyphView:
 
 @dataclass(frozen=True, eq=False)
 class _Attached:
-    """An arrow whose head is held by the points of a body that are nearest to it."""
+    """An arrow that ends at the points of a body that are nearest to its head, or leaves the middle of all."""
 
     arrow: Arrow
     carriers: Int[np.ndarray, " carriers"]
     offset: Vector
-    """(3,) m from their mean to the head, at rest."""
+    """(3,) m from their mean to that end, at rest."""
 
     @classmethod
     def to(cls, rest: Points, arrow: Arrow) -> "_Attached":
-        head = np.asarray(arrow.start + arrow.vector, dtype=float)
-        carriers = np.argpartition(np.linalg.norm(rest - head, axis=1), min(CARRIERS, len(rest)) - 1)[:CARRIERS]
-        return cls(arrow, carriers, head - rest[carriers].mean(axis=0))
+        if arrow.leaves:  # given where a motion begins, which may be turned and in the air
+            return cls(arrow, np.arange(len(rest)), np.zeros(3))
+        end = np.asarray(arrow.start + arrow.vector, dtype=float)
+        carriers = np.argpartition(np.linalg.norm(rest - end, axis=1), min(CARRIERS, len(rest)) - 1)[:CARRIERS]
+        return cls(arrow, carriers, end - rest[carriers].mean(axis=0))
 
     def placed(self, time: float, points: Points, pose: Pose) -> tuple[Vector, Vector]:
         """Tail and head (3,) m at `time` s."""
-        head = pose[:3, :3] @ (points[self.carriers].mean(axis=0) + self.offset) + pose[:3, 3]
-        return head - max(self.arrow.strength(time), SHORTEST) * self.arrow.vector, head
+        end = pose[:3, :3] @ (points[self.carriers].mean(axis=0) + self.offset) + pose[:3, 3]
+        vector = max(self.arrow.strength(time), SHORTEST) * self.arrow.vector
+        return (end, end + vector) if self.arrow.leaves else (end - vector, end)
 
     def label(self, time: float) -> str:
         """The strength now, of the largest."""

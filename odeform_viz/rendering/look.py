@@ -23,3 +23,5 @@ class Look:
     opacity: float | None = None
     wireframe: bool = False
     tint: Color | None = None
+    dots: bool = False
+    """Whether its points are drawn in place of its surface."""

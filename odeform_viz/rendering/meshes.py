@@ -13,6 +13,9 @@ from odeform_viz.rendering.look import Colors, Look
 __all__ = ["MeshView"]
 
 
+DOT, DOTS = 0.014, 400  # sizes of a body, across a point that is drawn of it; points, about
+
+
 class MeshView:
     """A mesh whose vertices move. Only one of its kinds of nodes is visible, and only that is updated."""
 
@@ -24,15 +27,22 @@ class MeshView:
         self._given = (given, own) if given and own else None
         self._checkerboard = _Checkerboard(server, root, mesh) if given is None else None
         self._colored = _Colored(server, f"{root}/colored", len(mesh.points), mesh.faces, radius, unlit=True)
+        self._dots = _Dots(server, f"{root}/dots")
 
     def show(self, points: Points | None, covariances: Floats | None, look: Look) -> None:
         """See `ShapeView`: (N, 3) m. A mesh has no covariances."""
         present = self._rest if points is None else points
-        if look.colors is not None:
+        if look.dots or look.colors is not None:
             if self._given is not None:
                 self._given[1].hide()
             if self._checkerboard is not None:
                 self._checkerboard.hide()
+        if look.dots:
+            self._colored.hide()
+            self._dots.show(present, look.tint or CLAY)
+            return
+        self._dots.hide()
+        if look.colors is not None:
             self._colored.show(present, look.colors, look)
             return
         self._colored.hide()
@@ -97,6 +107,28 @@ class _Checkerboard:
 
 def _shades(color: Color) -> tuple[Color, Color]:
     return color, darker(color)
+
+
+class _Dots:
+    """Some of the points, which a surface in the same place does not cover in patches."""
+
+    def __init__(self, server: viser.ViserServer, node: str) -> None:
+        self._server, self._node = server, node
+        self._cloud: viser.PointCloudHandle | None = None
+
+    def show(self, points: Points, color: Color) -> None:
+        few = points[:: max(len(points) // DOTS, 1)]
+        if self._cloud is None:
+            size = DOT * float(np.ptp(points, axis=0).max())
+            self._cloud = self._server.scene.add_point_cloud(
+                self._node, few, color, point_size=size, point_shape="circle", precision="float32"
+            )
+        else:
+            self._cloud.points, self._cloud.visible = few, True
+
+    def hide(self) -> None:
+        if self._cloud is not None:
+            self._cloud.visible = False
 
 
 class _Colored:

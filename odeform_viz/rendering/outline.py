@@ -28,19 +28,22 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
     return np.stack([arrows[0].start, arrows[0].start + arrows[0].vector]) if arrows else None
 
 
-def outline_of(shown: ColumnFrame, axes: Axes) -> Box:
-    """The box of the body within the trained window, whatever it travels along the floor, and of what acts on it."""
+def outline_of(shown: ColumnFrame, axes: Axes, travels: bool) -> Box:
+    """The box of the body within the trained window, of what acts on it, and of the middle of obstacles.
+
+    Where it goes along the floor counts if it `travels` through the view, and not if the view follows it.
+    """
     poses = _poses(shown)
     points = np.asarray(shown.column.geometry.points, dtype=float)
     points = points[:: max(len(points) // POINTS, 1)]
     centre = points.mean(axis=0)
     turned = np.einsum("tij,nj->tni", poses[:, :3, :3], points - centre)
-    heights = poses[:, 2, :3] @ centre + poses[:, 2, 3]
-    turned += centre * [1.0, 1.0, 0.0]
-    turned[:, :, 2] += heights[:, None]
+    centres = poses[:, :3, :3] @ centre + poses[:, :3, 3]
+    if not travels:
+        centres[:, :2] = centre[:2]
+    turned += centres[:, None]
     acting = _acting_on(shown)
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
-    # of obstacles, which are wide, their middle
     parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
     corners = np.concatenate(parts)
     across, upwards = corners @ axes.right, corners @ axes.above

@@ -10,6 +10,7 @@ from odeform.types import Floats, Mesh, Points, Pose, Vector
 from odeform_viz.coloring.scale import colors_of
 from odeform_viz.colors import TRUTH, color_of
 from odeform_viz.columns import Column
+from odeform_viz.obstacles import obstacles_of
 from odeform_viz.pushing import picked
 from odeform_viz.rendering.cameras import Cameras
 from odeform_viz.rendering.column_view import ColumnView
@@ -24,7 +25,6 @@ from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, F
 
 __all__ = ["SceneView"]
 
-OVERLAID = 0.45  # opacity of columns that overlap, but for the truth, or the first where there is none
 ENDED = 0.25  # opacity of a truth that is over
 
 
@@ -83,14 +83,13 @@ class SceneView:
             framing = self._frame_columns(frame, row, options, together)
             self._update_views(frame)
             self._stage.show(frame, discs)
+            first = next((c for c in frame.columns if c.column.truth is None), None)
             for shown in frame.columns:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
                 view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
                 values = coloring.values.get(shown.column.key) if coloring else None
                 colors = colors_of(values, coloring.scale) if coloring and values is not None else None
-                view.show(
-                    shown, options, self._look(shown, options, shown is (frame.truth or frame.columns[0]), colors)
-                )
+                view.show(shown, options, self._look(shown, options, shown is first, colors))
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
                 view.title(None if together else title_of(shown, framing.title_pixels), framing.title)
@@ -104,13 +103,13 @@ class SceneView:
     def _look(self, shown: ColumnFrame, options: DisplayOptions, solid: bool, colors: Colors | None) -> Look:
         """Bodies are of clay; those that overlap, or belong to a sweep, have the colors of their curves.
 
-        Of those that overlap one is `solid`, and is seen through the others.
+        Two surfaces in one place would cover each other in patches: of bodies that overlap only one is `solid`, and
+        the others are drawn as dots on it.
         """
         if shown.ended:
             return Look(None, ENDED, options.wireframe, TRUTH)
-        own = options.overlay or shown.column.rank is not None
-        opacity = OVERLAID if options.overlay and not solid else None
-        return Look(colors, opacity, options.wireframe, color_of(shown.column) if own else None)
+        tint = color_of(shown.column) if options.overlay or shown.column.rank is not None else None
+        return Look(colors, None, options.wireframe, tint, dots=options.overlay and not solid)
 
     def _drawn_body(self, shown: ColumnFrame, options: DisplayOptions) -> "_DrawnBody":
         view = self._views[shown.column.key][1]
@@ -132,7 +131,8 @@ class SceneView:
         reasons = (row, shapes, together, options.viewport, frame.still is None)
         if frame.columns and self._framed != reasons:
             axes = Axes.beside(direction_of(frame.columns[0]))
-            box, extent = _around([outline_of(c, axes) for c in frame.columns]), max(map(self._size, frame.columns))
+            outlines = [outline_of(c, axes, together and bool(obstacles_of(c.motion))) for c in frame.columns]
+            box, extent = _around(outlines), max(map(self._size, frame.columns))
             level = frame.still is not None
             self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level)
             self._climb = max(map(climb_of, frame.columns))
@@ -166,8 +166,8 @@ class SceneView:
 
     def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> Floats:
         """The shift (3,) of the world, in m, that keeps the first body in front of the camera; downwards where it rises
-        higher than what was framed, as after a harder kick."""
-        if discs or not options.follow or not frame.columns:
+        higher than what was framed, as after a harder kick. Where there is an obstacle, the body goes there instead."""
+        if discs or not options.follow or not frame.columns or obstacles_of(frame.columns[0].motion):
             return np.zeros(3)
         first = frame.columns[0]
         # in invisible steps, so that a body that falls straight down moves nothing

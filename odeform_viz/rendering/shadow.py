@@ -15,8 +15,10 @@ __all__ = ["FloorShadow", "cast_shadow"]
 
 MOST = 5000  # points that the hull is made from
 SOFT = ((0.35, 0.62), (0.75, 0.34), (1.3, 0.16))
-"""Standard deviation, in radii of the body, and opacity of each splat of a shadow: that of an even sky."""
-FLAT, RAISED = 1e-3, 2e-3  # m: how thick the shadow is, and how far above the floor
+"""Standard deviations, in radii of the body, and strengths of the parts of a shadow: that of an even sky."""
+WIDEST, PITCH = 2.4, 0.14  # radii: of the shadow, and from one splat to the next, which is their standard deviation too
+LAYERS = 1.5  # splats that lie over a place of the floor: half of those that overlap there
+FLAT, RAISED = 1e-3, 4e-3  # m: how thick the shadow is, and how far above the floor
 
 
 def cast_shadow(server: viser.ViserServer, node: str, points: Points) -> None:
@@ -30,32 +32,42 @@ def cast_shadow(server: viser.ViserServer, node: str, points: Points) -> None:
 
 
 class FloorShadow:
-    """Dark splats on the floor below a body, wider and fainter the higher it is."""
+    """Dark splats on the floor below a body, wider and fainter the higher it is.
+
+    Many small ones: browsers draw splats in the order of their centres, so that the floor would cover a large one.
+    """
 
     def __init__(self, server: viser.ViserServer, node: str, points: Points) -> None:
         """`points` (N, 3) m of the body at rest on the floor."""
         low, high = np.quantile(points, 0.02, axis=0), np.quantile(points, 0.98, axis=0)
         self._radius = 0.5 * float((high - low)[:2].max())
         self._rest = float(0.5 * (low + high)[2])
-        sizes = np.array([size for size, _ in SOFT]) * self._radius
-        self._covariances = np.zeros((len(SOFT), 3, 3), np.float32)
-        self._covariances[:, 0, 0] = self._covariances[:, 1, 1] = sizes**2
-        self._covariances[:, 2, 2] = FLAT**2
+        line = np.arange(-WIDEST, WIDEST + 0.5 * PITCH, PITCH)
+        places = np.stack([part.ravel() for part in np.meshgrid(line, line, [0.0])], axis=1)
+        away = np.linalg.norm(places, axis=1)
+        self._away, places = away[away <= WIDEST], places[away <= WIDEST]
+        flat = np.diag([(PITCH * self._radius) ** 2, (PITCH * self._radius) ** 2, FLAT**2]).astype(np.float32)
         self._height = 0.0
         self._splats = server.scene.add_gaussian_splats(
             node,
-            centers=np.zeros((len(SOFT), 3), np.float32),
-            covariances=self._covariances,
-            rgbs=np.zeros((len(SOFT), 3), np.float32),
-            opacities=np.array([[opacity] for _, opacity in SOFT], np.float32),
+            centers=(self._radius * places).astype(np.float32),
+            covariances=np.tile(flat, (len(places), 1, 1)),
+            rgbs=np.zeros((len(places), 3), np.float32),
+            opacities=self._opacities(),
         )
+
+    def _opacities(self) -> Floats:
+        """(N, 1) of the splats, under a body that is `_height` radii above where it rests."""
+        spread = 1.0 + 0.5 * self._height
+        light = np.ones_like(self._away)
+        for size, strength in SOFT:
+            light *= 1.0 - strength / spread**2 * np.exp(-0.5 * (self._away / size / spread) ** 2)
+        return (1.0 - light[:, None] ** (1.0 / LAYERS)).astype(np.float32)
 
     def show(self, centre: Floats) -> None:
         """Put it below a body whose centre is at (3,) m."""
         self._splats.position = (float(centre[0]), float(centre[1]), RAISED)
         height = round(max(float(centre[2]) - self._rest, 0.0) / self._radius, 2)
         if height != self._height:  # a body that rolls sends a position only
-            self._height, spread = height, 1.0 + 0.5 * height
-            wider = np.array([spread**2, spread**2, 1.0], np.float32)
-            self._splats.covariances = self._covariances * wider[:, None]
-            self._splats.opacities = np.array([[opacity / spread**2] for _, opacity in SOFT], np.float32)
+            self._height = height
+            self._splats.opacities = self._opacities()

@@ -28,6 +28,11 @@ class Clock:
         """Whether the time advances."""
         return self._playing
 
+    @property
+    def speed(self) -> float:
+        """Seconds of the motion in a second, where it is not slowed down."""
+        return self._speed
+
     def time(self) -> float:
         """Returns the current time of the motion, in s."""
         with self._lock:

@@ -22,6 +22,7 @@ from odeform.types import Geometry, MotionSequence, Times
 if TYPE_CHECKING:
     from odeform.figure import Source
     from odeform.identification.pushed.evidence import Evidence
+    from odeform.motion.recorded import RecordedMotion
     from odeform.stress.stability import StabilityMap
 
 __all__ = [
@@ -286,8 +287,10 @@ def map_stability(report: Report, checkpoint: str) -> "StabilityMap":
     return refined_map(load_continuous(checkpoint), MAPPING, report=report)
 
 
-def make_figure(report: Report, sources: "Sequence[tuple[str, Source]]", times: Times) -> bytes:
-    """Makes a figure with sliders of labelled models: a page of HTML."""
+def make_figure(
+    report: Report, sources: "Sequence[tuple[str, Source]]", times: Times, truth: "RecordedMotion | None"
+) -> bytes:
+    """Makes a figure with sliders of labelled models, and their error against a truth: a page of HTML."""
     from odeform.figure import column_bytes, figure_page, interpolated
 
     columns = []
@@ -298,4 +301,4 @@ def make_figure(report: Report, sources: "Sequence[tuple[str, Source]]", times: 
             report((before + motions / most) / len(sources))
 
         columns.append(interpolated(label, source, times, column_bytes(len(sources)), tell))
-    return figure_page(columns)
+    return figure_page(columns, truth)

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.figure import FigureColumn, Source, Sweep, column_bytes, figure_page, interpolated
+from odeform.figure import FigureColumn, Source, Sweep, column_bytes, figure_page, interpolated, truth_error
 from odeform.figure.grid import BAND_FRACTION
 from odeform.figure.page import MOST_BYTES
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform.simulation.recorded import read_truth
 from odeform.types import Floats, Mesh, Times
 
 
@@ -175,3 +177,25 @@ def test_what_a_figure_cannot_show(kick: Predictor) -> None:
     points = load("mass-elastic/rnn")
     with pytest.raises(InputError, match="a figure needs a pose and a basis"):
         made(Source(points, (sweep(points, "mass", 0.3, 0.5),), {}))
+
+
+def test_a_truth_is_compared_with_where_the_sliders_have_its_parameters(kick: Predictor) -> None:
+    first, other = (read_truth(f"kick/{entry.name}") for entry in open_dataset("kick").select("test")[:2])
+    given = {k: v for k, v in kick.schema.known(first.setting).items() if k != "force"}
+    column = made(Source(kick, (sweep(kick, "force", 10.0, 160.0),), given), kick.schema.window.times[:8])
+    ((compared,),) = ([c["truth"] for c in embedded(figure_page([column], first))[0]["columns"]],)
+    assert column.source.sweeps[0].values(np.array(compared["places"])) == pytest.approx(first.setting["force"])
+    known = kick.schema.known(first.setting)
+    motion = kick.solve(kick.to_body_frame(first.geometry, known), known)
+    off = motion.vertices(column.times) - first.vertices(column.times)
+    expected = 1e3 * np.sqrt(np.square(off, dtype=float).mean(axis=(1, 2)))
+    np.testing.assert_allclose(compared["rmse_mm"], expected, atol=1e-3)
+    assert truth_error(column, other) is None, "of other parameters than the sliders have"
+
+
+def test_under_a_load_ranges_are_those_that_were_measured() -> None:
+    thrown = load("contact-force").under("throw")
+    column = made(Source(thrown, (sweep(thrown, "height", 0.2, 0.6),), {}), thrown.schema.window.times[:8])
+    page = figure_page([column]).decode()
+    assert "partly outside of what was measured" in page
+    assert "of what was trained" not in page

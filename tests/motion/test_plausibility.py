@@ -60,6 +60,15 @@ def test_after_the_window_it_ends_where_it_first_sinks() -> None:
     assert sinking.first_stop(1.5) == sinking.stop_at(1.5)
 
 
+def test_what_is_inside_an_obstacle_is_said_to_be_so() -> None:
+    def sample(times: Times) -> Sample:
+        return Sample(falling(times), np.zeros(len(times)), np.zeros((len(times), 3)), times > 0.0)
+
+    stop = PlausibilityCheck(LIMITS, WINDOW, sample, "wall").stop_at(1.5)
+    assert stop is not None
+    assert stop.reason == "it sinks into the wall"
+
+
 def test_in_the_window_each_moment_is_checked_by_itself() -> None:
     dip, asked = plausibility(lowest=dipping)
     assert dip.clamped(np.array([0.7])).tolist() == [0.7]

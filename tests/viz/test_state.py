@@ -36,11 +36,12 @@ def view_request() -> ViewRequest:
 
 
 def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
-    looks = DisplayOptions(overlay=True, color_by="strain", exaggeration=2.5, ghost=True)
-    state = state_from_json(state_to_json(capture(SCENE, view_request, looks)), SCENE)
+    looks = DisplayOptions(overlay=True, color_by="strain", exaggeration=2.5, ghost=True, momentary=True)
+    state = state_from_json(state_to_json(capture(SCENE, view_request, looks, 0.5, False)), SCENE)
     columns = columns_of(state, view_request.columns[0].source.schema)
-    again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks)
+    again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks, 0.5, False)
     assert again == state
+    assert state.display.momentary
     assert [c.label for c in columns] == ["odeform", "heavy", "truth"]
     assert [c.visible for c in columns] == [False, True, True]
 
@@ -56,6 +57,7 @@ def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
         (lambda s: json.dumps({k: v for k, v in s.items() if k != "time"}).encode(), "time"),
         (lambda s: json.dumps({**s, "time": "soon"}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "time": float("nan")}).encode(), "time in seconds"),
+        (lambda s: json.dumps({**s, "speed": -1.0}).encode(), "speed above zero"),
         (lambda s: json.dumps({**s, "columns": [7]}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "columns": []}).encode(), "a model under the sliders"),
         (lambda s: json.dumps([s]).encode(), "format 1"),

@@ -64,10 +64,13 @@ def _floor(radius: float, rng: np.random.Generator) -> Surfels:
     x, y = grid(np.arange(LOW[0] + 0.03, HIGH[0], 0.06), rows)
     # finer where light changes
     fine = (np.hypot(x, y) < 3.6 * radius) | (np.abs(_sunlit(x, y) - 0.5) < 0.4999)
-    length = np.concatenate([np.full((~fine).sum(), 0.06), np.full(3 * fine.sum(), 0.02)])
-    x = np.concatenate([x[~fine], (x[fine, None] + [-0.02, 0.0, 0.02]).ravel()])
-    y = np.concatenate([y[~fine], np.repeat(y[fine], 3)])
-    pitch = np.stack([length, np.full(len(x), 0.01)], axis=1)
+    parts = 6 * int(fine.sum())
+    length = np.concatenate([np.full((~fine).sum(), 0.06), np.full(parts, 0.02)])
+    width = np.concatenate([np.full((~fine).sum(), 0.01), np.full(parts, 0.005)])
+    aside, beside = grid(np.array([-0.02, 0.0, 0.02]), np.array([-0.0025, 0.0025]))
+    x = np.concatenate([x[~fine], (x[fine, None] + aside).ravel()])
+    y = np.concatenate([y[~fine], (y[fine, None] + beside).ravel()])
+    pitch = np.stack([length, width], axis=1)
     # a little below the ball, so that no region around it contains any of the floor
     wood = OAK * _boards(x, y, rng)
     return tiles(-1e-3 * Z, X, Y, np.stack([x, y], axis=1), pitch, wood * _floor_light(x, y))
@@ -87,7 +90,7 @@ def _boards(x: Floats, y: Floats, rng: np.random.Generator) -> Points:
         np.abs(np.mod(value + 0.5 * size, size) - 0.5 * size)
         for value, size in ((y - LOW[1], PLANK[1]), (along, PLANK[0]))
     )
-    edge = np.where((side < 0.006) | (end < 0.011), 0.80, 1.0)
+    edge = np.where((side < 0.003) | (end < 0.011), 0.66, 1.0)
     return (tone * grain * edge)[:, None] * (1.0 + warmth[:, None] * np.array([1.0, 0.2, -1.5]))
 
 

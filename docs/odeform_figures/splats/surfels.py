@@ -6,9 +6,9 @@ import numpy as np
 
 from odeform.types import SH0, Floats, GaussianSplats, Points, Vector, Vectors
 
-__all__ = ["Surfels", "grid", "joined_surfels", "sphere_surfels", "splats_of", "tiles"]
+__all__ = ["COVER", "Surfels", "grid", "joined_surfels", "splats_of", "tiles"]
 
-THICKNESS = 4e-4  # m, one standard deviation
+THICKNESS = 2e-4  # m, one standard deviation
 COVER = 0.62  # standard deviations a pitch: neighbours overlap until no gap shows
 OPACITY = 0.97
 
@@ -39,17 +39,6 @@ def tiles(
     points = corner + at[:, :1] * along + at[:, 1:] * across
     sizes = np.broadcast_to(cover * pitch, (count, 2))
     return Surfels(points, np.tile(along, (count, 1)), np.tile(across, (count, 1)), sizes, colors)
-
-
-def sphere_surfels(centre: Vector, radius: float, count: int) -> Surfels:
-    """Makes `count` white round surfels on a sphere of `radius` m, evenly spread along a Fibonacci spiral."""
-    index = np.arange(count) + 0.5
-    z, angle = 1.0 - 2.0 * index / count, index * np.pi * (3.0 - np.sqrt(5.0))
-    flat = np.sqrt(1.0 - z**2)
-    normals = np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
-    along = np.stack([-np.sin(angle), np.cos(angle), np.zeros(count)], axis=1)
-    sizes = np.full((count, 2), COVER * radius * np.sqrt(4.0 * np.pi / count))
-    return Surfels(centre + radius * normals, along, np.cross(normals, along), sizes, np.ones((count, 3)))
 
 
 def joined_surfels(parts: list[Surfels]) -> Surfels:

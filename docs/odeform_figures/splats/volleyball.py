@@ -6,7 +6,6 @@ The ball has the size of the bundled models' body.
 import argparse
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +16,16 @@ from odeform.geometry.region import Sphere, region_to_json
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.io import atomic_write
-from odeform.types import GaussianSplats, Ints, Perpoint, Points
+from odeform.types import Floats, GaussianSplats, Ints, Perpoint, Points, Vectors
 from odeform_figures.splats.room import room
-from odeform_figures.splats.surfels import Surfels, joined_surfels, sphere_surfels, splats_of
+from odeform_figures.splats.surfels import COVER, Surfels, grid, joined_surfels, splats_of
 
 __all__ = ["BALL", "REGION", "main", "volleyball_in_room"]
 
 RADIUS = 0.1  # m
-BALL = 24_000  # splats
+BESIDE = (0.65e-3, 0.65e-3, 0.65e-3, 1.2e-3)  # m: rows from a seam on, the first two in its groove
+WIDE, LONG = 14, 49  # further rows across a panel, and along it
+BALL = 18 * (WIDE + 2 * len(BESIDE)) * (LONG + 2 * len(BESIDE))  # splats
 PANELS = np.array([[0.96, 0.76, 0.10], [0.93, 0.92, 0.88], [0.11, 0.27, 0.60]])  # yellow, white, blue
 SEAM = 1.3e-3  # m, half the width of a groove
 
@@ -41,14 +42,47 @@ def volleyball_in_room() -> GaussianSplats:
 
 
 def _ball() -> Surfels:
+    """Splats in rows along the seams, narrow beside them: colours change where rows do, so that edges are sharp."""
     centre, radius = np.array([0.0, 0.0, RADIUS]), RADIUS - 5e-4
-    ball = sphere_surfels(centre, radius, BALL)
-    normals = (ball.points - centre) / radius
-    panel, away = _panels(normals @ rotation_from_vector(np.array([0.33, -0.09, 0.49])).T)
+    points, along, across, sizes = (np.concatenate(part) for part in zip(*map(_face, range(6)), strict=True))
+    panel, away = _panels(points)
+    turn = rotation_from_vector(np.array([0.33, -0.09, 0.49]))
+    normals = points @ turn
     puffed = 1.0 - 0.10 * np.exp(-((away / 6e-3) ** 2))  # panels curve down towards their seams
-    groove = np.clip((away - SEAM) / 8e-4 + 0.5, 0.0, 1.0)
-    light = 0.88 + 0.12 * normals @ np.array([0.05, 0.45, 0.89])
-    return replace(ball, colors=PANELS[panel] * (puffed * (0.42 + 0.58 * groove) * light)[:, None])
+    groove = np.where(away < SEAM, 0.0, 1.0)
+    light = 0.86 + 0.14 * normals @ np.array([0.05, 0.45, 0.89])
+    colors = PANELS[panel] * (puffed * (0.34 + 0.66 * groove) * light)[:, None]
+    return Surfels(centre + radius * normals, along @ turn, across @ turn, radius * sizes, colors)
+
+
+def _rows(count: int, length: float) -> tuple[Floats, Floats]:
+    """Middles and lengths (N,) of `count` rows over `length` m, and of narrow ones beside the seams at both ends."""
+    narrow = np.array(BESIDE)
+    wide = np.full(count, (length - 2.0 * narrow.sum()) / count)
+    lengths = np.concatenate([narrow, wide, narrow[::-1]])
+    return np.cumsum(lengths) - 0.5 * lengths, lengths
+
+
+def _face(face: int) -> tuple[Points, Vectors, Vectors, Floats]:
+    """A sixth of a sphere of radius 1: points, two tangents and standard deviations along them, of a cube's face.
+
+    Rows are even in the two angles from the middle of the face.
+    """
+    side = 0.5 * np.pi * RADIUS
+    (third, thirds), (whole, wholes) = _rows(WIDE, side / 3.0), _rows(LONG, side)
+    across = np.concatenate([third + k * side / 3.0 for k in range(3)])
+    (x, y), (wide, long) = grid(across, whole), grid(np.tile(thirds, 3), wholes)
+    tangents = np.tan(np.stack([x, y], axis=1) / RADIUS - 0.25 * np.pi)
+    corner = np.roll(np.column_stack([np.full(len(x), 1.0 if face < 3 else -1.0), tangents]), face % 3, axis=1)
+    length = np.linalg.norm(corner, axis=1)
+    axes, sizes = [], []
+    for k, pitch in ((1, wide), (2, long)):
+        slope = np.roll(np.eye(3)[k], face % 3) * (1.0 + tangents[:, k - 1 : k] ** 2) / length[:, None]
+        slope -= corner * ((slope * corner).sum(axis=1) / length**2)[:, None]
+        stretch = np.linalg.norm(slope, axis=1)
+        axes.append(slope / stretch[:, None])
+        sizes.append(COVER * stretch * pitch / RADIUS)
+    return corner / length[:, None], axes[0], axes[1], np.stack(sizes, axis=1)
 
 
 def _panels(directions: Points) -> tuple[Ints, Perpoint]:

@@ -7,7 +7,7 @@ from odeform.geometry.contact import RADIUS
 from odeform.simulation.objects.soft_object import SoftMaterial
 from odeform.surroundings import GRAVITY
 
-__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_of"]
+__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_name", "material_of"]
 
 SILICONE = "silicone Ecoflex 00-50, cast solid: 83 kPa at 100 %, 1,070 kg/m^3 (Smooth-On, technical bulletin)"
 FOAM = "flexible polyurethane foam: 10 to 200 kPa, 25 to 300 kg/m^3 (Gibson and Ashby 1997, Cellular Solids, ch. 5)"
@@ -72,6 +72,12 @@ def material_of(text: str) -> SoftMaterial:
             "and 1 to 20,000 kg/m^3"
         )
     return SoftMaterial(1e3 * young, 0.3, density, 0.004, 0.6, "given")
+
+
+def material_name(material: SoftMaterial) -> str:
+    """What `material_of` reads as that material: the name of one to choose from, or stiffness and density."""
+    numbers = f"{1e-3 * material.young:g}:{material.density:g}"
+    return next((name for name, known in CHOICE.items() if known == material), numbers)
 
 
 def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ import trimesh
 from odeform.errors import InputError
 from odeform.io import bundled
 from odeform.simulation.objects.catalog import OBJECTS, get_object
-from odeform.simulation.objects.materials import FORCES, MATERIALS
+from odeform.simulation.objects.materials import CHOICE, FORCES, MATERIALS, material_name, material_of
 from odeform.types import Mesh
 
 SOLIDS = [name for name in OBJECTS if name != "chip"]
@@ -89,3 +89,8 @@ def test_all_files_together_are_small():
 def test_an_unknown_name_is_refused():
     with pytest.raises(InputError, match="expected one of bottle, cat"):
         get_object("teapot")
+
+
+@pytest.mark.parametrize("name", [*CHOICE, "60:120", "0.5:30"])
+def test_a_material_is_named_as_it_is_read(name: str) -> None:
+    assert material_name(material_of(name)) == name

@@ -127,6 +127,7 @@ def test_what_is_not_determined_is_not_given_as_a_number() -> None:
     assert "| mass (kg) | **0.7** | 0.69 to 0.71 | 0.72 |" in text
     assert "| bending (N m) | not identifiable | 0.1 to 0.9 |  |" in text
     assert "| friction | **0.7** | 0.69 to 0.71 |  |" in text
+    assert "| azimuth (rad) | *as given* | |  |" in text
     assert "the model does not explain this motion" in text
 
 

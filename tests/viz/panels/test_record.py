@@ -18,6 +18,7 @@ from odeform.figure import Source
 from odeform.formats.writing import shape_at, write_shape
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform.motion.recorded import RecordedMotion
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import Column, truth_column
@@ -164,17 +165,21 @@ def test_a_state_opens_no_file_outside_of_the_workspace(dropped: View, tmp_path:
     assert app.columns.all == before
 
 
-def tiny(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+def tiny(report: Report, sources: list[tuple[str, Source]], times: np.ndarray, truth: RecordedMotion | None) -> bytes:
     """The names and sliders of what would be made."""
     report(0.5)
     return json.dumps([(label, [sweep.name for sweep in source.sweeps]) for label, source in sources]).encode()
 
 
-def refused(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+def refused(
+    report: Report, sources: list[tuple[str, Source]], times: np.ndarray, truth: RecordedMotion | None
+) -> bytes:
     raise InputError("a figure shows a mesh with faces")
 
 
-def endless(report: Report, sources: list[tuple[str, Source]], times: np.ndarray) -> bytes:
+def endless(
+    report: Report, sources: list[tuple[str, Source]], times: np.ndarray, truth: RecordedMotion | None
+) -> bytes:
     report(0.25)
     threading.Event().wait()
     raise AssertionError

@@ -13,10 +13,11 @@ from odeform.models.modal.elastic_body import elastic_body
 from odeform.models.registry import load
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
-from odeform_viz.columns import Column
+from odeform_viz.columns import Column, Columns
 from odeform_viz.panels import teach
 from odeform_viz.panels.teach import describe_lesson, describe_result, lesson_folder
 from odeform_viz.runtime.jobs import Lesson, Report
+from odeform_viz.state import capture, state_from_json, state_to_json
 from odeform_viz.user_bodies import (
     TaughtBodyPredictor,
     UserBody,
@@ -25,6 +26,7 @@ from odeform_viz.user_bodies import (
     with_user_body,
     without_user_body,
 )
+from odeform_viz.view import DisplayOptions, ViewRequest
 from tests.soft_block import block_object
 
 View = tuple[App, LoopbackClient]
@@ -129,3 +131,13 @@ def test_the_refined_model_stands_beside_the_first_guess(view: View, tmp_path: P
     assert with_user_body(app.columns.all, body_of())[1].label == "refined"
     assert len(with_user_body(app.columns.all, body_of(5e4))) == 1, "it was taught another material"
     assert len(without_user_body(app.columns.all)) == 1
+
+
+def test_a_saved_page_says_of_what_material_a_shape_is() -> None:
+    model, body = load("contact-force"), body_of(6e4)
+    body = replace(body, fit=replace(body.fit, origin="shape.ply"))
+    columns = with_user_body([Column("guess", model, model.rest, origin="contact-force")], body)
+    request = ViewRequest(model.complete({}), 0.0, "balanced", Columns.of(columns).all)
+    state = state_from_json(state_to_json(capture("contact-force", request, DisplayOptions())), "contact-force")
+    assert state.shape is not None
+    assert state.shape["material"] == f"60:{body.item.material.density:g}"

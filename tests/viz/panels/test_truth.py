@@ -164,10 +164,10 @@ def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve:
     made = kick.checkpoint.provenance
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
     _, client = serve(Column("odeform", load_model(other), kick.rest))
-    assert "young_pa 1.3e+05 (trained on 1.7e+05)" in client.text()
+    assert "Young's modulus 130 kPa (trained on Young's modulus 170 kPa)" in client.text()
     trained_with = load("mass-elastic").checkpoint.provenance["fixed"]
     assert physics_difference(trained_with, open_dataset("mass-elastic").fixed) == ""
-    assert physics_difference({"a": 1.0}, {"b": 2.0}) == "a none (trained on 1), b 2 (trained on none)"
+    assert physics_difference({"a": 1.0}, {"b": 2.0}) == "none (trained on a 1), b 2 (trained on none)"
 
 
 def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:

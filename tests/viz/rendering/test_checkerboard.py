@@ -1,9 +1,11 @@
 """The checkerboard that makes rotations visible."""
 
 import numpy as np
+import pytest
 import trimesh
 
 from odeform.types import Mesh
+from odeform_viz.rendering import checkerboard
 from odeform_viz.rendering.checkerboard import CELLS, checkerboard_parts
 
 
@@ -32,7 +34,8 @@ def test_parts_are_cut_along_the_planes_and_cover_the_surface() -> None:
         assert ((normals * (corners.mean(axis=1) + centre)).sum(axis=1) > -1e-9).all()
 
 
-def test_a_mesh_along_the_planes_is_not_cut() -> None:
+def test_a_mesh_along_the_planes_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkerboard, "CELLS", 4)
     box = trimesh.creation.box((4.0, 4.0, 4.0)).subdivide().subdivide()
     mesh = Mesh(np.asarray(box.vertices, np.float32), np.asarray(box.faces, np.int32))
     parts = checkerboard_parts(mesh)

@@ -79,3 +79,22 @@ def test_an_arrow_touches_the_body_and_is_as_strong_as_its_cause_is_then(
         assert isinstance(node, viser.ArrowsHandle)
         np.testing.assert_allclose(node.points[0], [[0.01 - length, 5.0, 0.0], [0.01, 5.0, 0.0]], atol=1e-6)
         assert _labels(server) == [label]
+
+
+def test_a_velocity_leaves_the_middle_of_a_body_that_begins_turned(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.array([1.0, 0.0, 0.0])
+    middle = REST.mean(axis=0).astype(float)
+    toy = replace(kick.SCENE, glyphs=lambda *_: (Arrow(middle + 2.0 * x, x, "1 m/s", 0.0, 1.0, leaves=True),))
+    monkeypatch.setattr(glyphs, "find_scene", lambda _: toy)
+    view, pose = GlyphView(server, "/body", REST), np.eye(4)
+    pose[:3, :3] = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+    pose[:3, 3] = [0.0, 0.0, 2.0]
+    view.show("toy", {}, 0.0, REST, pose)
+    node = server.scene.get_handle_by_name("/body/arrows")
+    assert isinstance(node, viser.ArrowsHandle)
+    start = pose[:3, :3] @ middle + pose[:3, 3]
+    np.testing.assert_allclose(node.points[0], [start, start + x], atol=1e-6)
+    view.show("toy", {}, 0.0, REST, pose, labels=False)
+    assert _labels(server) == []
