@@ -170,7 +170,7 @@ def begun(dataset: Dataset, out: Path, *limit: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.parametrize("step", ["first guess", "model 1", "model 2"])
+@pytest.mark.parametrize("step", ["first guess", "model 1"])
 def test_a_refinement_that_is_killed_goes_on_where_it_was(dataset: Dataset, tmp_path: Path, step: str) -> None:
     out = tmp_path / "model.safetensors"
     process = begun(dataset, out)
@@ -180,8 +180,6 @@ def test_a_refinement_that_is_killed_goes_on_where_it_was(dataset: Dataset, tmp_
         process.kill()
         process.wait()
     assert process.returncode == -signal.SIGKILL
-    if step == "model 2":  # the first model was written before the second was scored
-        assert odeform.load(out).schema.objects == ("block",)
     resumed = Path(f"{out}.part").exists()
     found = refine(dataset, out, "contact-force", resume=resumed, report=lambda _: None)
     made = found.checkpoint.provenance["refined"]
