@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.formats.bundled import moving_part
 from odeform.models.base import Predictor
 from odeform.models.modal.taught_body import TaughtBodyPredictor, item_of, taught
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
@@ -35,7 +36,7 @@ def read_user_body(name: str | Path, material: str | None = None) -> UserBody:
 
     `InputError` for a file without one.
     """
-    geometry, _ = readable_shape(name)
+    geometry = moving_part(*readable_shape(name))
     given = None if material is None else material_of(material)
     body = user_body(geometry, Path(name).name, material=given)
     return replace(body, fit=replace(body.fit, origin=str(name)))
@@ -47,7 +48,7 @@ def describe_user_body(body: UserBody) -> str:
     points = len(body.fit.geometry.points)
     return (
         f"{body.item.name}: {points:,} points move with a soft body of {body.item.surface_count:,} surface vertices, "
-        f"{size:.0f} mm long and {1e3 * body.item.mass:,.0f} g, {body.made}"
+        f"{size:.0f} mm long and {1e3 * body.item.mass:,.0f} g, " + "; ".join((body.made, *body.fit.source.notes))
     )
 
 

@@ -97,7 +97,7 @@ def _shape(
     args: argparse.Namespace, predictor: "Predictor", settings: dict[str, Any]
 ) -> "tuple[Predictor, FittedShape | None, dict[str, Any]]":
     """The shape of `--geometry` as `predictor` moves it, with the predictor and the settings for it; None without."""
-    from odeform.formats.bundled import read_shape
+    from odeform.formats.bundled import moving_part, read_shape
     from odeform.geometry.shape import fit_to
     from odeform.geometry.similarity import UPRIGHT, Similarity
     from odeform.models.modal.user_body import UserBodyPredictor, takes_user_bodies, user_body
@@ -109,7 +109,7 @@ def _shape(
             _note(f"{args.checkpoint}: {note}")
     elif args.geometry is not None and takes_user_bodies(predictor):
         material = None if args.material is None else material_of(args.material)
-        own = user_body(read_shape(args.geometry)[0], Path(args.geometry).name, material=material)
+        own = user_body(moving_part(*read_shape(args.geometry)), Path(args.geometry).name, material=material)
         predictor = UserBodyPredictor(predictor, own)
         fit, settings = predictor.user_body.fit, {**predictor.parameters_like(), **settings}
         _note(f"{args.geometry}: {predictor.user_body.made}")

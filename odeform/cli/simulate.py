@@ -9,6 +9,7 @@ from odeform.errors import FailedCheck, InputError, counted
 
 if TYPE_CHECKING:
     from odeform.dataset.index import Dataset
+    from odeform.simulation.objects.user_object import UserObject
 
 __all__ = ["HELP", "add_options", "run"]
 
@@ -92,7 +93,12 @@ def _simulated(args: argparse.Namespace, asked: dict[str, Any], ranges: dict[str
     for option, given in (("--object", args.object), ("--range", ranges), ("--corners", args.corners)):
         if given:
             raise InputError(f"{option}: not with --geometry, whose body is the only one")
-    return simulate_shape(args.scene, args.geometry, args.out, args.material, **asked)
+    return simulate_shape(args.scene, args.geometry, args.out, args.material, made=_said, **asked)
+
+
+def _said(body: "UserObject") -> None:
+    """Say what was made of a shape, before it is simulated for minutes."""
+    print(f"{body.item.name}: {1e3 * body.item.mass:,.0f} g {body.made}", flush=True)
 
 
 def _range(name: str, text: str) -> tuple[float, float]:

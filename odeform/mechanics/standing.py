@@ -62,11 +62,14 @@ def sag(points: Points, elements: Ints, masses: Perpoint, young: float, poisson:
     return float(np.abs(found.reshape(-1, 3)[:, 2]).max() / height.max())
 
 
-def standing(points: Points, elements: Ints, masses: Perpoint, young: float, poisson: float) -> tuple[Points, bool]:
+def standing(
+    points: Points, elements: Ints, masses: Perpoint, young: float, poisson: float, least: float = 0.0
+) -> tuple[Points, bool]:
     """Where nodes (N, 3) m of tetrahedra (M, 4) are when they stand on the floor z = 0, and whether they came to rest.
 
-    `points` are without stress, `young` is in Pa. Newton's method in steps of a pseudo time, which the inertia of the
-    nodes, `masses` (N,) kg, holds back; steps that turn a tetrahedron inside out are taken again, shorter.
+    `points` are without stress, `young` is in Pa. A body that becomes lower than `least` m has not. Newton's method in
+    steps of a pseudo time, which the inertia of the nodes, `masses` (N,) kg, holds back; steps that turn a tetrahedron
+    inside out are taken again, shorter.
     """
     positions = points - [0.0, 0.0, points[:, 2].min()]
     mass, step = float(masses.sum()), FIRST
@@ -78,6 +81,8 @@ def standing(points: Points, elements: Ints, masses: Perpoint, young: float, poi
         if not np.isfinite(moved).all() or inside_out(moved, elements).any():
             step *= 0.25
             continue
+        if np.ptp(moved[:, 2]) < least:
+            return moved, False
         positions, left = moved, _forces(points, elements, moved, masses, young, poisson)
         still = left.copy()
         still[:, 2] += stiff * np.maximum(-positions[:, 2], 0.0)

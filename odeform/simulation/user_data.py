@@ -1,6 +1,7 @@
 """Motions of a user's own shape: its solid, and a data set of what the simulator does with it."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,14 @@ from odeform.types import Geometry
 __all__ = ["body_in", "digest", "simulate_item", "simulate_shape"]
 
 
-def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | None = None, **settings: Any) -> Dataset:
+def simulate_shape(
+    scene: str,
+    geometry: str,
+    out: str | Path,
+    material: str | None = None,
+    made: Callable[[UserObject], None] = lambda _: None,
+    **settings: Any,
+) -> Dataset:
     """Simulate motions of the shape in a file, under what happens in a scene of soft objects.
 
     The folder `out` keeps the body as `body.npz`. An interrupted run is continued with that body.
@@ -31,12 +39,13 @@ def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | N
         out: Folder to write to.
         material: A name or KPA:DENSITY, see `odeform.simulation.objects.materials.material_of`; default: the softest
             under which the shape stands.
+        made: Called with the body, before it is simulated.
         settings: Those of `odeform.simulation.runner.simulate`: `count`, `seed`, `workers`, `rate`, `step`.
 
     Raises:
         InputError: A shape that encloses no solid or does not stand; a folder with another data set.
     """
-    from odeform.formats.bundled import read_shape
+    from odeform.formats.bundled import moving_part, read_shape
 
     root = Path(out)
     path = Path(geometry)
@@ -44,7 +53,8 @@ def simulate_shape(scene: str, geometry: str, out: str | Path, material: str | N
     source = f"{mark}, {material or 'default material'}"
     body = body_in(root, source)
     if body is None:
-        body = _kept(root, _made(read_shape(geometry)[0], object_name(geometry), material, source))
+        body = _kept(root, _made(moving_part(*read_shape(geometry)), object_name(geometry), material, source))
+    made(body)
     return _simulated(scene, body, root, **settings)
 
 
@@ -105,4 +115,5 @@ def _made(geometry: Geometry, name: str, material: str | None, source: str) -> U
 
     given = None if material is None else material_of(material)
     placed = placed_object(geometry, name, material=given)
-    return UserObject(rested(placed.item), placed.like, source)
+    notes = "; ".join((placed.describe(), *geometry.notes))
+    return UserObject(rested(placed.item), placed.like, source, notes)

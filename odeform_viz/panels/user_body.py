@@ -6,6 +6,7 @@ from pathlib import Path
 import viser
 
 from odeform.errors import InputError
+from odeform.formats.bundled import moving_part
 from odeform.types import Geometry
 from odeform_viz.fitting import MOST_POINTS, readable_shape
 from odeform_viz.page import Page, Panel
@@ -72,8 +73,7 @@ class UserBodyPanel(Panel):
 
     def load(self, path: str | Path, name: str, origin: str) -> None:
         """Make a body of a file in another process, and show it. `InputError` for a file that cannot be read."""
-        geometry, _ = readable_shape(path)
-        self._make(geometry, name, origin)
+        self._make(moving_part(*readable_shape(path)), name, origin)
 
     def _make(self, geometry: Geometry, name: str, origin: str) -> None:
         with LOCK:

@@ -1,5 +1,8 @@
 """A model is refined for a body that it was not trained on, by simulated motions of it."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -145,3 +148,72 @@ def test_other_data_and_options_are_refused_in_one_line(
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert expected in error
     assert open_dataset(dataset.root).entries
+
+
+SCRIPT = """
+import sys
+from odeform.dataset.store import open_dataset
+from odeform.models.modal.training import fit, refine as refining
+from odeform.training.refine import refine
+
+if sys.argv[3:]:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]),) * 2)
+fit.MODES, refining.STARTS, refining.EVALUATIONS = (60, 60), 1, 4
+refine(open_dataset(sys.argv[1]), sys.argv[2], "contact-force", report=lambda line: print(line, flush=True))
+"""
+
+
+def begun(dataset: Dataset, out: Path, *limit: str) -> subprocess.Popen[str]:
+    """A refinement in a process of its own."""
+    command = [sys.executable, "-c", SCRIPT, str(dataset.root), str(out), *limit]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize("step", ["first guess", "model 1"])
+def test_a_refinement_that_is_killed_goes_on_where_it_was(dataset: Dataset, tmp_path: Path, step: str) -> None:
+    out = tmp_path / "model.safetensors"
+    process = begun(dataset, out)
+    with process:
+        assert process.stdout is not None
+        assert any(line.startswith(step) for line in process.stdout)
+        process.kill()
+        process.wait()
+    assert process.returncode == -signal.SIGKILL
+    resumed = Path(f"{out}.part").exists()
+    found = refine(dataset, out, "contact-force", resume=resumed, report=lambda _: None)
+    made = found.checkpoint.provenance["refined"]
+    assert made["test_mm"] < 0.5 * made["first_guess_mm"]
+    assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"] or not resumed
+
+
+def test_a_full_disk_leaves_no_half_file(dataset: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "model.safetensors"
+    process = begun(dataset, out, "2000")
+    _, said = process.communicate()
+    assert process.returncode == 1
+    assert "OSError" in said
+    assert not out.exists()
+    found = refine(dataset, out, "contact-force", report=lambda _: None)
+    assert odeform.load(out).schema.objects == found.schema.objects
+
+
+def test_a_simulation_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> None:
+    script = (
+        "import sys; from odeform.simulation.user_data import simulate_item; from tests.soft_block import block_object;"
+        "simulate_item('contact-force', block_object(), 'pillow', sys.argv[1], count=4, rate=50.0, step=1e-3,"
+        "report=lambda done, count: print(done, flush=True))"
+    )
+    out = tmp_path / "block"
+    root = str(Path(__file__).parents[2])
+    process = subprocess.Popen([sys.executable, "-c", script, str(out)], stdout=subprocess.PIPE, text=True, cwd=root)
+    with process:
+        assert process.stdout is not None
+        assert any(line.strip() == "2" for line in process.stdout)
+        process.kill()
+    told: list[int] = []
+    item = block_object()
+    options = {"count": 4, "rate": 50.0, "step": 1e-3}
+    found = simulate_item("contact-force", item, "pillow", out, report=lambda done, _: told.append(done), **options)
+    assert len(found.select("all")) == 4
+    assert told[0] >= 1, "at most the motion in progress is lost, and one that was not listed yet"

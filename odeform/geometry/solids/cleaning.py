@@ -12,6 +12,8 @@ __all__ = ["clean_mesh", "oriented"]
 
 SPECK = 0.02  # extent of a part, relative to the whole, below which it is dropped
 FLAT = 1e-4  # extent across, relative to the longest, below which a mesh encloses nothing
+ROUNDED = 1e-9  # of the cube of the longest extent: volumes below it are rounding errors
+INWARD = "its faces look inward, as those of a room do, and were turned: what they enclose was filled"
 SEAM = 1e-6  # of the longest extent, within which vertices are one
 MOST, FINE = 150_000, 128  # faces; of more, vertices are merged within the longest extent / FINE
 
@@ -68,7 +70,7 @@ def _holes(points: Points, faces: Ints, size: float) -> list[str]:
 def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
     """Turns faces (F, 3) so that they look outward, and says what was done.
 
-    Parts that look inward within another are cavities, and stay.
+    Parts that look inward within another are cavities, and stay, and so do those that are flat.
     """
     ends = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     directed = ends[:, 0] * len(points) + ends[:, 1]
@@ -84,14 +86,14 @@ def oriented(points: Points, faces: Ints) -> tuple[Ints, tuple[str, ...]]:
     corners = corners - (centre / np.maximum(np.bincount(label, minlength=parts), 1)[:, None])[label, None]
     signed = np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
     volume = np.bincount(label, signed, parts).astype(float)
-    inward = volume < 0.0
+    inward = volume < -ROUNDED * float(np.ptp(points, axis=0).max()) ** 3
     if not mixed and not inward.all():
         inward &= ~_within_another(points, faces, label, volume)
     turned = inward[label]
     faces = np.where(turned[:, None], faces[:, ::-1], faces)
     if mixed:
         return faces, ("faces that look inward were turned",)
-    return faces, ("its faces look inward and were turned",) if inward.any() else ()
+    return faces, (INWARD,) if inward.any() else ()
 
 
 def _within_another(points: Points, faces: Ints, label: Ints, volume: Floats) -> Bools:

@@ -18,7 +18,8 @@ CELLS = 56  # along the longest side, at most
 SPACING = 1.5  # width of a cell, in median distances between neighbouring points
 GROWTH = (1, 2, 3, 4)  # cells by which points are thickened until they enclose something
 DEEP, FRACTION = 2, 0.25  # fraction of the cells that are deeper than that many cells: less, and nothing is enclosed
-FOG = 5.0  # cells; points deeper than that outline nothing
+INNER, LEAST = 0.35, 2.0  # of the greatest depth, and cells, from which on a point does not outline anything
+FOG = 0.4  # density of such points, relative to that of points that fill the inside evenly
 SMOOTHING = 1.0  # cells
 LEVEL = 0.69  # of the smoothed cells: the surface passes through the points, half a cell within the cells' outline
 SLOPE = 0.4  # of the smoothed cells at the surface, for each cell
@@ -45,7 +46,9 @@ def enclosed_by_points(geometry: PointCloud | GaussianSplats) -> Enclosed:
     solid = _solid(kept, cell)
     inside = ndimage.gaussian_filter((solid.values < 0.0).astype(float), SMOOTHING)
     depth = solid.edge_distance(inside > LEVEL) * (inside > LEVEL)
-    if (depth[tuple(solid.indices(kept).T)] > FOG * cell).mean() > FRACTION:
+    deep = max(INNER * float(depth.max()), LEAST * cell)
+    even = float((depth > deep).sum()) / max(float((depth > 0.0).sum()), 1.0)
+    if (depth[tuple(solid.indices(kept).T)] > deep).mean() > FOG * even > 0.0:
         raise InputError("the points fill the inside, as fog does: expected points that outline a body")
     near = cell * (LEVEL - inside) / SLOPE
     away = solid.edge_distance(inside > LEVEL)

@@ -74,7 +74,8 @@ def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> 
     regression = known.regression
     assert isinstance(regression, PushRegression)
     # a scale belongs to a stiffness, and modes of the same number need not be as stiff in both bodies
-    scale = np.interp(np.log(body.eigenvalues), np.log(part.body.eigenvalues), regression.scale)
+    softest = part.body.eigenvalues[0]  # a body of slender parts has modes of no stiffness, but for rounding
+    scale = np.interp(np.log(np.maximum(body.eigenvalues, softest)), np.log(part.body.eigenvalues), regression.scale)
     kept = 1.0 - weight * (1.0 - weight_of(regression.parts, scale))
     standing = standing_offset(shape, part.rest)
     there = Mesh(shape.points + standing.astype(np.float32), shape.faces)

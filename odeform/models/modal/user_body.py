@@ -73,10 +73,7 @@ def user_body(
     sagging = _carried(item.settled - stiff, stiff, np.asarray(shape.points, dtype=float))
     shape = replace(shape, points=(shape.points + sagging).astype(np.float32))
     fit = FittedShape(geometry, None, laid, shape, None, 0.0)
-    size = float(np.ptp(item.settled, axis=0).max())
-    return UserBody(
-        item, elastic_body(item), placed.like, fit, f"of {placed.material}; {placed.changes.describe(size)}"
-    )
+    return UserBody(item, elastic_body(item), placed.like, fit, placed.describe())
 
 
 def resting_body(item: SoftObject, like: str) -> UserBody:

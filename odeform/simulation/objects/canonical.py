@@ -12,14 +12,14 @@ from odeform.geometry.similarity import UPRIGHT
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats, Points, Rotations
 
-__all__ = ["SOLIDS", "distances_to", "most_like", "plausible_scale"]
+__all__ = ["SOLIDS", "UNITS", "distances_to", "most_like", "plausible_scale"]
 
 SOLIDS = tuple(name for name in OBJECTS if name != "chip")
 """The classes that a closed mesh can be: a chip is a shell."""
 AZIMUTHS = 12
 SAMPLES = 400  # points of each shape that are compared
 SMALLEST, LARGEST = 0.04, 0.7  # m, extent of a body on which a sphere of 20 mm leaves a dent
-UNITS = (1.0, 1e-3, 1e-2)  # m: metres, millimetres, centimetres
+UNITS = {1.0: "metres", 1e-3: "millimetres", 1e-2: "centimetres"}  # by m
 
 
 def most_like(points: Points, like: str | None, up: str) -> tuple[str, Rotations]:

@@ -10,7 +10,7 @@ from odeform.geometry.similarity import Similarity
 from odeform.geometry.solids.solid import Changes, solid_inside
 from odeform.geometry.upright import guess_up
 from odeform.mechanics.standing import lying, sag, standing
-from odeform.simulation.objects.canonical import most_like, plausible_scale
+from odeform.simulation.objects.canonical import UNITS, most_like, plausible_scale
 from odeform.simulation.objects.materials import CHOICE, forces_on
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject, nodal_masses
 from odeform.simulation.objects.thickness import median_thickness
@@ -36,6 +36,13 @@ class PlacedObject:
     """What was done to make a solid of it."""
     material: str
     """What it is of, and why, as in "of foam"."""
+    unit: str
+    """Which unit its file was taken to be in, if not metres."""
+
+    def describe(self) -> str:
+        """Returns one line: the material, the unit, and what the solid has that the shape does not have."""
+        size = float(np.ptp(self.item.settled, axis=0).max())
+        return "; ".join(said for said in (f"of {self.material}", self.unit, self.changes.describe(size)) if said)
 
 
 def placed_object(
@@ -66,7 +73,8 @@ def placed_object(
     shape = trimesh.Trimesh(surface.points, surface.faces, process=False)
     even = np.asarray(trimesh.sample.sample_surface(shape, SAMPLES, seed=0)[0])
     like, rotation = most_like(even, like, up or geometry.up or guess_up(surface))
-    scale = plausible_scale(float(np.ptp(surface.points, axis=0).max()), like) if unit is None else unit
+    extent = float(np.ptp(surface.points, axis=0).max())
+    scale = plausible_scale(extent, like) if unit is None else unit
     turned = scale * (solid.points @ rotation.T)
     chosen = material or next(iter(CHOICE.values()))
     rotation = lying(turned, nodal_masses(turned, solid.elements, chosen)) @ rotation
@@ -77,7 +85,7 @@ def placed_object(
     mass = float(nodal_masses(points, solid.elements, used).sum())
     weakest, strongest = (float(f"{force:.2g}") for force in forces_on(used, thickness, mass))
     item = SoftObject(name, points, solid.elements, solid.faces, settled, used, (weakest, strongest), thickness)
-    return PlacedObject(item, place, like, solid.changes, said)
+    return PlacedObject(item, place, like, solid.changes, said, _unit(extent, scale, like) if unit is None else "")
 
 
 def _at_rest(
@@ -85,15 +93,28 @@ def _at_rest(
 ) -> tuple[Points, SoftMaterial, str]:
     """The nodes (N, 3) m at rest, the material, and its name with the reason."""
     choice = CHOICE if material is None else {"given": material}
+    least = 0.0 if material else (1.0 - SAGS) * float(np.ptp(points[:, 2]))  # m of height, or another one is chosen
+    weak = 0.0  # stiffness for its density of what it did not stand of
     for called, one in choice.items():
         masses = nodal_masses(points, elements, one)
-        if material is None and sag(points, elements, masses, one.young, one.poisson) > SAGS:
+        if material is None and one.young / one.density <= weak:
             continue
-        settled, rests = standing(points, elements, masses, one.young, one.poisson)
-        if rests and (material is not None or np.ptp(settled[:, 2]) > (1.0 - SAGS) * np.ptp(points[:, 2])):
+        rests, settled = material is not None or sag(points, elements, masses, one.young, one.poisson) < SAGS, points
+        if rests:
+            settled, rests = standing(points, elements, masses, one.young, one.poisson, least)
+        if rests:
             shift = masses @ settled / masses.sum() * [1.0, 1.0, 0.0]
             return settled - shift, one, _described(one, "" if material else called)
+        weak = max(weak, one.young / one.density)
     raise InputError(f"{name}: it does not stand: parts of it collapse under its weight, also of {list(choice)[-1]}")
+
+
+def _unit(extent: float, scale: float, like: str) -> str:
+    """Says which unit was taken, for a shape of that extent in its own."""
+    if scale in UNITS:
+        return "" if scale == 1.0 else f"its file is taken to be in {UNITS[scale]}"
+    size = 100.0 * extent * scale
+    return f"with an extent of {extent:.3g} it fits no usual unit, and was scaled to the {like}'s {size:.0f} cm"
 
 
 def _described(material: SoftMaterial, chosen: str) -> str:

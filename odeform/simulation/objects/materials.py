@@ -43,6 +43,7 @@ DOUGH = (
 )
 NATURAL = "soft natural rubber of Shore A 20: 0.7 MPa (Gent 1958, Rubber Chem. Technol. 31, 896), 1,000 kg/m^3"
 BOARD = "corrugated board across its flutes, about 1 MPa and 150 kg/m^3 (an estimate of its order of magnitude)"
+CORK = "cork: 13 to 20 MPa, 170 kg/m^3, Poisson's ratio 0 to 0.1 (Gibson et al. 1981, Proc. R. Soc. A 377, 99)"
 
 CHOICE: dict[str, SoftMaterial] = {
     "plush": SoftMaterial(12e3, 0.2, 50.0, 0.005, 0.6, PLUSH),
@@ -51,6 +52,7 @@ CHOICE: dict[str, SoftMaterial] = {
     "silicone": SoftMaterial(83e3, 0.4, 1070.0, 0.004, 0.6, SILICONE),
     "rubber": SoftMaterial(700e3, 0.4, 1000.0, 0.003, 0.8, NATURAL),
     "cardboard": SoftMaterial(1e6, 0.2, 150.0, 0.003, 0.4, BOARD),
+    "cork": SoftMaterial(13e6, 0.1, 170.0, 0.003, 0.5, CORK),
 }
 """What a shape of the user's own can be of, from soft to stiff."""
 DENT, LIFTS, WEAKEST = 0.12, 3.0, 0.3

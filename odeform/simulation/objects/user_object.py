@@ -31,6 +31,8 @@ class UserObject:
     """The trained object that it is like."""
     source: str = ""
     """Identifies what it was made of, so that a data set is not continued with another shape or material."""
+    made: str = ""
+    """How it was made, in one line."""
 
 
 def object_name(text: str) -> str:
@@ -44,7 +46,7 @@ def write_user_object(folder: Path, body: UserObject) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     arrays: dict[str, Any] = {
         **arrays_of(body.item),
-        "origin": np.array(json.dumps({"like": body.like, "source": body.source})),
+        "origin": np.array(json.dumps({"like": body.like, "source": body.source, "made": body.made})),
     }
     with atomic_open(folder / BODY) as file:
         np.savez_compressed(file, **arrays)
@@ -58,6 +60,6 @@ def read_user_object(folder: Path) -> UserObject | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             origin = json.loads(str(file["origin"]))
-            return UserObject(object_of(file), str(origin["like"]), str(origin["source"]))
+            return UserObject(object_of(file), str(origin["like"]), str(origin["source"]), str(origin.get("made", "")))
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"soft object {path}: cannot be read ({error})") from None

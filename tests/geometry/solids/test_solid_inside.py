@@ -104,7 +104,7 @@ def test_what_was_done_is_said() -> None:
     assert "1 hole closed, the widest" in changes.describe(1.0)
     assert "1 loose speck" in changes.describe(1.0)
     inward = solid_inside(mesh_of(turned(trimesh.creation.box(), np.ones(12, dtype=bool))))
-    assert "its faces look inward and were turned" in inward.changes.notes
+    assert "its faces look inward" in inward.changes.describe(1.0)
 
 
 def sheet() -> Mesh:
@@ -134,9 +134,42 @@ NOISE = np.random.default_rng(0).normal(size=(6000, 3))
         (lambda: PointCloud(NOISE * [1.0, 1.0, 0.0]), "enclose no volume"),
         (lambda: PointCloud(NOISE[:50]), "at least 300 points"),
         (lambda: PointCloud(np.random.default_rng(0).normal(size=(20_000, 3))), "as fog does"),
+        (lambda: PointCloud(np.random.default_rng(0).uniform(size=(2_000, 3))), "as fog does"),
     ],
-    ids=["triangle", "flat", "sheet", "two", "nan", "plane", "few", "fog"],
+    ids=["triangle", "flat", "sheet", "two", "nan", "plane", "few", "fog", "thin fog"],
 )
 def test_what_is_no_solid_is_refused_with_the_reason(shape: Callable[[], Geometry], reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         solid_inside(shape())
+
+
+@pytest.mark.slow
+def test_a_soup_whose_triangles_look_every_way_counts_as_points() -> None:
+    rng = np.random.default_rng(0)
+    corners = np.asarray(ball().triangles)[rng.random(5120) > 0.1]
+    turned_ones = rng.random(len(corners)) > 0.6
+    corners[turned_ones] = corners[turned_ones][:, ::-1]
+    corners = corners + 3e-3 * rng.standard_normal(corners.shape)  # no vertex is shared
+    found = solid_inside(Mesh(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)))
+    surface = trimesh.Trimesh(found.points, found.faces, process=False)
+    assert surface.is_watertight
+    assert surface.volume == pytest.approx(BALL, rel=0.1)
+    assert "its triangles look every way, and count as points" in found.changes.describe(1.0)
+
+
+@pytest.mark.slow
+def test_a_soup_that_looks_outward_keeps_its_sides() -> None:
+    corners = np.asarray(ball().triangles)
+    corners = corners + 1e-3 * np.random.default_rng(0).standard_normal(corners.shape)
+    found = solid_inside(Mesh(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)))
+    assert volumes(found.points, found.elements).sum() == pytest.approx(BALL, rel=0.05)
+    assert "look every way" not in found.changes.describe(1.0)
+
+
+@pytest.mark.slow
+def test_a_room_is_filled_and_it_is_said() -> None:
+    walls = trimesh.creation.box((4.0, 5.0, 2.5)).subdivide()
+    room = mesh_of(turned(walls, np.ones(len(walls.faces), dtype=bool)), ball(0.3))
+    found = solid_inside(room)
+    assert volumes(found.points, found.elements).sum() == pytest.approx(50.0, rel=0.02)
+    assert "as those of a room do" in found.changes.describe(1.0)
