@@ -103,8 +103,8 @@ class Dataset:
         return replace(self, schema=schema, entries=entries)
 
     def part(self, index: int, count: int) -> "Dataset":
-        """Part `index` of `count`, from 1: every `count`-th entry of each split and object. `InputError` for another
-        index."""
+        """Part `index` of `count`, from 1: every `count`-th entry of each split and object, failed ones included.
+        `InputError` for another index."""
         if not 1 <= index <= count:
             raise InputError(f"part: expected 1 to {count}, got {index}")
         seen: Counter[tuple[str, Any]] = Counter()

@@ -19,13 +19,12 @@ from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform.types import Floats, MotionSequence, Times
 
-__all__ = ["INFLATION", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
+__all__ = ["WIDENED", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
 
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
-INFLATION = 2.0
-"""Errors of a model are alike from frame to frame, and mislead more than independent ones of the same size, by this
-factor: a guess, which no motions were used to calibrate (docs/identification.md)."""
+WIDENED = 1.0
+"""Factor on all intervals: the conformal one of drawn bodies that the simulator moved (docs/identification.md)."""
 
 
 def identify_push(
@@ -96,7 +95,7 @@ def _problem(
     if model is None:
         raise InputError(f"identify: expected a mechanical model of pushed bodies, got {predictor.model}")
     if errors_mm is None:
-        errors_mm = INFLATION * model_errors(predictor, named, evidence.times)
+        errors_mm = model_errors(predictor, named, evidence.times)
     forward = Forward(model, evidence.times, named if model.schema.objects else {})
     complete = predictor.complete({**named, **{k: v for k, v in given.items() if k in predictor.schema.names}})
     vectors = [np.array([complete[f"{kind}_{axis}"] for axis in "xyz"]) for kind in ("contact", "force")]
@@ -148,8 +147,8 @@ def _identified(problem: Problem, found: Found) -> dict[str, Identified]:
     for index, name in enumerate(BODY):
         if index in free:
             at = free.index(index)
-            half = TWO_SIDED * float(np.sqrt(posterior[at, at]))
-            narrow = TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
+            half = WIDENED * TWO_SIDED * float(np.sqrt(posterior[at, at]))
+            narrow = WIDENED * TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
             unit, parameter = float(state.body[index]), problem.forward.ranges[index]
             low, high = (parameter.denormalise(float(np.clip(unit + side * half, -1.0, 1.0))) for side in (-1.0, 1.0))
             out[name] = Identified(parameter.denormalise(unit), low, high, narrow, unit, half)
@@ -169,8 +168,8 @@ def _vector(kind: str, value: Floats, covariance: Floats, alone: Floats, scale: 
     """Three estimates, of which `scale` is half of the range."""
     out = {}
     for axis, x, variance, wide in zip("xyz", value, np.diag(covariance), np.diag(alone), strict=True):
-        half = TWO_SIDED * float(np.sqrt(variance))
-        narrow = TWO_SIDED * float(np.sqrt(wide)) < scale
+        half = WIDENED * TWO_SIDED * float(np.sqrt(variance))
+        narrow = WIDENED * TWO_SIDED * float(np.sqrt(wide)) < scale
         x = float(x)
         out[f"{kind}_{axis}"] = Identified(x, x - half, x + half, narrow, x / scale, half / scale)
     return out

@@ -11,10 +11,14 @@ from odeform.identification.pushed.identify import identify_push
 from odeform.identification.pushed.state import BODY, PushState
 from odeform.identification.pushed.views import CloudView
 from odeform.models.base import Predictor
+from odeform.models.conformal import conformal_factor
 from odeform.progress import Progress
 from odeform.schema import OBJECT
 
 __all__ = ["identify_drawn", "report_drawn"]
+
+NOMINAL = 0.9
+TINY = 1e-9  # of an interval; an error of zero has no logarithm
 
 
 def identify_drawn(
@@ -52,6 +56,7 @@ def identify_drawn(
         "seconds": float(np.median([row["seconds"] for row in rows])),
         "bodies": len(rows),
         "parameters": {name: _scores(name, rows) for name in names},
+        "factor_90": _factor(rows),
         "rows": rows,
     }
 
@@ -87,6 +92,13 @@ def _row(name: str, state: PushState, found: Identification) -> dict[str, Any]:
     return one
 
 
+def _factor(rows: Sequence[dict[str, Any]]) -> float | None:
+    """By how much to widen intervals so that nine in ten of further masses, stiffnesses and frictions lie within; None
+    for too few. Those of one body are not independent of each other, so that their number says more than it is."""
+    every = [one for row in rows for key, one in row["parameters"].items() if key in BODY]
+    return conformal_factor(np.log([max(2.0 * one["error"] / one["half_width"], TINY) for one in every]), NOMINAL)
+
+
 def _scores(name: str, rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
     each = [row["parameters"][name] for row in rows]
     sure = [one for one in each if one["identifiable"]]
@@ -111,4 +123,6 @@ def report_drawn(result: dict[str, Any]) -> str:
     for name, one in result["parameters"].items():
         scores = f"{one['mae']:>10.3f}{one['median']:>10.3f}{one['inside_90']:>10.0%}{one['identifiable']:>14.0%}"
         lines.append(f"{name:<12}{scores}   {units.get(name, 'the range')}")
+    if result["factor_90"] is not None:
+        lines.append(f"intervals {result['factor_90']:.2f} times as wide would hold nine in ten of mass, young, friction")
     return "\n".join(lines)
