@@ -71,7 +71,9 @@ def run(args: argparse.Namespace) -> None:
     if args.attach is not None:
         source = f"{args.data}, split {args.split}, part {args.part or '1/1'}"
         attach(load(args.checkpoints[0]), dataset, args.split, args.attach, source)
-    write_json({"data": args.data, "split": args.split, "part": args.part, "window": window, "models": models}, args.json)
+    write_json(
+        {"data": args.data, "split": args.split, "part": args.part, "window": window, "models": models}, args.json
+    )
     print(_table(models))
 
 

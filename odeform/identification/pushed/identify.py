@@ -23,8 +23,9 @@ __all__ = ["WIDENED", "identifies_pushes", "identify_push", "model_errors", "pos
 
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
-WIDENED = 1.0
-"""Factor on all intervals: the conformal one of drawn bodies that the simulator moved (docs/identification.md)."""
+WIDENED = 5.4
+"""Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 14 drawn bodies that the
+simulator moved (docs/identification.md). What a model misses looks like another body, from frame to frame alike."""
 
 
 def identify_push(
@@ -42,7 +43,8 @@ def identify_push(
         evidence: Points of the surface over time, with correspondence (`Known`) or without (`Cloud`).
         known: Parameters that are known: the object, and any of `mass` (kg), `young` (kPa), `friction`, and the whole
             push (`contact_x` to `contact_z` in m, `force_x` to `force_z` in N).
-        errors_mm: (T,) how wrong the model is at the times of the evidence; by default as its error band says.
+        errors_mm: (T,) how wrong the model is at the times of the evidence, by errors that are independent from frame
+            to frame; by default as its error band says, and intervals are widened by what bodies in the simulator took.
         progress: Called with the parameters and the misfit before each step; an exception that it raises ends it.
         propose: Whether to look for the push that would tell most next.
 
@@ -57,7 +59,8 @@ def identify_push(
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
     found = search(problem, start, lambda state, misfit: progress(_values(state), misfit))
-    estimates, seconds = _identified(problem, found), time.perf_counter() - begin
+    widened = WIDENED if errors_mm is None else 1.0
+    estimates, seconds = _identified(problem, found, widened), time.perf_counter() - begin
     if not propose or not set(problem.free) & set(range(len(BODY))):
         return Identification(estimates, found.misfit, seconds)
     proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
@@ -140,15 +143,16 @@ def posterior_of(problem: Problem, found: Found) -> tuple[Floats, Floats]:
     return with_prior[:size, :size], alone[:size, :size]
 
 
-def _identified(problem: Problem, found: Found) -> dict[str, Identified]:
+def _identified(problem: Problem, found: Found, widened: float) -> dict[str, Identified]:
+    """Estimates, with intervals that are `widened` times as wide as those of the posterior."""
     state, free = found.state, list(problem.free)
-    posterior, alone = posterior_of(problem, found)
+    posterior, alone = (widened**2 * covariance for covariance in posterior_of(problem, found))
     out: dict[str, Identified] = {}
     for index, name in enumerate(BODY):
         if index in free:
             at = free.index(index)
-            half = WIDENED * TWO_SIDED * float(np.sqrt(posterior[at, at]))
-            narrow = WIDENED * TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
+            half = TWO_SIDED * float(np.sqrt(posterior[at, at]))
+            narrow = TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
             unit, parameter = float(state.body[index]), problem.forward.ranges[index]
             low, high = (parameter.denormalise(float(np.clip(unit + side * half, -1.0, 1.0))) for side in (-1.0, 1.0))
             out[name] = Identified(parameter.denormalise(unit), low, high, narrow, unit, half)
@@ -168,8 +172,8 @@ def _vector(kind: str, value: Floats, covariance: Floats, alone: Floats, scale: 
     """Three estimates, of which `scale` is half of the range."""
     out = {}
     for axis, x, variance, wide in zip("xyz", value, np.diag(covariance), np.diag(alone), strict=True):
-        half = WIDENED * TWO_SIDED * float(np.sqrt(variance))
-        narrow = WIDENED * TWO_SIDED * float(np.sqrt(wide)) < scale
+        half = TWO_SIDED * float(np.sqrt(variance))
+        narrow = TWO_SIDED * float(np.sqrt(wide)) < scale
         x = float(x)
         out[f"{kind}_{axis}"] = Identified(x, x - half, x + half, narrow, x / scale, half / scale)
     return out

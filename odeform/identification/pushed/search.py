@@ -23,7 +23,11 @@ PRIOR = 0.58
 FORCE_PRIOR = 1.0  # of each component, in strongest forces
 DRAWS, COMPARED = 128, 5  # pushes that are tried, and frames on which
 CAMERAS = 6  # places of the camera; a round body looks alike from many, and each is tried with all pushes
-TRIED, BRIEF, REFINED = 8, 2, 3  # starts that are refined briefly, for so many rounds, and starts that are refined fully
+TRIED, BRIEF, REFINED = (
+    8,
+    2,
+    3,
+)  # starts that are refined briefly, for so many rounds, and starts that are refined fully
 APART = 0.3  # half extents between two places that are tried
 ROUNDS, CLOSE = 12, 1e-2  # squared standard deviations: converged if an undamped step is shorter
 DAMPING = (1e-2, 0.2, 6.0)  # initially; factor after an accepted step; after a rejected one

@@ -124,5 +124,7 @@ def report_drawn(result: dict[str, Any]) -> str:
         scores = f"{one['mae']:>10.3f}{one['median']:>10.3f}{one['inside_90']:>10.0%}{one['identifiable']:>14.0%}"
         lines.append(f"{name:<12}{scores}   {units.get(name, 'the range')}")
     if result["factor_90"] is not None:
-        lines.append(f"intervals {result['factor_90']:.2f} times as wide would hold nine in ten of mass, young, friction")
+        lines.append(
+            f"intervals {result['factor_90']:.2f} times as wide would hold nine in ten of mass, young, friction"
+        )
     return "\n".join(lines)
