@@ -1,7 +1,7 @@
 """What each part of the modal model is worth on pushed objects: `python -m odeform_figures.studies.modal_parts`.
 
-Contact parameters that were not fitted to the object, fitted ones, these with the regression of what they leave, and the
-regression of whole motions alone, which is the baseline `gp`.
+Contact parameters that were not fitted to the object, fitted ones, these with the regression of what they leave, and
+the regression of whole motions alone, which is the baseline `gp`.
 """
 
 import argparse

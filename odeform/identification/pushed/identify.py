@@ -23,8 +23,8 @@ __all__ = ["WIDENED", "identifies_pushes", "identify_push", "model_errors", "pos
 
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
-WIDENED = 5.4
-"""Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 14 drawn bodies that the
+WIDENED = 7.8
+"""Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 20 drawn bodies that the
 simulator moved (docs/identification.md). What a model misses looks like another body, from frame to frame alike."""
 
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.pushed.drawn import drawn_states, forward_of, seen, simulated
 from odeform.identification.pushed.identify import identify_push
@@ -14,6 +15,7 @@ from odeform.models.base import Predictor
 from odeform.models.conformal import conformal_factor
 from odeform.progress import Progress
 from odeform.schema import OBJECT
+from odeform.simulation.errors import SimulationError
 
 __all__ = ["identify_drawn", "report_drawn"]
 
@@ -41,13 +43,19 @@ def identify_drawn(
     for name in objects:
         forward = forward_of(predictor, name)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
-            surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+            try:
+                surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+            except SimulationError as error:  # too strong a push of too soft a body; the others count
+                progress.advance(1, f"{name}: {error}")
+                continue
             evidence = seen(forward, surface, view, noise_mm, seed + index)
             given = {OBJECT: name, **{key: state.value(key) for key in known}}
             errors = None if from_simulator else np.zeros(len(forward.times))
             rows.append(_row(name, state, identify_push(predictor, evidence, given, errors)))
             progress.advance(1, _note(rows[-1]))
     progress.close()
+    if not rows:
+        raise InputError("identify: expected a body that can be simulated; none of those drawn could")
     names = [name for name in (*BODY, "contact", "force") if name not in known]
     return {
         "truth": "simulator" if from_simulator else "model",
@@ -124,7 +132,6 @@ def report_drawn(result: dict[str, Any]) -> str:
         scores = f"{one['mae']:>10.3f}{one['median']:>10.3f}{one['inside_90']:>10.0%}{one['identifiable']:>14.0%}"
         lines.append(f"{name:<12}{scores}   {units.get(name, 'the range')}")
     if result["factor_90"] is not None:
-        lines.append(
-            f"intervals {result['factor_90']:.2f} times as wide would hold nine in ten of mass, young, friction"
-        )
+        wide = f"{result['factor_90']:.2f} times as wide"
+        lines.append(f"intervals {wide} would hold nine in ten of mass, young and friction")
     return "\n".join(lines)
