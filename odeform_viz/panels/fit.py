@@ -25,7 +25,7 @@ NO_TRUTH = (
     "Choose a test sequence above, or open or simulate a motion: the parameters that explain it are then estimated."
 )
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
-CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within; of other shapes that is not known."
+CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within."
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
