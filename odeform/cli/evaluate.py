@@ -30,7 +30,6 @@ COLUMNS = (
     "relative",
     "deformation_relative",
     "off_grid_rmse_mm",
-    "motions_covered_90",
 )
 
 
@@ -75,6 +74,9 @@ def run(args: argparse.Namespace) -> None:
         {"data": args.data, "split": args.split, "part": args.part, "window": window, "models": models}, args.json
     )
     print(_table(models))
+    for key, scores in models.items():
+        if (inside := scores["motions_covered_90"]) is not None:
+            print(f"{key}: {inside:.1%} of {scores['sequences']} motions stay within the error band throughout")
 
 
 def _rows(key: str, scores: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
