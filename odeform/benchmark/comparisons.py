@@ -8,6 +8,7 @@ import numpy as np
 from odeform.benchmark.equal_error import simulator
 from odeform.benchmark.precision import OperatingPoint
 from odeform.benchmark.probes import nearest_sequences, round_cloud, round_mesh
+from odeform.benchmark.scipy_solver import scipy_comparison
 from odeform.benchmark.timing import milliseconds, typical
 from odeform.checkpoint import bundled_checkpoints
 from odeform.dataset.index import Dataset
@@ -45,6 +46,7 @@ def comparisons(
     rows |= _checkpoints(predictor, dataset)
     if isinstance(predictor, Model):
         rows["torchdiffeq, same field"] = torchdiffeq_comparison(predictor, operating_points[0])
+        rows["SciPy, same field, equal error"] = scipy_comparison(predictor, operating_points[0])
         rows["mujoco, equal error"] = simulator(predictor, dataset)
     return rows
 

@@ -8,9 +8,11 @@ from odeform.cli.options import (
     CHECKPOINT,
     add_data,
     add_json,
+    add_part,
     add_quality,
     add_split,
     add_window,
+    parse_part,
     parse_window,
     write_json,
 )
@@ -35,6 +37,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("checkpoints", nargs="+", metavar="CKPT", help=CHECKPOINT)
     add_data(parser)
     add_split(parser)
+    add_part(parser)
     add_window(parser, "score")
     add_quality(parser)
     parser.add_argument(
@@ -54,7 +57,7 @@ def run(args: argparse.Namespace) -> None:
 
     if args.attach is not None and len(args.checkpoints) > 1:
         raise InputError("--attach: expected one checkpoint")
-    dataset, window = open_dataset(args.data), parse_window(args.window)
+    dataset, window = open_dataset(args.data).part(*parse_part(args.part)), parse_window(args.window)
     models: dict[str, dict[str, Any]] = {}
     for name in args.checkpoints:
         predictor = load(name)
@@ -65,9 +68,15 @@ def run(args: argparse.Namespace) -> None:
         key = predictor.model if predictor.model not in models else name
         models[key] = evaluate(predictor, dataset, args.split, window, args.quality)
     if args.attach is not None:
-        attach(load(args.checkpoints[0]), dataset, args.split, args.attach)
-    write_json({"data": args.data, "split": args.split, "window": window, "models": models}, args.json)
+        source = f"{args.data}, split {args.split}, part {args.part or '1/1'}"
+        attach(load(args.checkpoints[0]), dataset, args.split, args.attach, source)
+    write_json(
+        {"data": args.data, "split": args.split, "part": args.part, "window": window, "models": models}, args.json
+    )
     print(_table(models))
+    for key, scores in models.items():
+        if (inside := scores["motions_covered_90"]) is not None:
+            print(f"{key}: {inside:.1%} of {scores['sequences']} motions stay within the error band throughout")
 
 
 def _rows(key: str, scores: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:

@@ -14,12 +14,14 @@ __all__ = [
     "add_cluster",
     "add_data",
     "add_json",
+    "add_part",
     "add_plugin",
     "add_quality",
     "add_seed",
     "add_split",
     "add_window",
     "load_plugins",
+    "parse_part",
     "parse_settings",
     "parse_window",
     "positive",
@@ -55,6 +57,21 @@ def add_split(parser: argparse.ArgumentParser) -> None:
     """Adds --split."""
     splits = ("train", "val", "test", "all")
     parser.add_argument("--split", default="test", choices=splits, help="sequences to use (default: test)")
+
+
+def add_part(parser: argparse.ArgumentParser) -> None:
+    """Adds --part, read by `parse_part`."""
+    text = "use part K of N of these sequences: every N-th of each object (default: all)"
+    parser.add_argument("--part", metavar="K/N", help=text)
+
+
+def parse_part(text: str | None) -> tuple[int, int]:
+    """Parses K/N, as `Dataset.part` takes it; 1, 1 for None."""
+    try:
+        index, count = (1, 1) if text is None else (int(number) for number in text.split("/"))
+    except ValueError:
+        raise InputError(f"--part: expected K/N, got {text!r}") from None
+    return index, count
 
 
 def add_window(parser: argparse.ArgumentParser, purpose: str) -> None:

@@ -1,6 +1,7 @@
 """A data set: an index of sequences, and a reader of one sequence at a time."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -100,6 +101,20 @@ class Dataset:
         schema = replace(self.schema, objects=tuple(name for name in self.schema.objects if name in wanted))
         entries = tuple(entry for entry in self.entries if entry.parameters.get(OBJECT) in wanted)
         return replace(self, schema=schema, entries=entries)
+
+    def part(self, index: int, count: int) -> "Dataset":
+        """Part `index` of `count`, from 1: every `count`-th entry of each split and object, failed ones included.
+        `InputError` for another index."""
+        if not 1 <= index <= count:
+            raise InputError(f"part: expected 1 to {count}, got {index}")
+        seen: Counter[tuple[str, Any]] = Counter()
+        kept = []
+        for entry in self.entries:
+            group = entry.split, entry.parameters.get(OBJECT)
+            if seen[group] % count == index - 1:
+                kept.append(entry)
+            seen[group] += 1
+        return replace(self, entries=tuple(kept))
 
     def sequences(self, split: str, object: str | None = None) -> Iterator[MotionSequence]:
         """The sequences of a split, read one at a time; see `select`."""

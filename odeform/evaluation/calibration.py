@@ -9,7 +9,8 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.conformal import FEWEST, SCORES, motion_score
-from odeform.types import Floats
+from odeform.models.registry import observations
+from odeform.types import Floats, MotionSequence
 
 __all__ = ["attach", "whole_motion_scores"]
 
@@ -18,34 +19,52 @@ def whole_motion_scores(predictor: Predictor, dataset: Dataset, split: str) -> F
     """(S,) the largest logarithm of error to band, over the trained frames, of each motion of a split.
 
     Raises:
-        InputError: A model without an error band, or of several bodies.
+        InputError: A model without an error band.
     """
-    if predictor.schema.objects or predictor.error_band(predictor.complete({}), np.ones(1)) is None:
-        raise InputError(f"{predictor.model}: expected a model of one body that has an error band")
-    scores = []
-    for recorded in dataset.sequences(split):
-        sequence = recorded.until(dataset.schema.window.stop)
-        parameters = {**predictor.schema.known(dataset.fixed), **sequence.parameters}
-        motion = predictor.solve(predictor.to_body_frame(sequence.rest, parameters), parameters)
-        difference = motion.vertices(sequence.times).astype(float) - sequence.vertices
-        errors = 1e3 * np.sqrt((difference**2).mean(axis=(1, 2)))
-        band = predictor.error_band(parameters, sequence.times)
-        assert band is not None
-        scores.append(motion_score(errors, band[:, 1]))
-    return np.array(scores)
+    return np.array([_score(predictor, dataset, recorded) for recorded in dataset.sequences(split)])
 
 
-def attach(predictor: Predictor, dataset: Dataset, split: str, path: str | Path) -> None:
-    """Write the checkpoint of a model with the scores of motions that nothing was fitted to.
+def _score(predictor: Predictor, dataset: Dataset, recorded: MotionSequence) -> float:
+    window = predictor.schema.window
+    whole = recorded.until(window.stop)
+    frames = (whole.times - window.start) * window.rate
+    on_frames = np.abs(frames - frames.round()) < 1e-3
+    if predictor.final_only:
+        on_frames &= whole.times > window.stop - 0.5 / window.rate
+    truth = replace(whole, times=whole.times[on_frames], vertices=whole.vertices[on_frames])
+    parameters = {**predictor.schema.known(dataset.fixed), **truth.parameters}
+    band = predictor.error_band(parameters, truth.times)
+    if band is None:
+        raise InputError(f"{predictor.model}: expected a model that has an error band")
+    rest = predictor.to_body_frame(whole.rest, parameters)
+    motion = predictor.solve(rest, parameters, observed=observations(predictor.schema, whole))
+    difference = motion.vertices(truth.times).astype(float) - truth.vertices
+    return motion_score(1e3 * np.sqrt((difference**2).mean(axis=(1, 2))), band[:, 1])
+
+
+def attach(predictor: Predictor, dataset: Dataset, split: str, path: str | Path, source: str = "") -> None:
+    """Write the checkpoint of a model with the scores of motions that nothing was fitted to, of each object its own.
+
+    `source` says in words which motions these are; the checkpoint keeps it as `provenance["band"]`.
 
     Raises:
         InputError: Too few motions, or as `whole_motion_scores`.
     """
     checkpoint = predictor.checkpoint
-    without = {name: array for name, array in checkpoint.arrays.items() if name != SCORES}
+    without = {name: array for name, array in checkpoint.arrays.items() if name.rpartition("/")[2] != SCORES}
     plain = predictor.of_same_kind(replace(checkpoint, arrays=without))
-    scores = whole_motion_scores(plain, dataset, split)
+    if predictor.schema.objects:
+        known = [name for name in predictor.schema.objects if name in dataset.objects]
+        each = {f"{name}/": dataset.of(name) for name in known}
+    else:
+        each = {"": dataset}
+    scored = {f"{prefix}{SCORES}": _enough(plain, part, split) for prefix, part in each.items()}
+    provenance = {**checkpoint.provenance, "band": source}
+    plain.of_same_kind(replace(checkpoint, arrays={**without, **scored}, provenance=provenance)).save(path)
+
+
+def _enough(predictor: Predictor, dataset: Dataset, split: str) -> Floats:
+    scores = whole_motion_scores(predictor, dataset, split)
     if len(scores) < FEWEST:
         raise InputError(f"split {split}: expected at least {FEWEST} motions to calibrate on, got {len(scores)}")
-    scored = {**without, SCORES: scores.astype(np.float32)}
-    plain.of_same_kind(replace(checkpoint, arrays=scored)).save(path)
+    return scores.astype(np.float32)

@@ -314,6 +314,12 @@ class Predictor(ABC):
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
         return None if band is None else band.at(self.schema.vector(parameters), times)
 
+    def band_motions(self, parameters: Parameters) -> int:
+        """On how many whole motions the error band of a body was calibrated, none of which chose the model: nine in ten
+        motions then stay within it throughout. 0 where it holds for each moment by itself, or is not known."""
+        band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
+        return 0 if band is None else band.motions
+
     @property
     def loads(self) -> tuple[str, ...]:
         """Names of the loads under which it computes its bodies; empty for models that know one scene only."""

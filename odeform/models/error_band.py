@@ -44,7 +44,11 @@ class ErrorBand:
         """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
         self._growth = arrays.get(OUTSIDE)
-        self._whole = conformal_factor(arrays.get(SCORES, np.zeros(0)).astype(float), NOMINAL) or 1.0
+        scores = arrays.get(SCORES, np.zeros(0)).astype(float)
+        factor = conformal_factor(scores, NOMINAL)
+        self._whole = factor or 1.0
+        self.motions = 0 if factor is None else len(scores)
+        """Of how many whole motions the band was calibrated; 0 where it holds for single moments."""
         self._theta = arrays["val.theta"].astype(float)
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))

@@ -32,8 +32,8 @@ class FrameRegression(Protocol):
     """A regression of whole motions."""
 
     def frames(self, inputs: Any) -> Float[np.ndarray, "*batch times y"]:
-        """Computes (T, 6 + K) at the residual's frames, from what causes the motion; (B, T, 6 + K) from what causes
-        several."""
+        """Computes (B, T, 6 + K) at the residual's frames, from what causes B motions; of one motion B may be left
+        out."""
         ...
 
 
@@ -55,8 +55,8 @@ class Residual:
         return float(self.times[-1])
 
     def over_time(self, inputs: Any) -> Callable[[Times], Float[np.ndarray, "*batch times y"]]:
-        """Maps (T,) s to (T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them. Of
-        several motions, (B, T, 6 + K)."""
+        """Maps (T,) s to (B, T, 6 + K): the regression, as a cubic spline through its frames, constant outside of them;
+        to (T, 6 + K) where the regression leaves out B."""
         frames = self.regression.frames(inputs) * self._factors
         return lambda times: self._spline(np.clip(times, self.times[0], self.times[-1])) @ frames
 
@@ -80,7 +80,7 @@ class Residual:
         added_at, taken, stop = self.over_time(inputs), self._taken, self.stop
 
         def adjust(times: Times, y: Floats) -> Floats:
-            added = added_at(times)
+            added = added_at(times).reshape(y.shape)  # one motion alone, or B of them
             if taken.any():
                 added -= taken * (y if (times <= stop).all() else own.reduced(np.minimum(times, stop)))
             return y + added * (times > 0.0)[:, None]
@@ -98,7 +98,7 @@ class Residual:
         def adjust(times: Times, y: Floats) -> Floats:
             fading = np.clip(1.0 - (times - stop) / FADES, 0.0, 1.0)[:, None]
             out = y.copy()
-            out[..., POSE:] += fading * (added_at(times) - taken * y)[..., POSE:]
+            out[..., POSE:] += fading * (added_at(times).reshape(y.shape) - taken * y)[..., POSE:]
             return out
 
         return adjust

@@ -25,7 +25,7 @@ NO_TRUTH = (
     "Choose a test sequence above, or open or simulate a motion: the parameters that explain it are then estimated."
 )
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
-UNCHECKED = "These intervals were not checked against simulations: how often they hold is not known."
+CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within."
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
@@ -147,7 +147,7 @@ class FitPanel(Panel):
         except InputError as error:
             self._show(FAILED.format(error))
             return
-        search = _Search(self._page, model, truth.setting, named, self._show, UNCHECKED)
+        search = _Search(self._page, model, truth.setting, named, self._show, CALIBRATED)
         self._show("starting", working=True)
         self._job = Job(fit_push, (predictor, seen, named), search.done, search.failed, search.progress)
         self._job.start()

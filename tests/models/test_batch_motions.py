@@ -141,6 +141,16 @@ def test_what_a_batch_is(kick: Predictor) -> None:
         batch[4]
 
 
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_batch_of_one_is_a_batch(name: str) -> None:
+    predictor = load(name)
+    given = drawn(predictor, 1)
+    batch = predictor.solve_batch(given, "draft")
+    times = np.array([0.5, 1.0]) * predictor.schema.window.stop
+    assert batch.vertices(times).shape[:2] == (1, 2)
+    assert_equals_single_motions(predictor, batch, given, times, quality="draft")
+
+
 def test_vectors_and_names() -> None:
     predictor = load("contact-force")
     given = drawn(predictor, 3)

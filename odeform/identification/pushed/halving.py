@@ -7,7 +7,7 @@ import numpy as np
 
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.experiment import candidates, until_halved, widest
-from odeform.identification.pushed.identify import INFLATION, model_errors
+from odeform.identification.pushed.identify import model_errors
 from odeform.identification.pushed.search import PRIOR
 from odeform.identification.pushed.state import BODY
 from odeform.models.base import Predictor
@@ -30,7 +30,7 @@ def halve_drawn(
     progress = Progress("next pushes", count * len(objects))
     for name in objects:
         forward, forces = forward_of(predictor, name), predictor.force_range({OBJECT: name})
-        errors = INFLATION * model_errors(predictor, {OBJECT: name}, forward.times)
+        errors = model_errors(predictor, {OBJECT: name}, forward.times)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
             pushes = candidates(forward, state.body, forces, noise_mm, errors, seed + index)
             orders = [rng.permutation(len(pushes.states)) for _ in range(ORDERS)]

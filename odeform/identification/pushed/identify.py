@@ -19,13 +19,13 @@ from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform.types import Floats, MotionSequence, Times
 
-__all__ = ["INFLATION", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
+__all__ = ["WIDENED", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
 
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
-INFLATION = 2.0
-"""Errors of a model are alike from frame to frame, and mislead more than independent ones of the same size, by this
-factor: a guess, which no motions were used to calibrate (docs/identification.md)."""
+WIDENED = 7.8
+"""Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 20 drawn bodies that the
+simulator moved (docs/identification.md). What a model misses looks like another body, from frame to frame alike."""
 
 
 def identify_push(
@@ -43,7 +43,8 @@ def identify_push(
         evidence: Points of the surface over time, with correspondence (`Known`) or without (`Cloud`).
         known: Parameters that are known: the object, and any of `mass` (kg), `young` (kPa), `friction`, and the whole
             push (`contact_x` to `contact_z` in m, `force_x` to `force_z` in N).
-        errors_mm: (T,) how wrong the model is at the times of the evidence; by default as its error band says.
+        errors_mm: (T,) how wrong the model is at the times of the evidence, by errors that are independent from frame
+            to frame; by default as its error band says, and intervals are widened by what bodies in the simulator took.
         progress: Called with the parameters and the misfit before each step; an exception that it raises ends it.
         propose: Whether to look for the push that would tell most next.
 
@@ -58,7 +59,8 @@ def identify_push(
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
     found = search(problem, start, lambda state, misfit: progress(_values(state), misfit))
-    estimates, seconds = _identified(problem, found), time.perf_counter() - begin
+    widened = WIDENED if errors_mm is None else 1.0
+    estimates, seconds = _identified(problem, found, widened), time.perf_counter() - begin
     if not propose or not set(problem.free) & set(range(len(BODY))):
         return Identification(estimates, found.misfit, seconds)
     proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
@@ -96,7 +98,7 @@ def _problem(
     if model is None:
         raise InputError(f"identify: expected a mechanical model of pushed bodies, got {predictor.model}")
     if errors_mm is None:
-        errors_mm = INFLATION * model_errors(predictor, named, evidence.times)
+        errors_mm = model_errors(predictor, named, evidence.times)
     forward = Forward(model, evidence.times, named if model.schema.objects else {})
     complete = predictor.complete({**named, **{k: v for k, v in given.items() if k in predictor.schema.names}})
     vectors = [np.array([complete[f"{kind}_{axis}"] for axis in "xyz"]) for kind in ("contact", "force")]
@@ -141,9 +143,10 @@ def posterior_of(problem: Problem, found: Found) -> tuple[Floats, Floats]:
     return with_prior[:size, :size], alone[:size, :size]
 
 
-def _identified(problem: Problem, found: Found) -> dict[str, Identified]:
+def _identified(problem: Problem, found: Found, widened: float) -> dict[str, Identified]:
+    """Estimates, with intervals that are `widened` times as wide as those of the posterior."""
     state, free = found.state, list(problem.free)
-    posterior, alone = posterior_of(problem, found)
+    posterior, alone = (widened**2 * covariance for covariance in posterior_of(problem, found))
     out: dict[str, Identified] = {}
     for index, name in enumerate(BODY):
         if index in free:

@@ -21,14 +21,19 @@ __all__ = ["PRIOR", "Found", "Problem", "information_of", "search"]
 PRIOR = 0.58
 """Standard deviation of each of `BODY` before anything is seen: that of a uniform draw from [-1, 1]."""
 FORCE_PRIOR = 1.0  # of each component, in strongest forces
-DRAWS, COMPARED, REFINED = 96, 5, 3  # pushes that are tried, frames on which, and how many are refined at most
-CAMERAS = 2
+DRAWS, COMPARED = 128, 5  # pushes that are tried, and frames on which
+CAMERAS = 6  # places of the camera; a round body looks alike from many, and each is tried with all pushes
+TRIED, BRIEF, REFINED = (
+    8,
+    2,
+    3,
+)  # starts that are refined briefly, for so many rounds, and starts that are refined fully
 APART = 0.3  # half extents between two places that are tried
 ROUNDS, CLOSE = 12, 1e-2  # squared standard deviations: converged if an undamped step is shorter
 DAMPING = (1e-2, 0.2, 6.0)  # initially; factor after an accepted step; after a rejected one
 LARGEST = 1e5
-EXPLAINED = 1.3
-"""Misfit below which no other start is tried."""
+EXPLAINED = 1.1
+"""Misfit below which no other start is tried: in a cloud, wrong places often have no more than 1.3."""
 FLOOR_MM = 0.02  # error that is never below rounding
 
 
@@ -129,12 +134,14 @@ def _moved(problem: Problem, state: PushState, step: Floats) -> PushState:
     return out
 
 
-def _refined(problem: Problem, state: PushState, progress: Callable[[PushState, float], None]) -> Found:
+def _refined(
+    problem: Problem, state: PushState, progress: Callable[[PushState, float], None], rounds: int = ROUNDS
+) -> Found:
     """Levenberg-Marquardt with the prior, from one start."""
     precision = np.diag(problem.precision())
     now, damping, converged = _equations(problem, state), DAMPING[0], False
     total = now.cost + _prior_cost(problem, state)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         progress(state, now.cost / now.count)
         matrix = now.information + precision
         pulled = now.score - precision @ problem.departure(state)
@@ -169,10 +176,16 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
 
 
 def search(problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None) -> Found:
-    """Compares drawn pushes, if the push is unknown, and refines the best until one explains the observation."""
+    """Compares drawn pushes, if the push is unknown; refines the push of the best briefly, and all that is unknown of
+    those that are best then, until one explains the observation."""
     found: list[Found] = []
     with threadpool_limits(1):  # products are small
-        for state in _apart(_starts(problem, start))[:REFINED]:
+        starts = _apart(_starts(problem, start))[:TRIED]
+        if len(starts) > REFINED:
+            push = tuple(index for index in problem.free if index >= len(BODY))
+            brief = [_refined(replace(problem, free=push), state, progress, BRIEF) for state in starts]
+            starts = [one.state for one in sorted(brief, key=lambda one: one.misfit)]
+        for state in starts[:REFINED]:
             found.append(_refined(problem, state, progress))
             # under noise, places that are wrong explain a cloud nearly as well
             if found[-1].misfit < EXPLAINED and len(found) >= (2 if problem.camera_free else 1):

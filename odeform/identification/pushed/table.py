@@ -5,16 +5,22 @@ from typing import Any
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.pushed.drawn import drawn_states, forward_of, seen, simulated
 from odeform.identification.pushed.identify import identify_push
 from odeform.identification.pushed.state import BODY, PushState
 from odeform.identification.pushed.views import CloudView
 from odeform.models.base import Predictor
+from odeform.models.conformal import conformal_factor
 from odeform.progress import Progress
 from odeform.schema import OBJECT
+from odeform.simulation.errors import SimulationError
 
 __all__ = ["identify_drawn", "report_drawn"]
+
+NOMINAL = 0.9
+TINY = 1e-9  # of an interval; an error of zero has no logarithm
 
 
 def identify_drawn(
@@ -37,13 +43,19 @@ def identify_drawn(
     for name in objects:
         forward = forward_of(predictor, name)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
-            surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+            try:
+                surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+            except SimulationError as error:  # too strong a push of too soft a body; the others count
+                progress.advance(1, f"{name}: {error}")
+                continue
             evidence = seen(forward, surface, view, noise_mm, seed + index)
             given = {OBJECT: name, **{key: state.value(key) for key in known}}
             errors = None if from_simulator else np.zeros(len(forward.times))
             rows.append(_row(name, state, identify_push(predictor, evidence, given, errors)))
             progress.advance(1, _note(rows[-1]))
     progress.close()
+    if not rows:
+        raise InputError("identify: expected a body that can be simulated; none of those drawn could")
     names = [name for name in (*BODY, "contact", "force") if name not in known]
     return {
         "truth": "simulator" if from_simulator else "model",
@@ -52,6 +64,7 @@ def identify_drawn(
         "seconds": float(np.median([row["seconds"] for row in rows])),
         "bodies": len(rows),
         "parameters": {name: _scores(name, rows) for name in names},
+        "factor_90": _factor(rows),
         "rows": rows,
     }
 
@@ -87,6 +100,13 @@ def _row(name: str, state: PushState, found: Identification) -> dict[str, Any]:
     return one
 
 
+def _factor(rows: Sequence[dict[str, Any]]) -> float | None:
+    """By how much to widen intervals so that nine in ten of further masses, stiffnesses and frictions lie within; None
+    for too few. Those of one body are not independent of each other, so that their number says more than it is."""
+    every = [one for row in rows for key, one in row["parameters"].items() if key in BODY]
+    return conformal_factor(np.log([max(2.0 * one["error"] / one["half_width"], TINY) for one in every]), NOMINAL)
+
+
 def _scores(name: str, rows: Sequence[dict[str, Any]]) -> dict[str, float | None]:
     each = [row["parameters"][name] for row in rows]
     sure = [one for one in each if one["identifiable"]]
@@ -111,4 +131,7 @@ def report_drawn(result: dict[str, Any]) -> str:
     for name, one in result["parameters"].items():
         scores = f"{one['mae']:>10.3f}{one['median']:>10.3f}{one['inside_90']:>10.0%}{one['identifiable']:>14.0%}"
         lines.append(f"{name:<12}{scores}   {units.get(name, 'the range')}")
+    if result["factor_90"] is not None:
+        wide = f"{result['factor_90']:.2f} times as wide"
+        lines.append(f"intervals {wide} would hold nine in ten of mass, young and friction")
     return "\n".join(lines)

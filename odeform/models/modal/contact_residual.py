@@ -32,10 +32,9 @@ class PushRegression:
     """N; weaker pushes were not trained, and without one nothing moves."""
 
     def frames(self, inputs: ContactInputs) -> Floats:
-        """(T, 6 + K) of one push, (B, T, 6 + K) of several; zero at rest."""
+        """(B, T, 6 + K) of B pushes; zero at rest."""
         strength = np.minimum(np.linalg.norm(inputs.force, axis=1) / max(self.weakest, 1e-9), 1.0)
-        found = strength[:, None, None] * self.regression.predict(inputs)
-        return found[0] if len(found) == 1 else found
+        return strength[:, None, None] * self.regression.predict(inputs)
 
 
 def contact_residual(arrays: Arrays, settings: Mapping[str, Any]) -> Residual:

@@ -57,14 +57,12 @@ class _Transferred:
     coefficients: Float[np.ndarray, "known coefficients"]
 
     def frames(self, inputs: ContactInputs) -> Floats:
-        """(T, 6 + K) of one push, (B, T, 6 + K) of several."""
-        if len(inputs.contact) > 1:
-            vectors = zip(inputs.contact, inputs.normal, inputs.force, strict=True)
-            return np.stack([self.frames(ContactInputs(*(vector[None] for vector in one))) for one in vectors])
-        near, anchor = nearest_on(self.part.rest, inputs.contact[0] + self.offset), self.part.body.anchor
-        there = ContactInputs(near.point[None] - anchor, near.normal[None], inputs.force)
+        """(B, T, 6 + K) of B pushes."""
+        near = [nearest_on(self.part.rest, contact + self.offset) for contact in inputs.contact]
+        points, normals = (np.stack([getattr(each, name) for each in near]) for name in ("point", "normal"))
+        there = ContactInputs(points - self.part.body.anchor, normals, inputs.force)
         found = self.weight * self.known.regression.frames(there)
-        return np.concatenate([found[:, :POSE], found[:, POSE:] @ self.coefficients], axis=1)
+        return np.concatenate([found[..., :POSE], found[..., POSE:] @ self.coefficients], axis=-1)
 
 
 def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> Residual:

@@ -4,7 +4,8 @@ import pytest
 from odeform.errors import InputError
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.experiment import Candidates, until_halved, widest
-from odeform.identification.pushed.identify import identifies_pushes, identify_push
+from odeform.identification.pushed.identify import WIDENED, identifies_pushes, identify_push, model_errors
+from odeform.identification.pushed.table import identify_drawn, report_drawn
 from odeform.identification.pushed.views import points_of
 from odeform.models.registry import load
 
@@ -40,6 +41,32 @@ def test_a_push_that_is_hardly_seen_says_that_it_is_not_identifiable() -> None:
     push = {name: value for name, value in state.parameters().items() if name not in ("mass", "young")}
     found = identify_push(predictor, seen, {"object": "pillow", **push}, np.zeros(2))
     assert not any(one.identifiable for one in found.parameters.values())
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_intervals_are_as_wide_as_bodies_in_the_simulator_took() -> None:
+    predictor = load("contact-force")
+    forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=1)[0]
+    seen = points_of(forward.times, forward.motions([state])[0], forward.model.rest.faces)
+    push = {name: value for name, value in state.parameters().items() if name not in ("mass", "young")}
+    known = {"object": "dog", **push}
+    plain = identify_push(predictor, seen, known, model_errors(predictor, {"object": "dog"}, forward.times))
+    calibrated = identify_push(predictor, seen, known)
+    for name in ("mass", "young", "friction"):
+        one, other = calibrated.parameters[name], plain.parameters[name]
+        assert one.value == pytest.approx(other.value)
+        assert one.half_width == pytest.approx(WIDENED * other.half_width)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_drawn_bodies_are_scored_by_how_much_wider_intervals_would_have_to_be() -> None:
+    wider = identify_drawn(load("contact-force"), ["chip", "flip-flop", "dog"], 1, noise_mm=1.0)
+    assert wider["bodies"] == 3
+    ratios = [2.0 * p["error"] / p["half_width"] for row in wider["rows"] for p in list(row["parameters"].values())[:3]]
+    assert wider["factor_90"] == pytest.approx(max(ratios)), "of nine, the largest"
+    assert f"{wider['factor_90']:.2f} times as wide" in report_drawn(wider)
 
 
 def test_the_push_that_tells_of_what_is_most_open_is_proposed() -> None:

@@ -136,6 +136,7 @@ def test_title_status_and_legend_say_the_same_at_any_moment(drop: Predictor, tim
     assert band is not None
     assert f"90 % below {band[0, 1]:.2f} mm" in status
     assert f"90 %: {band[0, 1]:.2f} mm" in legend
+    assert "9 in 10 stay below it throughout, by 50 that chose nothing" in status
 
 
 def test_a_turn_is_counted_past_half_and_whole_turns(kick: Predictor) -> None:
