@@ -18,7 +18,7 @@ __every_ = ["HELD", "Hold", "Patch", "no_hold", "patch_of"]
 
 HELD = 40  # points of a patch that springs hold
 LEAST = 0.02  # of the largest stiffness of a sample, below which it is left out
-EACH = ("points", "rows", "stiffness", "places")
+EACH = {"points": 2, "rows": 2, "stiffness": 1, "places": 1}  # and the axis of their points
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +80,12 @@ class Hold:
 
     @classmethod
     def together(cls, holds: Sequence["Hold"]) -> "Hold":
-        """Several bodies as a batch."""
-        each = {name: np.concatenate([getattr(hold, name) for hold in holds]) for name in EACH}
+        """Several bodies as a batch. Those with fewer points than others get some of no stiffness."""
+        most = max(hold.points.shape[2] for hold in holds)
+        each = {
+            name: np.concatenate([_padded(getattr(hold, name), axis, most) for hold in holds])
+            for name, axis in EACH.items()
+        }
         return replace(holds[0], **each)
 
     def some(self, rows: Ints) -> "Hold":
@@ -107,6 +111,12 @@ class Hold:
         away = place.swapaxes(1, 2) - (self.places - state.shift[:, None]) @ state.rotation
         stiffness = np.repeat(self.stiffness, 3, axis=1)
         return Held(out.reshape(batch, 3 * held, -1), away.reshape(batch, -1), stiffness, self.damping)
+
+
+def _padded(values: Floats, axis: int, count: int) -> Floats:
+    """The values with zeros after them along an axis, `count` in all."""
+    widths = [(0, count - size if place == axis else 0) for place, size in enumerate(values.shape)]
+    return np.pad(values, widths)
 
 
 def no_hold(batch: int, directions: int) -> Hold:

@@ -23,6 +23,7 @@ from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
 from odeform.simulation.obstacles import obstacle_xml
 from odeform.simulation.scenes.loaded import scene_of, simulate_load
 from odeform.simulation.scenes.registry import find_scene, get_scene
+from odeform.surroundings import GRAVITY
 from odeform.types import Mesh
 
 
@@ -105,7 +106,7 @@ def test_a_kick_gives_the_body_its_impulse() -> None:
     assert 0.5 * given < speed < given, "friction takes some of it"
 
 
-@pytest.mark.parametrize("name", ["drop", "throw", "kick", "wall", "step", "slope"])
+@pytest.mark.parametrize("name", ["drop", "throw", "kick", "wall", "step", "slope", "hold"])
 def test_each_load_is_a_scene_of_all_objects(name: str) -> None:
     scene = get_scene(f"object-{name}")
     assert find_scene(scene.schema.scene) is scene
@@ -183,3 +184,18 @@ def test_obstacles_that_the_simulator_does_not_have_are_refused() -> None:
     ledge = Obstacle(np.zeros(3), np.full(3, -np.inf), np.array([0.0, np.inf, 0.0]), (np.zeros(3), np.ones(3)))
     with pytest.raises(ValueError, match="half space"):
         obstacle_xml([ledge], Contact(0.5, 0.002))
+
+
+def test_a_simulated_body_hangs_from_what_holds_it() -> None:
+    """A coarse block: springs stand for its weight, and its free end falls."""
+    item, load = soft_block(), get_load("hold")
+    parameters = get_scene("object-hold").schema.complete({"object": "donut", "held_up": 0.0, "height": 0.3})
+    sequence = simulate_load(load, item, parameters, rate=100.0, until=0.2)
+    clamp = load.situation(item.rest_mesh(), parameters).clamp
+    assert clamp is not None
+    moved = sequence.vertices.astype(float) - sequence.vertices[0]
+    first, last = moved[:, clamp.vertex], moved[:, int(np.linalg.norm(moved[-1], axis=1).argmax())]
+    assert np.abs(first).max() < 6.0 * clamp.sink, "the patch is held"
+    assert last[:, 2].min() < -3.0 * np.abs(first).max(), "the other end is not"
+    weight = clamp.stiffness(item.settled[: item.surface_count], item.weights, item.mass).sum() * clamp.sink
+    assert weight == pytest.approx(item.mass * GRAVITY)

@@ -46,6 +46,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
         ("slope", "angle (°)"),
+        ("hold", "held up (°)"),
         ("push", "force (N)"),
     ):
         app.show_load(load)
