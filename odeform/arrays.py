@@ -43,7 +43,10 @@ def row_steps(sizes: Steps, noise: float) -> Steps:
 
 def in_steps(name: str, values: Floats, steps: Steps) -> Arrays:
     """Returns an array (R, ...) rounded to multiples of the steps (R,) of its rows, and these, as a checkpoint names
-    them. A row keeps 5 bits at least, and 22 at most."""
+    them. A row keeps 5 bits at least, and 22 at most. What is not finite has no steps, and stays as it is:
+    whoever reads it refuses it."""
+    if not np.isfinite(values).all():
+        return {name: values.astype(np.float32)}
     largest = np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0)
     steps = np.clip(steps, largest / FINEST, largest / COARSEST)
     steps[largest == 0.0] = 1.0
@@ -52,7 +55,9 @@ def in_steps(name: str, values: Floats, steps: Steps) -> Arrays:
 
 
 def packed(values: Floats, steps: Steps) -> UInt8[np.ndarray, " bytes"]:
-    """Packs an array (R, ...) of multiples of `steps` (R,)."""
+    """Packs an array (R, ...) of multiples of `steps` (R,). `ValueError` for what is not finite."""
+    if not np.isfinite(values).all():
+        raise ValueError("expected finite numbers")
     integers = np.rint(values / _by_row(steps, values.ndim)).astype(np.int32)
     codes = ((integers << 1) ^ (integers >> 31)).astype("<u4").reshape(-1)
     planes = np.ascontiguousarray(codes.view(np.uint8).reshape(-1, PLANES).T)

@@ -24,6 +24,8 @@ class Arrow:
     """Whether its strength is sin^2 of its time, from none to that of the label and back; otherwise it is constant."""
     leaves: bool = False
     """Whether it starts in the middle of the body, as a velocity does; otherwise it ends at it, where a force acts."""
+    vertex: int | None = None
+    """The vertex of the body that its head touches; None for those that are nearest to the head."""
 
     def strength(self, time: float) -> float:
         """The part of the label's strength that acts at `time` in seconds."""

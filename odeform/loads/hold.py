@@ -49,7 +49,8 @@ def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:
     turn, points = turn_of(parameters), np.asarray(start.points, dtype=float)
     resting = points @ turn
     vector = -LENGTH * float(np.ptp(resting, axis=0).max()) * (turn @ _towards(parameters))
-    return (Arrow(points[held_vertex(resting, parameters)] - vector, vector, "held", 0.0, np.inf),)
+    vertex = held_vertex(resting, parameters)
+    return (Arrow(points[vertex] - vector, vector, "held", 0.0, np.inf, vertex=vertex),)
 
 
 LOAD = Load(

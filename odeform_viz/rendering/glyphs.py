@@ -93,6 +93,8 @@ class _Attached:
     def to(cls, rest: Points, arrow: Arrow) -> "_Attached":
         if arrow.leaves:  # given where a motion begins, which may be turned and in the air
             return cls(arrow, np.arange(len(rest)), np.zeros(3))
+        if arrow.vertex is not None:
+            return cls(arrow, np.array([arrow.vertex]), np.zeros(3))
         end = np.asarray(arrow.start + arrow.vector, dtype=float)
         carriers = np.argpartition(np.linalg.norm(rest - end, axis=1), min(CARRIERS, len(rest)) - 1)[:CARRIERS]
         return cls(arrow, carriers, end - rest[carriers].mean(axis=0))

@@ -60,7 +60,7 @@ def test_each_part_is_predicted_by_what_knows_it() -> None:
     np.testing.assert_array_equal(residual.weight[:POSE], np.repeat([0.0, settings["shares"]["rotation"]], 3))
     np.testing.assert_array_equal(residual.weight[POSE:], residual.regression.scale)
     push = ContactInputs(val.contacts[:1], val.normals[:1], val.forces[:1])
-    rest = residual.over_time(push)(val.times)
+    rest = residual.over_time(push)(val.times)[0]
     error = rest[:, :3] - val.reduced[0, :, :3]
     assert np.abs(error).max() < 0.1 * np.abs(val.reduced[0, :, :3]).max()
     tried = {(trial["part"], trial["share"]): trial["error"] for trial in settings["trials"]}

@@ -28,10 +28,10 @@ def test_a_ball_at_rest_stays_so_for_as_long_as_is_asked() -> None:
     spans = found["windows"]
     assert all(0.0 < spans[f"{a:g}:{b:g}"]["median_mm"] < 1.0 for a, b in SPANS)
     # a model that is somewhere else is as wrong as that
-    jump = np.where(motions.times > 0.0, 0.01, 0.0).astype(np.float32)[:, None, None]
+    jump = np.where(motions.times > 0.0, 0.03, 0.0).astype(np.float32)[:, None, None]
     moved = replace(motions, vertices=[vertices + jump for vertices in motions.vertices])
     off = compare_later(load("mass-elastic"), moved)["windows"]["1:2"]
-    assert off["pooled_mm"] > 8.0
+    assert off["pooled_mm"] > 25.0
     assert off["coverage_90"] < 0.5 < spans["1:2"]["coverage_90"]
 
 
