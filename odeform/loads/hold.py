@@ -58,7 +58,7 @@ LOAD = Load(
     title="Hold it",
     happened="held",
     parameters=(
-        Parameter("held_around", "deg", -180.0, 180.0, 0.0, description="where it is held: around, from x to y"),
+        Parameter("held_around", "deg", -180.0, 180.0, -120.0, description="where it is held: around, from x to y"),
         Parameter("held_up", "deg", -90.0, 90.0, 30.0, description="where it is held: up from its middle"),
         HEIGHT,
         *PARAMETERS[1:],
