@@ -14,7 +14,7 @@ from odeform.mechanics.state import State
 from odeform.mechanics.warping import bent
 from odeform.types import Floats, Ints, Points
 
-__every_ = ["HELD", "Hold", "Patch", "no_hold", "patch_of"]
+__all__ = ["Grip", "Held", "Hold", "grip_of", "no_hold"]
 
 HELD = 40  # points of a patch that springs hold
 LEAST = 0.02  # of the largest stiffness of a sample, below which it is left out
@@ -22,7 +22,7 @@ EACH = {"points": 2, "rows": 2, "stiffness": 1, "places": 1}  # and the axis of 
 
 
 @dataclass(frozen=True, eq=False)
-class Patch:
+class Grip:
     """What of a body's surface is held."""
 
     samples: Ints
@@ -33,7 +33,7 @@ class Patch:
     """What forces on the patch, even ones and ones that grow along it, do to the modes of the body."""
 
 
-def patch_of(body: ReducedBody, clamp: Clamp) -> Patch:
+def grip_of(body: ReducedBody, clamp: Clamp) -> Grip:
     """The samples of a body's surface that stand for those that a clamp holds."""
     surface, mass = body.surface, body.solid.mass
     every = clamp.stiffness(surface.points, surface.masses, mass)
@@ -43,7 +43,7 @@ def patch_of(body: ReducedBody, clamp: Clamp) -> Patch:
     owner = KDTree(points[chosen]).query(points)[1]
     stiffness = np.bincount(owner, every[inside], len(chosen))
     weights = every[inside] / every[inside].sum()
-    return Patch(inside[chosen], stiffness * (every.sum() / stiffness.sum()), _loads(body, inside, points, weights))
+    return Grip(inside[chosen], stiffness * (every.sum() / stiffness.sum()), _loads(body, inside, points, weights))
 
 
 def _loads(body: ReducedBody, inside: Ints, points: Points, weights: Floats) -> Floats:
@@ -71,12 +71,12 @@ class Hold:
     """s: of the dampers, relative to the springs."""
 
     @classmethod
-    def of(cls, body: ReducedBody, patch: Patch, modes: Floats, damping: float) -> "Hold":
+    def of(cls, body: ReducedBody, grip: Grip, modes: Floats, damping: float) -> "Hold":
         """One body in directions (M, K) of deformation, held where it is when all its coordinates are zero."""
-        samples = patch.samples
+        samples = grip.samples
         rows = np.stack([row.take(samples, axis=0) @ modes for row in body.surface.rows])
         points = body.surface.points[samples]
-        return cls(np.ascontiguousarray(points.T)[None], rows[None], patch.stiffness[None], points[None], damping)
+        return cls(np.ascontiguousarray(points.T)[None], rows[None], grip.stiffness[None], points[None], damping)
 
     @classmethod
     def together(cls, holds: Sequence["Hold"]) -> "Hold":

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from odeform.loads.situation import Clamp, Pulse
 from odeform.mechanics.body import ReducedBody
-from odeform.mechanics.holding import Hold, patch_of
+from odeform.mechanics.holding import Hold, grip_of
 from odeform.mechanics.obstacles import Obstacles
 from odeform.types import Floats, Ints, Vector, Vectors
 
@@ -142,9 +142,9 @@ def kicked(body: ReducedBody, soft: int, middle: Vector, pulse: Pulse) -> Push:
 def held(body: ReducedBody, soft: int, clamp: Clamp) -> Push:
     """A body that a clamp holds. The `soft` softest modes are among the directions of deformation; the others are what
     forces of the clamp do to the rest of its modes."""
-    patch, soft = patch_of(body, clamp), min(soft, len(body.eigenvalues))
-    modes, eigenvalues = _attached(body.eigenvalues, soft, patch.loads[None, soft:])
-    hold = Hold.of(body, patch, modes[0], clamp.damping)
+    grip, soft = grip_of(body, clamp), min(soft, len(body.eigenvalues))
+    modes, eigenvalues = _attached(body.eigenvalues, soft, grip.loads[None, soft:])
+    hold = Hold.of(body, grip, modes[0], clamp.damping)
     return replace(_without_sphere(body, modes, eigenvalues, soft), hold=hold)
 
 
