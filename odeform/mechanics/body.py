@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from odeform.types import Faces, Floats, Ints, Perpoint, Points
 
-__all__ = ["SUPPORT", "ReducedBody", "Samples", "Solid", "reduce_body", "solid_of"]
+__all__ = ["SUPPORT", "ReducedBody", "Samples", "Solid", "reduce_body", "solid_of", "spread"]
 
 SUPPORT = 96
 """Points spread over the surface that may touch the floor under a body that stands and is pushed."""

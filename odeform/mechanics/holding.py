@@ -49,7 +49,7 @@ def grip_of(body: ReducedBody, clamp: Clamp) -> Grip:
 def _loads(body: ReducedBody, inside: Ints, points: Points, weights: Floats) -> Floats:
     """(M, 9): forces along each axis, even ones and ones that grow along the patch in two directions."""
     arms = points - weights @ points
-    along = np.linalg.svd(np.sqrt(weights)[:, None] * arms, full_matrices=False)[2][:2]
+    along = np.linalg.eigh((weights * arms.T) @ arms)[1].T[1:]  # the two in which it is widest
     grows = np.stack([np.ones(len(points)), *(along @ arms.T)])
     rows = body.surface.rows[:3, inside]  # (3, N, M)
     return np.einsum("gn,anm->mga", weights * grows, rows).reshape(rows.shape[2], -1)
