@@ -38,10 +38,11 @@ class LoadPanel(Panel):
     def _chosen(self, event: viser.GuiEvent) -> None:
         if event.client_id is None or self._choice.value == self._shown:
             return
-        title, self._choice.value = self._choice.value, self._shown  # the page that is built anew has a list of its own
+        title = self._choice.value  # the page that is built anew has a list of its own
         try:
             if title not in self._names:
                 raise InputError(f"what happens: expected one of {', '.join(self._names)}, got {title!r}")
             self._page.controls.show_load(self._names[title])
         except InputError as error:
+            self._choice.value = self._shown
             self._page.notices.show("Nothing changed", str(error))

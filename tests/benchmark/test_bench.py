@@ -69,6 +69,7 @@ def test_bench(
         "this model",
         "pod-rbf",
         "torchdiffeq, same field",
+        "SciPy, same field, equal error",
         "mujoco, equal error",
     }
     assert result["peers"]["this model"]["error_mm"] > 0.0
