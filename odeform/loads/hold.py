@@ -12,13 +12,11 @@ from odeform.loads.situation import Clamp, Flight, Situation
 from odeform.schema import Parameter, Parameters
 from odeform.types import Mesh, Points, Vector
 
-__all__ = ["LOAD"]
+__all__ = ["LOAD", "held_vertex"]
 
-RADIUS = 0.12  # of the body's size: that of the patch
+RADIUS = 0.12  # of the body's size: where the springs of the patch are softer by a factor e
 SINK, DAMPING = 5e-4, 2e-3  # m and s, of the springs
 LENGTH = 0.25  # of the body's size: the arrow that points at the patch
-
-
 HEIGHT = replace(PARAMETERS[0], default=0.3)
 
 
@@ -58,8 +56,10 @@ LOAD = Load(
     title="Hold it",
     happened="held",
     parameters=(
-        Parameter("held_around", "deg", -180.0, 180.0, -120.0, description="where it is held: around, from x to y"),
-        Parameter("held_up", "deg", -90.0, 90.0, 30.0, description="where it is held: up from its middle"),
+        Parameter(
+            "held_around", "deg", -180.0, 180.0, -120.0, description="direction of the patch from the middle, about z"
+        ),
+        Parameter("held_up", "deg", -90.0, 90.0, 30.0, description="direction of the patch from the middle, upward"),
         HEIGHT,
         *PARAMETERS[1:],
     ),
@@ -74,8 +74,8 @@ LOAD = Load(
         "it touches the floor": {"held_up": 0.0, "height": 0.05},
     },
     notes=(
-        "The body begins in the air, without stress. Springs and dampers hold a patch of its surface, an eighth of its "
-        "size wide, where it begins.",
+        "The body begins in the air, without stress. Springs and dampers hold a patch of its surface where it begins; "
+        "they get softer with the distance from its middle, to a third at an eighth of the body's size.",
     ),
     arrows=arrows,
     held=True,

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from same_steps import assert_same_steps
 from scipy.spatial.transform import Rotation
 from soft_block import SIZE, Block
 from test_loads import FINE, TILTED, flier, solved
@@ -12,7 +13,6 @@ from odeform.compiling import compiles
 from odeform.loads.situation import Clamp, Flight, Situation
 from odeform.mechanics.flat import body_motion, parts_of, unpacked
 from odeform.mechanics.holding import Hold
-from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
 from odeform.models.modal.loaded import Beginning, LoadedBody
 from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Rotations
@@ -107,17 +107,6 @@ def test_compiled_steps_are_those_of_numpy(block: Block) -> None:
     body = flier(block)
     clamps = [Clamp(vertex, 0.03, SINK, DAMPING) for vertex in (0, 5)]
     begun = body.begin([Situation(Flight(0.002, TILTED), clamp=clamp) for clamp in clamps])
-    reference, compiled = (kind(body.mechanics, begun.push, 0.0) for kind in (PushedBodies, CompiledBodies))
-    without = CompiledBodies(body.mechanics, replace(begun.push, hold=None), 0.0)
-    rows, steps, states, pulled = np.arange(2), np.array([1e-3, 7e-4]), begun.start, 0.0
-    for index in range(40):
-        known, found = (each.advance(rows, index * steps, states, steps) for each in (reference, compiled))
-        for one, other in zip(known, found, strict=True):
-            np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-9 * np.abs(one).max())
-        slopes = reference(rows, index * steps, states)
-        np.testing.assert_allclose(
-            compiled(rows, index * steps, states), slopes, rtol=1e-8, atol=1e-9 * np.abs(slopes).max()
-        )
-        pulled = max(pulled, float(np.abs(without.advance(rows, index * steps, states, steps)[0] - known[0]).max()))
-        states = known[0]
+    free = replace(begun.push, hold=None)
+    _, pulled = assert_same_steps(body.mechanics, begun.push, begun.start, 40, free)
     assert pulled > 1e-3, "the springs matter"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from same_steps import assert_same_steps
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from soft_block import SIZE, Block
@@ -14,7 +15,6 @@ from odeform.loads.situation import Flight, Pulse, Situation, pulse_strength
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion, parts_of
 from odeform.mechanics.pushed import PushedBody
-from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.modal.loaded import Beginning, LoadedBody
 from odeform.solver.integrate import SolverSettings, integrate
@@ -160,17 +160,7 @@ def test_compiled_steps_are_those_of_numpy(block: Block, kicked: bool) -> None:
     flight = Situation(Flight(0.003, TILTED, np.array([0.5, 0.0, -2.0]), spin))
     situations = [kick(block, np.array(f)) for f in ([-9.0, 2.0, 3.0], [-2.0, 0.0, -7.0])] if kicked else [flight] * 2
     begun = body.begin(situations)
-    reference, compiled = (kind(body.mechanics, begun.push, 0.0) for kind in (PushedBodies, CompiledBodies))
-    rows, steps, states = np.arange(2), np.array([1e-3, 7e-4]), begun.start
-    for index in range(40):
-        known, found = (each.advance(rows, index * steps, states, steps) for each in (reference, compiled))
-        for one, other in zip(known, found, strict=True):
-            np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-9 * np.abs(one).max())
-        slopes = reference(rows, index * steps, states)
-        np.testing.assert_allclose(
-            compiled(rows, index * steps, states), slopes, rtol=1e-8, atol=1e-9 * np.abs(slopes).max()
-        )
-        states = known[0]
+    states, _ = assert_same_steps(body.mechanics, begun.push, begun.start, 40, begun.push)
     assert np.abs(states[:, parts_of(states)[2]]).max() > 1e-5, "they have been deformed"
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from same_steps import assert_same_steps
 from scipy.spatial.transform import Rotation
 from soft_block import SIZE, Block
 
@@ -16,7 +17,6 @@ from odeform.loads.wall import wall
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion, parts_of
 from odeform.mechanics.pushed import PushedBody
-from odeform.mechanics.pushed_batch import CompiledBodies, PushedBodies
 from odeform.mechanics.step import Mechanics, Projectile
 from odeform.models.modal.loaded import LoadedBody
 from odeform.solver.integrate import SolverSettings, integrate
@@ -141,17 +141,5 @@ def test_compiled_steps_are_those_of_numpy(block: Block, obstacles: tuple[tuple[
     flights = [Flight(height, TILTED, speed, spin) for height in (0.03, 0.04)]
     begun = body.begin([Situation(f, obstacles=some) for f, some in zip(flights, obstacles, strict=True)])
     free = replace(begun.push, obstacles=None)
-    reference, compiled = (kind(body.mechanics, begun.push, 0.0) for kind in (PushedBodies, CompiledBodies))
-    without = CompiledBodies(body.mechanics, free, 0.0)
-    rows, steps, states, met = np.arange(2), np.array([1e-3, 7e-4]), begun.start, 0.0
-    for index in range(60):
-        known, found = (each.advance(rows, index * steps, states, steps) for each in (reference, compiled))
-        for one, other in zip(known, found, strict=True):
-            np.testing.assert_allclose(other, one, rtol=1e-8, atol=1e-9 * np.abs(one).max())
-        slopes = reference(rows, index * steps, states)
-        np.testing.assert_allclose(
-            compiled(rows, index * steps, states), slopes, rtol=1e-8, atol=1e-9 * np.abs(slopes).max()
-        )
-        met = max(met, float(np.abs(without.advance(rows, index * steps, states, steps)[0] - known[0]).max()))
-        states = known[0]
+    _, met = assert_same_steps(body.mechanics, begun.push, begun.start, 60, free)
     assert met > 1e-3, "they have met an obstacle"
