@@ -28,6 +28,7 @@ class LoadPanel(Panel):
         hint = "how the motion begins, and what acts on the body"
         titles = tuple(self._names)
         self._choice = page.server.gui.add_dropdown("what happens", titles, initial_value=self._shown, hint=hint)
+        self._closed = False
         self._choice.on_update(self._chosen)
 
     @classmethod
@@ -35,14 +36,18 @@ class LoadPanel(Panel):
         predictor = page.model.predictor
         return predictor is not None and len(predictor.loads) > 1
 
+    def close(self) -> None:
+        self._closed = True
+
     def _chosen(self, event: viser.GuiEvent) -> None:
         if event.client_id is None or self._choice.value == self._shown:
             return
-        title = self._choice.value  # the page that is built anew has a list of its own
+        title = self._choice.value
         try:
             if title not in self._names:
                 raise InputError(f"what happens: expected one of {', '.join(self._names)}, got {title!r}")
             self._page.controls.show_load(self._names[title])
         except InputError as error:
-            self._choice.value = self._shown
+            if not self._closed:  # a page that is built anew has a list of its own
+                self._choice.value = self._shown
             self._page.notices.show("Nothing changed", str(error))
