@@ -96,7 +96,8 @@ class ReducedBody:
 
 
 def spread(points: Points, count: int, first: int) -> Ints:
-    """Choose `count` points (or all), each as far as possible from those before it; returns their indices."""
+    """Chooses `count` of points (N, 3) m, or all, from the one at `first` on, each as far as possible from those before
+    it; returns their indices (count,)."""
     chosen, distance = [first], np.full(len(points), np.inf)
     while len(chosen) < min(count, len(points)):
         distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
