@@ -76,11 +76,13 @@ def _rotation(motion: Motion, times: Times) -> Floats:
 
 
 def _status(motion: Motion, time: float) -> str:
+    stop = motion.stop_at(time)
     flags = {
         "untrained-shape": motion.untrained,
         "outside-parameters": bool(motion.outside),
         "outside-window": motion.extrapolates(time),
-        "stopped": motion.stop_at(time) is not None,
+        "stopped": stop is not None and not stop.limited,
+        "limited": stop is not None and stop.limited,
         "unsolved": time > motion.last_good,
     }
     return " ".join(name for name, holds in flags.items() if holds) or "ok"

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from odeform.motion.limits import Limits
-from odeform.motion.plausibility import CHUNK, COARSE, FINER, VALID, Sample, energy_of, faults_of
+from odeform.motion.plausibility import CHUNK, COARSE, FINER, VALID, Sample, energy_of, faults_of, wrong_with
 from odeform.schema import Window
 from odeform.types import Floats, Times
 
@@ -51,7 +51,7 @@ class BatchPlausibility:
         return self._later
 
     def _wrong(self, sample: Sample) -> Bool[np.ndarray, "batch times"]:
-        return (faults_of(sample, self._limits) != VALID).reshape(self._count, -1)
+        return (faults_of(wrong_with(sample, self._limits), self._limits) != VALID).reshape(self._count, -1)
 
     def _check_on(self) -> None:
         stop = self._window.stop

@@ -21,7 +21,8 @@ class Limits:
         energy: Largest energy of the rigid motion after the trained window, in multiples of the largest within it.
             Nothing drives a body then: sound motions stay below 0.6, one that falls through the floor reaches 18.
         ends: Whether a motion ends where it is first not valid after the trained window, because what follows builds on
-            it. Mechanics loses energy by itself and gets up again: then each moment is checked as in the window.
+            it. Mechanics loses energy by itself and gets up again: then each moment is checked as in the window, and
+            where a body deforms more than it can, its deformation is bounded and its rigid motion goes on.
     """
 
     floor: float | None = None

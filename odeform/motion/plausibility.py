@@ -2,8 +2,10 @@
 
 Within the trained window a model predicts each moment by itself, so each is checked by itself: a moment that is not
 valid shows the last valid one before it. After the window each frame follows from the ones before, so the motion ends
-where it is first not valid, unless its limits say otherwise. Both follow from the motion on fixed grids of times, whose
-intervals are refined where needed: never from the times that are asked for, nor from their order.
+where it is first not valid, unless its limits say otherwise. Mechanics knows where a body is even where it has lost its
+shape: there its rigid motion goes on, and its deformation is bounded (`ReducedSpace.bounded`). All follow from the
+motion on fixed grids of times, whose intervals are refined where needed: never from the times that are asked for, nor
+from their order.
 """
 
 import math
@@ -20,7 +22,18 @@ from odeform.motion.recent import Recent
 from odeform.schema import Window
 from odeform.types import Floats, Ints, Times
 
-__all__ = ["CHUNK", "COARSE", "FINER", "VALID", "PlausibilityCheck", "Sample", "Stop", "energy_of", "faults_of"]
+__all__ = [
+    "CHUNK",
+    "COARSE",
+    "FINER",
+    "VALID",
+    "PlausibilityCheck",
+    "Sample",
+    "Stop",
+    "energy_of",
+    "faults_of",
+    "wrong_with",
+]
 
 FINER = 2  # grid times per trained frame: a body that falls at 3 m/s moves by 12 mm between them
 REFINED = 32  # parts of a grid interval, which are divided once more: 4 microseconds at 120 Hz
@@ -62,8 +75,12 @@ class Stop:
     reason: str
     for_good: bool = True
     """Whether the motion ends there; false where later moments are valid again, or may be."""
+    limited: bool = False
+    """Whether the motion goes on, with as much deformation as the body can have in place of more."""
 
     def __str__(self) -> str:
+        if self.limited:
+            return f"limited in its deformation at t = {self.time:.3f} s: {self.reason}"
         if self.for_good:
             return f"stopped at t = {self.time:.3f} s: {self.reason} afterwards"
         return f"held at t = {self.time:.3f} s while {self.reason}"
@@ -91,16 +108,24 @@ class PlausibilityCheck:
         """Says what is shown in place of `time` (seconds of the clock) and why; None where it is shown itself."""
         if not self._alone(time):
             return self._after_window(time)
-        return self._last_valid(time) if time > self._window.start and self._faults(np.array([time]))[0] else None
+        if time <= self._window.start:
+            return None
+        wrong = self._wrong(np.array([time]))
+        if faults_of(wrong, self._limits)[0] != VALID:
+            return self._last_valid(time)
+        return _limited(time) if wrong[0] != VALID else None
 
     def first_stop(self, until: float) -> Stop | None:
-        """The first moment before `until` seconds of the clock from which on the motion is clamped; checks all of
-        it."""
+        """The first moment before `until` seconds of the clock from which on the motion is clamped or limited; checks
+        all of it."""
         grid = self._grid(until)
         grid = grid[self._alone(grid)]
-        wrong = np.flatnonzero(self._faults(grid))
-        if len(wrong):
-            return self._last_valid(float(grid[wrong[0]]))
+        wrong = self._wrong(grid)
+        if wrong.any():
+            first = int((wrong != VALID).argmax())
+            if faults_of(wrong[first : first + 1], self._limits)[0] != VALID:
+                return self._last_valid(float(grid[first]))
+            return _limited(float(grid[first]))
         return None if self._alone(until) else self._after_window(until)
 
     def _clamped(self, times: Times) -> Times:
@@ -125,11 +150,13 @@ class PlausibilityCheck:
         count = math.floor((until - self._window.start) / self._step + 1e-9)
         return self._window.start + self._step * np.arange(1, count + 1)
 
-    def _faults(self, times: Times) -> Ints:
+    def _wrong(self, times: Times) -> Ints:
         """(T,) what is wrong, energy aside; `VALID` where nothing is."""
-        if not len(times):
-            return np.zeros(0, dtype=int)
-        return faults_of(self.sample(times), self._limits)
+        return wrong_with(self.sample(times), self._limits) if len(times) else np.zeros(0, dtype=int)
+
+    def _faults(self, times: Times) -> Ints:
+        """(T,) that for which an earlier moment is shown."""
+        return faults_of(self._wrong(times), self._limits)
 
     def _last_valid(self, time: float) -> Stop:
         """The last valid moment before `time`, which is checked by itself and not valid."""
@@ -164,7 +191,7 @@ class PlausibilityCheck:
             return
         times = stop + self._step * np.arange(steps - 1, steps + CHUNK + 2)
         sample = self.sample(times)
-        faults = faults_of(sample, self._limits)[1:-1]
+        faults = faults_of(wrong_with(sample, self._limits), self._limits)[1:-1]
         driven = self._energy(times, sample) > self._limits.energy * self._most_energy
         faults[(faults == VALID) & driven] = DRIVEN
         wrong = np.flatnonzero(faults[1:] != VALID)
@@ -205,7 +232,16 @@ def energy_of(
         return gravity * (centres[..., 1:-1, 2] - ground) + 0.5 * (speed**2).sum(axis=-1)
 
 
-def faults_of(sample: Sample, limits: Limits) -> Ints:
+def _limited(time: float) -> Stop:
+    return Stop(time, REASONS[DEFORMED], for_good=False, limited=True)
+
+
+def faults_of(wrong: Ints, limits: Limits) -> Ints:
+    """(T,) that, of what is wrong, for which an earlier moment is shown; `VALID` elsewhere."""
+    return wrong if limits.ends else np.where(wrong == DEFORMED, VALID, wrong)
+
+
+def wrong_with(sample: Sample, limits: Limits) -> Ints:
     """(T,) what is wrong with each moment, energy aside; `VALID` where nothing is."""
     finite = np.isfinite(sample.lowest) & np.isfinite(sample.deformation) & np.isfinite(sample.centre).all(axis=1)
     out = np.where(finite, VALID, NON_FINITE)

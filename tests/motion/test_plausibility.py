@@ -174,3 +174,21 @@ def test_mechanics_goes_on_after_a_moment_that_is_not_valid() -> None:
     assert stop == check.stop_at(1.25)
     assert str(stop) == "held at t = 1.200 s while it sinks into the floor"
     assert check.stop_at(1.5) is None
+
+
+def test_mechanics_that_deforms_too_much_goes_on_and_says_so() -> None:
+    def sample(times: Times) -> Sample:
+        bent = np.where((times > 1.2) & (times < 1.3), 1.4, 1.0)
+        return Sample(np.where(times > 1.4, -0.006, 0.0), bent, np.zeros((len(times), 3)))
+
+    check = PlausibilityCheck(Limits(floor=0.0, ends=False), WINDOW, sample)
+    times = np.array([1.1, 1.25, 1.29, 1.31])
+    assert np.array_equal(check.clamped(times), times)
+    stop = check.stop_at(1.25)
+    assert str(stop) == "limited in its deformation at t = 1.250 s: it deforms more than the body can"
+    assert check.stop_at(1.31) is None
+    first = check.first_stop(1.5)
+    assert first is not None
+    assert first.limited
+    assert 1.2 < first.time < 1.21
+    assert str(check.stop_at(1.45)) == "held at t = 1.400 s while it sinks into the floor"
