@@ -23,6 +23,8 @@ class Limits:
         ends: Whether a motion ends where it is first not valid after the trained window, because what follows builds on
             it. Mechanics loses energy by itself and gets up again: then each moment is checked as in the window, and
             where a body deforms more than it can, its deformation is bounded and its rigid motion goes on.
+        flat: Whether what is in the floor or an obstacle is shown flat on it (`odeform.motion.ground`): then a motion
+            that does not end goes on there, too.
     """
 
     floor: float | None = None
@@ -31,3 +33,4 @@ class Limits:
     deformation: float = 1.3
     energy: float = 1.1
     ends: bool = True
+    flat: bool = False

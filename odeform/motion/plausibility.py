@@ -113,7 +113,7 @@ class PlausibilityCheck:
         wrong = self._wrong(np.array([time]))
         if faults_of(wrong, self._limits)[0] != VALID:
             return self._last_valid(time)
-        return _limited(time) if wrong[0] != VALID else None
+        return self._limited(time, int(wrong[0])) if wrong[0] != VALID else None
 
     def first_stop(self, until: float) -> Stop | None:
         """The first moment before `until` seconds of the clock from which on the motion is clamped or limited; checks
@@ -125,8 +125,11 @@ class PlausibilityCheck:
             first = int((wrong != VALID).argmax())
             if faults_of(wrong[first : first + 1], self._limits)[0] != VALID:
                 return self._last_valid(float(grid[first]))
-            return _limited(float(grid[first]))
+            return self._limited(float(grid[first]), int(wrong[first]))
         return None if self._alone(until) else self._after_window(until)
+
+    def _limited(self, time: float, fault: int) -> Stop:
+        return Stop(time, REASONS[fault].format(self._obstacle), for_good=False, limited=True)
 
     def _clamped(self, times: Times) -> Times:
         latest = float(times.max(initial=self._window.start))
@@ -232,13 +235,11 @@ def energy_of(
         return gravity * (centres[..., 1:-1, 2] - ground) + 0.5 * (speed**2).sum(axis=-1)
 
 
-def _limited(time: float) -> Stop:
-    return Stop(time, REASONS[DEFORMED], for_good=False, limited=True)
-
-
 def faults_of(wrong: Ints, limits: Limits) -> Ints:
     """(T,) that, of what is wrong, for which an earlier moment is shown; `VALID` elsewhere."""
-    return wrong if limits.ends else np.where(wrong == DEFORMED, VALID, wrong)
+    if limits.ends:
+        return wrong
+    return np.where(np.isin(wrong, (DEFORMED, SUNK, INSIDE) if limits.flat else (DEFORMED,)), VALID, wrong)
 
 
 def wrong_with(sample: Sample, limits: Limits) -> Ints:

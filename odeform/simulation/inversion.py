@@ -4,9 +4,11 @@ Saint Venant-Kirchhoff material gives way under strong compression, and is at re
 that an impact flattens may pass through itself, and then stays so for good.
 """
 
+from typing import Any
+
 import numpy as np
 
-from odeform.simulation.flex import FlexBody
+from odeform.simulation.objects.body import SoftBody
 from odeform.types import Floats, Ints, Points
 
 __all__ = ["GuardedBody"]
@@ -24,12 +26,22 @@ class GuardedBody:
     That moves no mass centre. Where none is that small, nothing changes.
     """
 
-    def __init__(self, body: FlexBody, points: Points, elements: Ints) -> None:
+    def __init__(self, body: SoftBody, points: Points, elements: Ints) -> None:
         """`points` (N, 3) m are the nodes without stress, `elements` (M, 4)."""
         self._body, self._elements = body, elements
         volumes, _ = _volumes(points[elements])
         self._signs, self._least = np.sign(volumes), SMALLEST * np.abs(volumes)
         self._yields = 1.0 / body.masses
+
+    @property
+    def model(self) -> Any:
+        """The simulator's model."""
+        return self._body.model
+
+    @property
+    def data(self) -> Any:
+        """The simulator's state."""
+        return self._body.data
 
     @property
     def timestep(self) -> float:
@@ -46,10 +58,18 @@ class GuardedBody:
         """(N, 3) metres."""
         return self._body.positions
 
+    @positions.setter
+    def positions(self, value: Floats) -> None:
+        self._body.positions = value
+
     @property
     def velocities(self) -> Floats:
         """(N, 3) m/s, a view."""
         return self._body.velocities
+
+    def set_timestep(self, step: float) -> None:
+        """Go on in steps of `step` seconds."""
+        self._body.set_timestep(step)
 
     def check(self) -> None:
         """Raise `SimulationError` unless the run so far is sound."""

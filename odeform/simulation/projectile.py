@@ -6,6 +6,7 @@
 from odeform.geometry.contact import RADIUS
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.flex import CONTACT_RADIUS, Contact, FlexBody
+from odeform.simulation.inversion import GuardedBody
 from odeform.types import Floats, Vector
 
 __all__ = ["MASS", "StruckBody", "projectile_xml"]
@@ -35,7 +36,7 @@ def _numbers(vector: Vector) -> str:
 class StruckBody:
     """A flexible body with a projectile, which is gone after the pulse. It is a `odeform.simulation.stepping.Body`."""
 
-    def __init__(self, body: FlexBody, force: Vector, pulse: float) -> None:
+    def __init__(self, body: FlexBody | GuardedBody, force: Vector, pulse: float) -> None:
         """`body` has a projectile (`projectile_xml`), which `force` (3,) N drives for `pulse` seconds."""
         self.body, self._pulse = body, pulse
         self._index = body.model.body("projectile").id

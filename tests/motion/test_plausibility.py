@@ -192,3 +192,12 @@ def test_mechanics_that_deforms_too_much_goes_on_and_says_so() -> None:
     assert first.limited
     assert 1.2 < first.time < 1.21
     assert str(check.stop_at(1.45)) == "held at t = 1.400 s while it sinks into the floor"
+
+
+def test_what_is_shown_flat_on_the_floor_goes_on() -> None:
+    def sample(times: Times) -> Sample:
+        return Sample(np.where(times > 1.4, -0.006, 0.0), np.zeros_like(times), np.zeros((len(times), 3)))
+
+    check = PlausibilityCheck(Limits(floor=0.0, ends=False, flat=True), WINDOW, sample)
+    assert check.clamped(np.array([1.45])).tolist() == [1.45]
+    assert str(check.stop_at(1.45)) == "limited in its deformation at t = 1.450 s: it sinks into the floor"

@@ -99,6 +99,17 @@ def test_too_strong_a_push_is_refused() -> None:
         simulate_object(block(), parameters((-300.0, 0.0, 0.0)))
 
 
+@pytest.mark.slow
+def test_a_push_that_turns_a_soft_body_inside_out_is_simulated_again_with_a_guard() -> None:
+    item = get_object("bottle")
+    soft = {"mass": 0.37, "young": 41.5, **parameters((-8.0, 0.0, 0.0), (0.038, 0.0, 0.1))}
+    with pytest.raises(SimulationError, match="inside out"):
+        simulate_object(item, soft, until=0.1, guard=False)
+    motion = simulate_object(item, soft, until=0.1)
+    assert motion.times[-1] == pytest.approx(0.1)
+    assert np.abs(motion.vertices[-1] - motion.vertices[0]).max() > 0.02
+
+
 def test_drawn_contacts_lie_on_the_surface_where_the_sphere_fits() -> None:
     item = get_object("cat")
     rest = item.rest_mesh()

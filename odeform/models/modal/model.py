@@ -158,7 +158,7 @@ class ModalModel(Model):
         validity = super().validity
         limits = replace(validity.limits, ends=False)
         if self.load is not None:
-            limits = replace(limits, depth=FLATTENED * float(np.ptp(self.body.points, axis=0).min()))
+            limits = replace(limits, flat=True, depth=FLATTENED * float(np.ptp(self.body.points, axis=0).min()))
         return replace(validity, limits=limits)
 
     @property
