@@ -80,23 +80,11 @@ def fit_mechanical(
     """Train on the objects of a data set of the scene `contact-force`; contact parameters that are finished are kept in
     `known_parameters`, and those that it has are not fitted again.
 
-    Without `correct`, motions are those of the mechanics alone. `InputError` for other data.
+    Without `with_residual`, motions are those of the mechanics alone. `InputError` for other data.
     """
-    missing = [name for name in dataset.objects if name not in OBJECTS]
-    if missing or not dataset.objects or not set(dataset.fixed) >= FIXED:
-        raise InputError(
-            f"{dataset.root}: expected data of scene contact-force, of objects {', '.join(OBJECTS)}; "
-            f"got scene {dataset.schema.scene}"
-        )
+    _require_objects(dataset)
     begin, pulse = time.process_time(), dataset.fixed["pulse_s"]
-    each: dict[str, Pushes] = {}
-    for name in dataset.objects:
-        each[name] = training_pushes(dataset.of(name), get_object(name))
-        pushes = each[name]
-        report(
-            f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.eigenvalues)} modes leave out "
-            f"{100.0 * pushes.fraction_left_out:.0f} % of the deformation"
-        )
+    each = {name: _read_pushes(dataset, name, report) for name in dataset.objects}
     shared = known_parameters.get(SHARED)
     if shared is None:
         some = [pushes.some(SEQUENCES, seed) for pushes in each.values()]
@@ -131,6 +119,24 @@ def fit_mechanical(
     items = [get_object(name) for name in names]
     whole = joined(schema_of(items, dataset.schema), {name: found[name] for name in names})
     return replace(whole, config={**whole.config, "val": {"seconds": spent}})
+
+
+def _require_objects(dataset: Dataset) -> None:
+    missing = [name for name in dataset.objects if name not in OBJECTS]
+    if missing or not dataset.objects or not set(dataset.fixed) >= FIXED:
+        raise InputError(
+            f"{dataset.root}: expected data of scene contact-force, of objects {', '.join(OBJECTS)}; "
+            f"got scene {dataset.schema.scene}"
+        )
+
+
+def _read_pushes(dataset: Dataset, name: str, report: Callable[[str], None]) -> Pushes:
+    pushes = training_pushes(dataset.of(name), get_object(name))
+    report(
+        f"{name}: {len(pushes.contacts)} pushes; {len(pushes.body.eigenvalues)} modes leave out "
+        f"{100.0 * pushes.fraction_left_out:.0f} % of the deformation"
+    )
+    return pushes
 
 
 def inputs_of(dataset: Dataset, split: str) -> Floats:
