@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.geometry.solids.tetrahedra import boundary, outward
+from odeform.loads.registry import CLAMPED
 from odeform.mechanics.clamped import ClampedBody, Weight
 from odeform.mechanics.quadratic import Stiffness, quadratic_mesh
 from odeform.mechanics.swinging import Loss, SwingingBody, swinging_body
@@ -54,7 +55,7 @@ def clamped_checkpoint(
     held: Bool[np.ndarray, " nodes"],
     material: tuple[float, float],
     gravity: Vector,
-    edge: Points,
+    edge: Float[np.ndarray, "places 3"],
     markers: Markers,
     until: float,
 ) -> Checkpoint:
@@ -71,7 +72,7 @@ def clamped_checkpoint(
         until: The window ends here, s.
     """
     shown = trimesh.Trimesh(corners, boundary(outward(corners, elements))).subdivide()  # so that its bending is seen
-    schema = Schema("clamped", PARAMETERS, Window(0.0, until, 100.0), notes=NOTES, surroundings=Surroundings(None))
+    schema = Schema(CLAMPED, PARAMETERS, Window(0.0, until, 100.0), notes=NOTES, surroundings=Surroundings(None))
     arrays = {
         "corners": np.asarray(corners, dtype=float),
         "elements": np.asarray(elements, dtype=np.int32),
@@ -96,7 +97,10 @@ class ClampedModel(Predictor):
 
     def _read(self, checkpoint: Checkpoint) -> None:
         config, arrays = checkpoint.config, checkpoint.arrays
-        self.markers: Markers = config["markers"]
+        self.markers: Markers = {
+            part: {name: (float(x), float(y), float(z)) for name, (x, y, z) in places.items()}
+            for part, places in config["markers"].items()
+        }
         mesh = quadratic_mesh(arrays["corners"], arrays["elements"])
         self._stiffness = Stiffness(mesh, 1e3 * self._default("young"), config["poisson"])
         held, gravity = arrays["held"].astype(bool), np.array(config["gravity"], dtype=float)
@@ -138,7 +142,8 @@ class ClampedModel(Predictor):
         steps, wall_ms = round(times[-1] / STEP), 1e3 * (time.perf_counter() - begin)
         stats = SolveStats(f"implicit midpoint, {1e3 * STEP:g} ms", steps, steps, 0, "ok", wall_ms, estimate)
         moved = np.einsum("tr,rpi->tpi", amplitudes, seen)
-        return FrameMotion(self.schema, parameters, geometry, times, np.zeros((len(times), 3)), moved, stats)
+        centre = moved.mean(axis=1)
+        return FrameMotion(self.schema, parameters, geometry, times, centre, moved - centre[:, None], stats)
 
     def _amplitudes(self, parameters: Parameters, times: Times, step: float) -> Floats:
         """(T, R) at `times` (T,) s, of the body that is let go straight; `InputError` where it cannot be followed."""

@@ -48,6 +48,7 @@ CELLS, FINER = 3, 4  # across the beam
 COARSE = (2, 2, 7)  # cells of the model of the page
 TILT = np.radians(6.5)  # of gravity out of the beam's normal, as both recordings say
 SHOWN = 2.0  # s
+HEIGHT = 0.1  # m of the beam above the grid of the page
 LAYOUT = MarkerLayout(
     tip={"Tip - 1": (0.036, 0.015, 0.1), "Tip - 2": (0.024, 0.036, 0.1), "Tip - 3": (0.006, -0.006, 0.1)},
     base={"Base - 1": (0.0, 0.04, 0.006), "Base - 2": (0.0275, -0.01, 0.006), "Base - 3": (-0.001, -0.01, 0.006)},
@@ -70,7 +71,7 @@ def model() -> Checkpoint:
     """The beam as a model of the page, in the axes of a scene: it lies along y, and z is up."""
 
     def placed(place: Sequence[float]) -> tuple[float, float, float]:
-        return float(place[1]), float(place[2]), float(place[0])
+        return float(place[1]), float(place[2]), HEIGHT + float(place[0])
 
     points, elements = block(np.zeros(3), np.array(SIZE), COARSE)
     corners = np.array([placed(point) for point in points])
