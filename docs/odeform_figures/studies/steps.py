@@ -31,15 +31,17 @@ Simulated = tuple[Floats, float] | str
 """(T, N, 3) m and seconds of processor time; or why there is no motion."""
 
 
-def steps(names: Sequence[str], count: int, seed: int, workers: int) -> dict[str, Any]:
-    """The figures of `count` pushes of each of the objects `names`, drawn as for a data set with this seed."""
-    settings = SCENE.sample(count, seed, names)
+def steps(names: Sequence[str], count: int, seed: int, workers: int, skip: int = 0) -> dict[str, Any]:
+    """The figures of `count` pushes of each of the objects `names`, drawn as for a data set with this seed, without the
+    first `skip` of them."""
+    settings = [parameters for name in names for parameters in SCENE.sample(count, seed, [name])[skip:]]
     jobs = [(parameters, factor * SCENE.step) for parameters in settings for factor in FACTORS]
     motions = parallel_map("steps of contact-force", _run, jobs, workers)
     width = len(FACTORS)
     rows = [_row(parameters, motions[width * at : width * (at + 1)]) for at, parameters in enumerate(settings)]
     return {
-        "command": f"python -m odeform_figures.studies.steps {' '.join(names)} --count {count} --seed {seed}",
+        "command": f"python -m odeform_figures.studies.steps {' '.join(names)} --count {count} --seed {seed}"
+        + (f" --skip {skip}" if skip else ""),
         "steps_ms": [1e3 * factor * SCENE.step for factor in FACTORS],
         "objects": {name: _pooled([row for row in rows if row["parameters"][OBJECT] == name]) for name in names},
         "pushes": rows,
@@ -93,6 +95,7 @@ def main(argv: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.steps", description=__doc__)
     parser.add_argument("objects", nargs="*", metavar="OBJECT", help=f"of {', '.join(OBJECTS)} (default: all)")
     parser.add_argument("--count", type=int, default=6, metavar="N", help="pushes of each object (default: 6)")
+    parser.add_argument("--skip", type=int, default=0, metavar="N", help="leave out the first N of them (default: 0)")
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="random seed of the parameters (default: 0)")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="W", help="number of processes")
     parser.add_argument("--json", metavar="FILE", help="write the result to this file instead of printing it")
@@ -100,10 +103,12 @@ def main(argv: list[str] | None = None) -> None:
     for option in ("count", "workers"):
         if (value := getattr(args, option)) < 1:
             parser.error(f"--{option}: expected at least 1, got {value}")
+    if not 0 <= args.skip < args.count:
+        parser.error(f"--skip: expected at least 0 and less than --count, got {args.skip}")
     names = args.objects or list(OBJECTS)
     if unknown := [name for name in names if name not in OBJECTS]:
         parser.error(f"{', '.join(unknown)}: expected objects, {', '.join(OBJECTS)}")
-    write_or_print(steps(names, args.count, args.seed, args.workers), args.json)
+    write_or_print(steps(names, args.count, args.seed, args.workers, args.skip), args.json)
 
 
 if __name__ == "__main__":
