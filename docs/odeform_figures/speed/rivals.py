@@ -81,7 +81,8 @@ class _Caged(SoftBody):
         ).replace("<flexcomp ", f'<flexcomp dof="{order}" cellcount="{cells} {cells} {cells}" ')
         still = mujoco.MjModel.from_xml_string(xml)
         mujoco.mj_forward(still, data := mujoco.MjData(still))
-        FlexBody.__init__(self, xml, data.xpos[-int(still.nflexnode) :].copy())
+        moving = int(still.nv) // 3  # nodes of empty cells are not; a projectile has one coordinate
+        FlexBody.__init__(self, xml, data.xpos[-moving:].copy())
         self._material = material
         self.set_timestep(step)
 
