@@ -16,7 +16,6 @@ motion...* there.
 
 import argparse
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -70,18 +69,18 @@ def beam(release: Release, grams: float = 0.0, cells: int = CELLS) -> ClampedBod
 def model() -> Checkpoint:
     """The beam as a model of the page, in the axes of a scene: it lies along y, and z is up."""
 
-    def placed(place: Sequence[float]) -> tuple[float, float, float]:
-        return float(place[1]), float(place[2]), HEIGHT + float(place[0])
+    def placed(x: float, y: float, z: float) -> tuple[float, float, float]:
+        return float(y), float(z), HEIGHT + float(x)
 
     points, elements = block(np.zeros(3), np.array(SIZE), COARSE)
-    corners = np.array([placed(point) for point in points])
+    corners = np.array([placed(*point) for point in points])
     mesh = quadratic_mesh(corners, elements)
     markers = {
-        "tip": {name: placed(place) for name, place in LAYOUT.tip.items()},
-        "base": {name: placed(place) for name, place in LAYOUT.base.items()},
+        "tip": {name: placed(*place) for name, place in LAYOUT.tip.items()},
+        "base": {name: placed(*place) for name, place in LAYOUT.base.items()},
     }
     gravity = GRAVITY * np.array([0.0, np.sin(TILT), -np.cos(TILT)])
-    edge = np.array([placed(place) for place in EDGE])
+    edge = np.array([placed(*place) for place in EDGE])
     held = held_by_face(mesh, 1, low=True)
     made = clamped_checkpoint(corners, elements, held, (POISSON, DENSITY), gravity, edge, markers, SHOWN)
     provenance = {"command": ["python -m odeform_figures.studies.beam --model FILE"]}
