@@ -34,7 +34,7 @@ def scatter(panels: Mapping[str, Series], x: str, y: str) -> str:
         left = LEFT + index * (WIDE + GAP)
         parts.append(f'<g transform="translate({left} {TOP})">{_panel(title, series, colors, low, high, index == 0)}')
         parts.append(f'<text x="{WIDE / 2}" y="{HIGH + 34}" text-anchor="middle">{escape(x)}</text></g>')
-    parts.append(f'<text x="4" y="{TOP - 16}">{escape(y)}</text>')
+    parts.append(f'<text x="4" y="{TOP - 22}">{escape(y)}</text>')
     for index, name in enumerate(names):
         across, down = LEFT + 200 * (index % 4), TOP + HIGH + 56 + 20 * (index // 4)
         parts.append(f'<circle cx="{across}" cy="{down - 4}" r="5" fill="{colors[name]}"/>')
