@@ -35,6 +35,7 @@ __all__ = [
 
 FORMAT = 1
 LIMIT = 1 << 29  # bytes; no checkpoint is larger, and no array of one
+INDICES = ("faces", "elements")  # arrays whose names end so are indices of points
 PACKED_BYTES = 4  # of an entry of an array that was packed
 
 
@@ -80,7 +81,15 @@ def write_checkpoint(path: str | Path, checkpoint: Checkpoint) -> None:
     }
     metadata = {"odeform": json.dumps(meta, default=_plain)}  # one key: safetensors writes several in no fixed order
     arrays |= {name: packed(arrays[name], arrays[f"{name}{STEP}"]) for name in in_steps}
+    arrays |= {name: array.astype(np.uint16) for name, array in arrays.items() if _is_short(name, array)}
     atomic_write(Path(path), save(arrays, metadata))
+
+
+def _is_short(name: str, array: np.ndarray) -> bool:
+    """Whether these are indices that two bytes hold; they are read as four again."""
+    if not name.endswith(INDICES) or array.dtype.kind not in "iu":
+        return False
+    return array.size > 0 and int(array.min()) >= 0 and int(array.max()) < 1 << 16
 
 
 def _plain(value: Any) -> Any:
@@ -117,6 +126,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
         if meta["format"] != FORMAT:
             raise InputError(f"checkpoint {path}: expected format {FORMAT}, got {meta['format']!r}")
         _unpack(arrays, meta.get("packed", {}), str(path))
+        arrays |= {name: array.astype(np.int32) for name, array in arrays.items() if _is_short(name, array)}
         return Checkpoint(
             model=str(meta["model"]),
             schema=Schema.from_json(meta["schema"]),

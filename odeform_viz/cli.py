@@ -53,7 +53,7 @@ def make_columns(
 def _label(model: Predictor, fit: FittedShape | None) -> str:
     """The authors' files contain no body, so a ball is shown unless the user gives one."""
     name = model_title(model)
-    return name if fit or model.rescales_input or model.schema.objects else f"{name} (shown on a ball)"
+    return name if fit or model.bodies else f"{name} (shown on a ball)"
 
 
 def _serve(args: argparse.Namespace) -> None:

@@ -34,9 +34,10 @@ MODELS = {
     "pe-gnn": "graph network",
     "occupancy-flow": "occupancy flow",
     "released": "authors' network",
+    "clamped": "clamped body",
 }
 PARAMETERS = {"young": "stiffness"}
-SCENES = {"kick": "ball, kicked", "mass-elastic": "ball, dropped"}
+SCENES = {"kick": "ball, kicked", "mass-elastic": "ball, dropped", "clamped": "clamped body, let go"}
 CONSTANTS = {
     "young": "Young's modulus",
     "poisson": "Poisson's ratio",

@@ -79,6 +79,19 @@ def test_a_reloaded_model_predicts_the_same(
     assert np.array_equal(again.solve().vertices(times), predictors[model].solve().vertices(times))
 
 
+@pytest.mark.parametrize(("largest", "bytes_each"), [(65535, 2), (65536, 4)])
+def test_indices_take_two_bytes_where_they_fit(tmp_path: Path, largest: int, bytes_each: int) -> None:
+    faces = np.array([[0, 1, largest]], dtype=np.int32)
+    other = np.array([7, 8], dtype=np.int32)
+    arrays = {**small().arrays, "rest.faces": faces, "counts": other}
+    write_checkpoint(path := tmp_path / "a.safetensors", replace(small(), arrays=arrays))
+    assert safetensors.numpy.load(path.read_bytes())["rest.faces"].dtype.itemsize == bytes_each
+    read = read_checkpoint(path).arrays
+    for name, array in (("rest.faces", faces), ("counts", other)):
+        assert read[name].dtype == np.int32
+        assert np.array_equal(read[name], array)
+
+
 @pytest.mark.parametrize("keep", [0, 4, 8, 100, -1, -1000])
 def test_truncated(trained: dict[str, Path], tmp_path: Path, keep: int) -> None:
     path = tmp_path / "cut.safetensors"

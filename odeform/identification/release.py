@@ -1,6 +1,8 @@
 """A measured release: markers on a body that is clamped, held straight, let go, and comes to rest."""
 
+import io
 import re
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +13,9 @@ from jaxtyping import Float
 from odeform.errors import InputError
 from odeform.formats.motion_capture import read_c3d
 from odeform.geometry.rigid import best_rigid
-from odeform.types import Floats, Frames, Points, Times, Vector
+from odeform.types import Floats, Frames, MotionSequence, Points, Times, Vector
 
-__all__ = ["MarkerLayout", "Markers", "Release", "read_markers", "released"]
+__all__ = ["MarkerLayout", "Markers", "Release", "markers_in", "read_markers", "recorded_release", "released"]
 
 MOVES = 0.1  # of the sag: what has moved that far has been let go
 BEGINS = 0.03  # of the sag, from which on it counts as begun
@@ -76,13 +78,18 @@ def read_markers(path: Path | str) -> Markers:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: no such file")
-    if path.suffix.lower() == ".c3d":
-        capture = read_c3d(path.read_bytes(), str(path), gaps=True)
+    return markers_in(path.read_bytes(), str(path))
+
+
+def markers_in(data: bytes, path: str) -> Markers:
+    """The markers in the bytes of a file, as `read_markers` has them; `path` is its name. `InputError` as there."""
+    if path.lower().endswith(".c3d"):
+        capture = read_c3d(data, path, gaps=True)
         return Markers(capture.times, capture.points, capture.labels)
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             times, points, labels = (arrays[name] for name in ("times", "positions", "labels"))
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: expected a .c3d, or an .npz with times, positions and labels: {error}") from None
     points = np.asarray(points, dtype=float)
     if points.shape != (len(times), len(labels), 3):
@@ -134,6 +141,22 @@ def released(markers: Markers, layout: MarkerLayout) -> Release:
         float(np.linalg.norm((settled - held)[count:], axis=1).max()),
         float(np.nanmean(np.nanstd(still, axis=0))),
     )
+
+
+def recorded_release(release: Release, name: str) -> MotionSequence:
+    """The markers of the tip as a motion to compare with: they are the vertices of a plate, and what is not seen lies
+    on a line between what is. `InputError` for fewer than three markers."""
+    count = len(release.places)
+    if count < 3:
+        raise InputError(f"{name}: expected at least three markers at the tip, got {count}")
+    paths = release.places + release.displacements
+    for path in paths.reshape(len(paths), -1).T:
+        seen = np.isfinite(path)
+        path[:] = np.interp(release.times, release.times[seen], path[seen])
+    fan = np.array([[0, at, at + 1] for at in range(1, count - 1)])
+    times = np.linspace(0.0, float(release.times[-1] - release.times[0]), len(release.times))
+    even = np.full(count, 1.0 / count)
+    return MotionSequence(times, paths.astype(np.float32), np.concatenate([fan, fan[:, ::-1]]), even, {}, name)
 
 
 def _release_frame(times: Times, tip: Floats) -> int:

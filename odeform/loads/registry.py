@@ -6,8 +6,20 @@ from pathlib import Path
 from odeform.errors import InputError
 from odeform.loads.load import SCENES_OF_LOADS, Load
 
-__all__ = ["LOADS", "PUSH", "get_load", "known_as", "known_loads", "load_of_scene", "register_load", "split_load"]
+__all__ = [
+    "CLAMPED",
+    "LOADS",
+    "PUSH",
+    "get_load",
+    "known_as",
+    "known_loads",
+    "load_of_scene",
+    "register_load",
+    "split_load",
+]
 
+CLAMPED = "clamped"
+"""The scene of a clamped body, of which nothing is learned."""
 PUSH = "push"
 """What happens in the scene `contact-force`, for which models are trained: a sphere pushes."""
 
@@ -61,5 +73,7 @@ def load_of_scene(scene: str) -> Load | None:
 
 def known_as(scene: str) -> str:
     """What a scene's ranges and its window are those of: "trained", or, under a load, of which no motions were trained,
-    "measured"."""
+    "measured"; "shown" where nothing is learned, and sliders and window are as long as is worth seeing."""
+    if scene == CLAMPED:
+        return "shown"
     return "trained" if load_of_scene(scene) is None else "measured"

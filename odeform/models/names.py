@@ -16,12 +16,14 @@ MODELS: dict[str, str] = {
     "gp": "odeform.models.baselines.gp:GaussianProcess",
     "nearest": "odeform.models.baselines.nearest:Nearest",
     "released": "odeform.models.authors.predictor:AuthorsModel",
+    "clamped": "odeform.models.clamped:ClampedModel",
 }
 """Name in checkpoints and on the command line -> "module:class"."""
 
 ALIASES = {"odeform": "latent", "odeform-rolling": "rolling", "odeform-mechanical": "modal"}
 """Names that older checkpoints and commands have for the three families of ODeform."""
 
-TRAINABLE = tuple(name for name in (*MODELS, *ALIASES) if name not in ("released", "odeform-mechanical"))
-"""The models that `odeform train` trains. The authors' network is only read; `odeform` is the family that suits the
+TRAINABLE = tuple(name for name in (*MODELS, *ALIASES) if name not in ("released", "clamped", "odeform-mechanical"))
+"""The models that `odeform train` trains. The authors' network and the clamped body, of which nothing is learned,
+are only read; `odeform` is the family that suits the
 data: modal in scenes with objects, latent in all others."""

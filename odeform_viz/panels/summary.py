@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import CLAMPED, load_of_scene
 from odeform.motion.base import Motion
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
@@ -60,6 +60,8 @@ def badge_of(frame: Frame) -> Badge:
         # amber: what moves it is modelled, and no data say how well under this load
         text = "; ".join(filter(None, ("mechanics: only its contacts were fitted", where)))
         return Badge("outside", text, expected)
+    if schema.scene == CLAMPED:
+        return Badge("outside", "; ".join(filter(None, ("mechanics: nothing of it is learned", where))), expected)
     if any(c.changed for c in models):
         where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
         return Badge("unknown", where, expected)

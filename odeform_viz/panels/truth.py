@@ -11,6 +11,8 @@ from odeform.dataset.captured import read_captured
 from odeform.dataset.index import Entry
 from odeform.dataset.store import bundled_datasets, open_dataset
 from odeform.errors import InputError
+from odeform.identification.release import MarkerLayout, markers_in, recorded_release, released
+from odeform.models.clamped import ClampedModel
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT, Schema
 from odeform.simulation.contacts import vector_of
@@ -29,7 +31,11 @@ __all__ = ["TruthPanel", "entry_label", "physics_difference"]
 
 NONE, SIMULATED = "none", "simulated here"
 FORMAT = "an .npz file: times (T,) in s, vertices (T, N, 3) in m; if known, faces and parameters"
+RECORDING = (
+    "markers of this body while it is held, let go, and comes to rest: .c3d, or .npz with times, positions, labels"
+)
 NO_SIMULATOR = "This scene was imported, so it cannot be simulated here."
+NO_SIMULATION = "Open a recording of its markers to compare with; no simulator has this body."
 OVERSAMPLING = 4  # simulated frames per frame of training, to compare between those too
 
 PHYSICS = (
@@ -64,6 +70,8 @@ class TruthPanel(Panel):
     def __init__(self, page: Page) -> None:
         self._page, self._schema, self._columns = page, page.schema, page.columns
         scene = self._schema.scene
+        model = page.model.predictor
+        self._layout = MarkerLayout(**model.markers) if isinstance(model, ClampedModel) else None
         self._scene = find_scene(scene)  # None for imported data, which cannot be simulated
         self._dataset = open_dataset(scene) if scene in bundled_datasets() else None
         self._entries = {entry_label(e, self._schema): e for e in self._dataset.select("test")} if self._dataset else {}
@@ -75,13 +83,14 @@ class TruthPanel(Panel):
             if self._dataset is not None:
                 self._browser = gui.add_dropdown("test sequence", (NONE, *self._entries))
                 self._browser.on_update(self._chosen)
-            upload = gui.add_upload_button("Open a motion...", color="gray", mime_type=".npz", hint=FORMAT)
+            kinds, hint = (".npz,.c3d", RECORDING) if self._layout else (".npz", FORMAT)
+            upload = gui.add_upload_button("Open a motion...", color="gray", mime_type=kinds, hint=hint)
             upload.on_upload(lambda event: self._upload(take_upload(event)))
             self._build_simulation(gui)
             self._back = gui.add_button("Set sliders to the truth", color="gray", visible=False)
             self._back.on_click(lambda _: self._set_sliders())
             self._physics = self._physics_note()
-            note = self._physics if self._scene else NO_SIMULATOR
+            note = self._physics if self._scene else NO_SIMULATION if self._layout else NO_SIMULATOR
             self._note = gui.add_markdown(note, visible=bool(note))
         page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
         self._refresh()
@@ -122,9 +131,14 @@ class TruthPanel(Panel):
 
     def _upload(self, file: viser.UploadedFile) -> None:
         try:
-            self.open(read_captured(content_of(file), file.name, self._schema, self._page.body))
+            self.open(self._read(content_of(file), file.name))
         except InputError as error:
             self._page.notices.show("Motion not opened", str(error))
+
+    def _read(self, content: bytes, name: str) -> MotionSequence:
+        if self._layout is None:
+            return read_captured(content, name, self._schema, self._page.body)
+        return recorded_release(released(markers_in(content, name), self._layout), name)
 
     async def _chosen(self, event: viser.GuiEvent) -> None:
         # a coroutine runs at once where the message arrives, before `_refresh` shows the old choice again

@@ -5,17 +5,23 @@
 
 The recording is one of github.com/srl-ethz/diffPD_sim2real (MIT): six markers on a beam of 30 x 30 x 100 mm that
 is clamped at one end, held straight, and let go, without or with a weight at its upper edge. Places of the markers,
-material and size are the authors'. Errors of the numbers, of the model and of the measurement stand side by side; they
-are not summed.
+material and size are the authors'. Errors of the numbers, of the model and of the measurement stand side by side;
+they are not summed.
+
+    python -m odeform_figures.studies.beam --model beam.safetensors
+
+writes the beam as a model of the page, without any recording: `odeform-viz --checkpoint beam.safetensors`, and *Open a
+motion...* there.
 """
 
 import argparse
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from odeform.checkpoint import Checkpoint, write_checkpoint
 from odeform.geometry.solids.block import block
 from odeform.identification.clamped import (
     LOSSES,
@@ -31,12 +37,17 @@ from odeform.identification.clamped import (
 from odeform.identification.release import MarkerLayout, Release, read_markers, released
 from odeform.mechanics.clamped import GRAVITY, ClampedBody, Weight, held_by_face
 from odeform.mechanics.quadratic import Stiffness, quadratic_mesh
+from odeform.models.clamped import clamped_checkpoint
 
-__all__ = ["AUTHORS", "LAYOUT", "beam", "main", "report"]
+__all__ = ["AUTHORS", "LAYOUT", "beam", "main", "model", "report"]
 
 SIZE = (0.03, 0.03, 0.1)  # m: height, width, length
 AUTHORS, POISSON, DENSITY = 263.8e3, 0.499, 1070.0  # Pa, and kg/m^3
 CELLS, FINER = 3, 4  # across the beam
+COARSE = (2, 2, 7)  # cells of the model of the page
+TILT = np.radians(6.5)  # of gravity out of the beam's normal, as both recordings say
+SHOWN = 2.0  # s
+HEIGHT = 0.1  # m of the beam above the grid of the page
 LAYOUT = MarkerLayout(
     tip={"Tip - 1": (0.036, 0.015, 0.1), "Tip - 2": (0.024, 0.036, 0.1), "Tip - 3": (0.006, -0.006, 0.1)},
     base={"Base - 1": (0.0, 0.04, 0.006), "Base - 2": (0.0275, -0.01, 0.006), "Base - 3": (-0.001, -0.01, 0.006)},
@@ -53,6 +64,27 @@ def beam(release: Release, grams: float = 0.0, cells: int = CELLS) -> ClampedBod
     weights = [Weight(1e-3 * grams, EDGE)] if grams else []
     held = held_by_face(mesh, 2, low=True)
     return ClampedBody(Stiffness(mesh, AUTHORS, POISSON), DENSITY, held, GRAVITY * release.gravity, weights)
+
+
+def model() -> Checkpoint:
+    """The beam as a model of the page, in the axes of a scene: it lies along y, and z is up."""
+
+    def placed(x: float, y: float, z: float) -> tuple[float, float, float]:
+        return float(y), float(z), HEIGHT + float(x)
+
+    points, elements = block(np.zeros(3), np.array(SIZE), COARSE)
+    corners = np.array([placed(*point) for point in points])
+    mesh = quadratic_mesh(corners, elements)
+    markers = {
+        "tip": {name: placed(*place) for name, place in LAYOUT.tip.items()},
+        "base": {name: placed(*place) for name, place in LAYOUT.base.items()},
+    }
+    gravity = GRAVITY * np.array([0.0, np.sin(TILT), -np.cos(TILT)])
+    edge = np.array([placed(*place) for place in EDGE])
+    held = held_by_face(mesh, 1, low=True)
+    made = clamped_checkpoint(corners, elements, held, (POISSON, DENSITY), gravity, edge, markers, SHOWN)
+    provenance = {"command": ["python -m odeform_figures.studies.beam --model FILE"]}
+    return replace(made, provenance=provenance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +186,17 @@ def _measured(study: _Study) -> dict[str, float]:
 def main() -> None:
     """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("recording", type=Path)
+    parser.add_argument("recording", type=Path, nargs="?")
+    parser.add_argument("--model", type=Path, metavar="FILE", help="write a checkpoint of the beam for the page")
     parser.add_argument("--weight", type=float, default=0.0, help="grams on the upper edge of the tip")
     parser.add_argument("--out", type=Path, help="a .json file to add the figures to, by the name of the recording")
     args = parser.parse_args()
+    if args.model:
+        write_checkpoint(args.model, model())
+    if args.recording is None:
+        if args.model is None:
+            parser.error("expected a recording, or --model")
+        return
     found = report(args.recording, args.weight)
     for name, value in found.items():
         print(f"{name:42} {value if isinstance(value, str) else format(value, '.4g')}")

@@ -68,8 +68,9 @@ class SolidMesh:
     changes: Changes
 
 
-def solid_inside(geometry: Geometry) -> SolidMesh:
-    """The solid that a mesh bounds, or that points or splats outline. It takes one to three seconds.
+def solid_inside(geometry: Geometry, nodes: int = NODES) -> SolidMesh:
+    """The solid of about so many nodes that a mesh bounds, or that points or splats outline. It takes one to three
+    seconds.
 
     Raises `InputError` where nothing is enclosed, or several bodies are.
     """
@@ -78,7 +79,7 @@ def solid_inside(geometry: Geometry) -> SolidMesh:
     spacing, points, elements = _fine(distance)
     out = distance.with_values(distance.values - OUTWARD * spacing)
     solid = Coarsening(points, elements, out)
-    solid.collapse(NODES)
+    solid.collapse(nodes)
     solid.improve()
     for _ in range(FITS):
         solid.project(distance)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from odeform.arrays import STEP
 from odeform.checkpoint import Checkpoint
 from odeform.errors import InputError
 from odeform.models.points.node_graph import NodeGraph
@@ -74,7 +75,8 @@ class PeGnn(PointPredictor):
         self._graph = NodeGraph(arrays["nodes"], self.frame)
         features = self._graph.features(self.schema, np.zeros((1, len(self.schema.learned)))).shape[2]
         self._network = new_network(features, config["width"], config["layers"])
-        weights = {k.removeprefix(PREFIX): torch.tensor(v) for k, v in arrays.items() if k.startswith(PREFIX)}
+        stored = {k: v for k, v in arrays.items() if k.startswith(PREFIX) and not k.endswith(STEP)}
+        weights = {k.removeprefix(PREFIX): torch.tensor(v) for k, v in stored.items()}
         if not all(torch.isfinite(weight).all() for weight in weights.values()):
             raise ValueError("weights: expected finite numbers")
         self._network.load_state_dict(weights)

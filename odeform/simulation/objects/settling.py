@@ -10,7 +10,7 @@ from odeform.simulation.objects.body import SoftBody
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
 from odeform.types import Ints, Points
 
-__all__ = ["REST_SPEED", "STEP", "rested", "settle"]
+__all__ = ["REST_SPEED", "STEP", "calmed", "rested", "settle"]
 
 STEP, COARSE = 5e-4, 2e-3  # s
 REST_SPEED = 1e-3  # m/s, RMS over the mass; a body counts as settled at a fifth of it
@@ -27,7 +27,7 @@ def settle(points: Points, elements: Ints, material: SoftMaterial, start: Points
     """
     positions = points - [0.0, 0.0, points[:, 2].min()] if start is None else start
     for step in (COARSE, STEP) if start is None else (STEP,):
-        positions = _calmed(_body(points, elements, material, step, positions))
+        positions = calmed(_body(points, elements, material, step, positions))
     body = _body(points, elements, material, STEP, positions)
     for _ in range(UNDAMPED):
         body.step()
@@ -53,7 +53,9 @@ def _body(points: Points, elements: Ints, material: SoftMaterial, step: float, p
     return body
 
 
-def _calmed(body: SoftBody) -> Points:
+def calmed(body: SoftBody) -> Points:
+    """(N, 3) m, where a body is that loses its velocity whenever its kinetic energy passes a maximum, until it is slow
+    or the steps are spent."""
     energy, calm = 0.0, 0
     for _ in range(LIMIT):
         body.step()

@@ -103,7 +103,7 @@ def test_a_body_that_cannot_rest_is_reported(monkeypatch):
 
 def test_a_body_whose_parts_collapse_under_its_weight_is_reported(monkeypatch):
     settling, item = "odeform.simulation.objects.settling", get_object("donut")
-    monkeypatch.setattr(f"{settling}._calmed", lambda _: item.points * [1.0, 1.0, -1.0])
+    monkeypatch.setattr(f"{settling}.calmed", lambda _: item.points * [1.0, 1.0, -1.0])
     monkeypatch.setattr(f"{settling}.UNDAMPED", 0)
     with pytest.raises(SimulationError, match=r"collapse under its weight: (\d+) of \1 tetrahedra are inside out"):
         settle(item.points, item.elements, item.material)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from clamped_bodies import clamped_bar, recording
 
 from odeform.dataset.store import open_dataset
 from odeform.models.base import Predictor
@@ -18,6 +19,7 @@ from odeform_viz.columns import Column
 from odeform_viz.panels import truth
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.truth import NONE, SIMULATED, TruthPanel, entry_label, physics_difference
+from odeform_viz.runtime import notices
 from odeform_viz.runtime.jobs import Report
 
 View = tuple[App, LoopbackClient]
@@ -186,3 +188,20 @@ def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:
     part = app.server.scene.get_handle_by_name(f"/world/column_{app.columns.all[0].key}/body/part_0")
     assert part is not None
     assert part.visible
+
+
+def test_a_recording_of_markers_stands_beside_the_clamped_body(
+    serve: Callable[..., View], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(notices.Notices, "show", lambda _, title, message: said.append(message))
+    model = clamped_bar()
+    app, client = serve(Column("beam", model, model.rest))
+    assert "mechanics: nothing of it is learned" in client.text()
+    client.upload("Open a motion...", "bar.npz", recording(model, model.schema.complete(None)))
+    assert client.until(lambda: app.columns.truth is not None)
+    assert client.until(lambda: "error now:" in client.text())
+    client.set("stiffness (kPa)", 300.0)
+    assert client.until(lambda: app.panel(ParameterPanel).parameters()["young"] == 300.0)
+    client.upload("Open a motion...", "other.npz", b"PK nothing")
+    assert client.until(lambda: any("expected a .c3d, or an .npz" in message for message in said))

@@ -12,7 +12,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.models.points.node_graph import NodeGraph
 from odeform.models.points.pe_gnn import PeGnn, new_network
-from odeform.models.points.point_model import PREFIX, frame_to_json
+from odeform.models.points.point_model import PREFIX, frame_to_json, weights_in_steps
 from odeform.models.points.training.fit import CLIP
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
@@ -99,7 +99,8 @@ def fit_graphs(data: PointData, rest: Mesh, budget: Budget, seed: int, report: C
         descend(learner, budget, report)
     settings = {"width": config.width, "layers": config.layers, "frame": frame_to_json(graph.frame)}
     val = {"val_rmse_mm": learner.best[0], "steps": learner.done, "seconds": learner.elapsed}
-    arrays = {"nodes": graph.nodes, **{PREFIX + name: weight for name, weight in learner.best[1].items()}}
+    weights = weights_in_steps({PREFIX + name: weight for name, weight in learner.best[1].items()})
+    arrays = {"nodes": graph.nodes, **weights}
     return Checkpoint(PeGnn.model, data.schema, {**settings, "val": val}, arrays)
 
 
