@@ -19,6 +19,7 @@ from odeform.models.modal.elastic_body import ElasticBody, elastic_body
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
 from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
+from odeform.models.modal.user_part import forces_in
 from odeform.models.per_object import PerObject
 from odeform.motion.recent import Recent
 from odeform.motion.validity import Validity
@@ -165,7 +166,7 @@ class UserBodyPredictor(ModalModel):
         return UserBodyPredictor(self.trained.under(load), self.user_body)
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
-        return self.user_body.item.forces
+        return forces_in(self.user_body.item, self.rest, parameters, self.load)
 
     @cached_property
     def validity(self) -> Validity:

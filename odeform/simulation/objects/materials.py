@@ -3,11 +3,12 @@
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.geometry.contact import RADIUS
-from odeform.simulation.objects.soft_object import SoftMaterial
+from odeform.geometry.contact import RADIUS, SurfacePoint
+from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
+from odeform.simulation.objects.thickness import thickness_at
 from odeform.surroundings import GRAVITY
 
-__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_name", "material_of"]
+__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_at", "forces_on", "material_name", "material_of"]
 
 SILICONE = "silicone Ecoflex 00-50, cast solid: 83 kPa at 100 %, 1,070 kg/m^3 (Smooth-On, technical bulletin)"
 FOAM = "flexible polyurethane foam: 10 to 200 kPa, 25 to 300 kg/m^3 (Gibson and Ashby 1997, Cellular Solids, ch. 5)"
@@ -88,3 +89,14 @@ def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[fl
     dents = 4.0 / 3.0 * stiffness * np.sqrt(RADIUS) * (DENT * thickness) ** 1.5
     strongest = float(min(dents, LIFTS * GRAVITY * mass))
     return WEAKEST * strongest, strongest
+
+
+def forces_at(item: SoftObject, contact: SurfacePoint) -> tuple[float, float]:
+    """Newton, weakest and strongest at a contact on the resting surface of a user's own body.
+
+    They are those of the body (`SoftObject.forces`), or less where it is thinner than in the median: what dents its
+    trunk visibly breaks an ear.
+    """
+    thickness = thickness_at(item.rest_mesh(), contact)
+    dents = forces_on(item.material, thickness, item.mass)
+    return min(item.forces[0], dents[0]), min(item.forces[1], dents[1])
