@@ -170,17 +170,18 @@ class UserBodyPredictor(ModalModel):
 
     @cached_property
     def validity(self) -> Validity:
-        return replace(super().validity, untrained=f"{self.describe_motion()}, {self._describe_error()}")
+        return replace(super().validity, untrained=f"{self.describe_motion()}, {self.describe_error()}")
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
         return f"its motion follows from its shape, its material, and the {self.user_body.like}'s contact parameters"
 
-    def _describe_error(self) -> str:
+    def describe_error(self) -> str:
+        """Says what is known of its error: on how many other shapes it was measured, and how far this one is away."""
         if self._band is None:
             return "with an unknown error"
         away = 100.0 * self.distance
-        return f"with an error as measured on other unseen shapes; it is {away:.1f} % from the {self.user_body.like}"
+        return f"with an error {self._band.describe()}; it is {away:.1f} % from the {self.user_body.like}"
 
     @property
     def bodies(self) -> tuple[Mesh, ...]:

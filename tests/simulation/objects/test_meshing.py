@@ -42,7 +42,7 @@ def test_what_is_long_behind_its_tip_is_as_thick_as_it_is_wide():
 def test_a_thin_place_is_pushed_less_and_a_thick_one_never_more():
     cat = replace(get_object("cat"), forces=(0.9, 3.0))
     rest = cat.rest_mesh()
-    ear = nearest_on(rest, rest.points[rest.points[:, 2].argmax()].astype(float))
+    ear = nearest_on(rest, rest.points[thicknesses(rest).argmin()].astype(float))
     belly = nearest_on(rest, rest.points.astype(float).mean(axis=0) + np.array([0.0, 0.3, 0.0]))
     assert forces_at(cat, belly) == cat.forces
     weak, strong = forces_at(cat, ear)
