@@ -23,6 +23,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--shape", nargs="+", action="extend", default=[], metavar="MESH", help="scanned solids to measure as well"
     )
     parser.add_argument(
+        "--simulated",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="DIR",
+        help="folders of `odeform simulate contact-force --geometry FILE` to measure as well",
+    )
+    parser.add_argument(
         "--data",
         metavar="DATASET",
         help="training data: each class is also predicted as a shape that is like another class",
@@ -58,6 +66,7 @@ def run(args: argparse.Namespace) -> None:
         not args.no_instances,
         args.code,
         scans,
+        tuple(Path(folder) for folder in args.simulated),
         args.data,
         args.workers,
         args.kept_only,

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
 from odeform.io import atomic_open
 from odeform.parallel import parallel_map
-from odeform.schema import Parameters
+from odeform.schema import OBJECT, Parameters
 from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.files import arrays_of, object_of
@@ -22,6 +23,7 @@ from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.objects.user_object import object_name
 from odeform.simulation.scenes.contact_force import simulate_object
+from odeform.simulation.user_data import body_in
 from odeform.types import Geometry, MotionSequence
 
 __all__ = [
@@ -37,8 +39,10 @@ __all__ = [
     "scan",
     "shape_file",
     "simulated",
+    "taught",
 ]
 
+SPLITS = ("test", "val", "train")
 INSTANCE, SCAN, BY_CODE, LEFT_OUT = "other instance", "scanned shape", "shape by code", "class left out"
 
 
@@ -81,6 +85,17 @@ def by_code(key: str, name: str) -> UnseenShape:
     from odeform_figures.bodies.hard import HARD
 
     return _placed(HARD[name](), key, BY_CODE)
+
+
+def taught(folder: Path, count: int) -> UnseenShape:
+    """The body of a folder that `odeform simulate SCENE --geometry FILE` wrote, with its first `count` motions."""
+    dataset, body = open_dataset(folder), body_in(folder)
+    if body is None:
+        raise InputError(f"{folder}: expected motions of a shape of your own")
+    window, finished = dataset.schema.window, [entry for split in SPLITS for entry in dataset.select(split)]
+    motions = (dataset.read(entry).frames(window.stop, window.rate) for entry in finished[:count])
+    pushed = (replace(one, parameters={k: v for k, v in one.parameters.items() if k != OBJECT}) for one in motions)
+    return UnseenShape(folder.name, SCAN, body.like, body.item, tuple(pushed))
 
 
 def _placed(geometry: Geometry, name: str, kind: str) -> UnseenShape:

@@ -31,6 +31,7 @@ from odeform_figures.unseen.shapes import (
     scan,
     shape_file,
     simulated,
+    taught,
 )
 
 __all__ = ["Plan", "attach_band", "unseen"]
@@ -55,6 +56,8 @@ class Plan:
     code: bool = False
     """Whether shapes that are made by code (`odeform_figures.bodies.hard`) are measured."""
     scans: tuple[Path, ...] = ()
+    folders: tuple[Path, ...] = ()
+    """Folders of a body of one's own with motions that are simulated already."""
     data: str | None = None
     """Training data, to leave one class out; None: this is not measured."""
     workers: int | None = None
@@ -122,6 +125,8 @@ def _shapes(trained: PerObject, plan: Plan, failed: dict[str, list[str]]) -> Ite
                 failed[key] = [str(error)]
             else:
                 yield shape, trained
+    for folder in plan.folders:
+        yield taught(folder, plan.pushes), trained
     if plan.data is not None:
         dataset = open_dataset(plan.data)
         for name in trained.parts:
