@@ -42,6 +42,7 @@ __all__ = [
     "taught",
 ]
 
+MOTIONS = 10  # of a shape that is simulated already
 SPLITS = ("test", "val", "train")
 INSTANCE, SCAN, BY_CODE, LEFT_OUT = "other instance", "scanned shape", "shape by code", "class left out"
 
@@ -87,13 +88,13 @@ def by_code(key: str, name: str) -> UnseenShape:
     return _placed(HARD[name](), key, BY_CODE)
 
 
-def taught(folder: Path, count: int) -> UnseenShape:
-    """The body of a folder that `odeform simulate SCENE --geometry FILE` wrote, with its first `count` motions."""
+def taught(folder: Path) -> UnseenShape:
+    """The body of a folder that `odeform simulate SCENE --geometry FILE` wrote, with its first motions."""
     dataset, body = open_dataset(folder), body_in(folder)
     if body is None:
         raise InputError(f"{folder}: expected motions of a shape of your own")
     window, finished = dataset.schema.window, [entry for split in SPLITS for entry in dataset.select(split)]
-    motions = (dataset.read(entry).frames(window.stop, window.rate) for entry in finished[:count])
+    motions = (dataset.read(entry).frames(window.stop, window.rate) for entry in finished[:MOTIONS])
     pushed = (replace(one, parameters={k: v for k, v in one.parameters.items() if k != OBJECT}) for one in motions)
     return UnseenShape(folder.name, SCAN, body.like, body.item, tuple(pushed))
 

@@ -126,7 +126,7 @@ def _shapes(trained: PerObject, plan: Plan, failed: dict[str, list[str]]) -> Ite
             else:
                 yield shape, trained
     for folder in plan.folders:
-        yield taught(folder, plan.pushes), trained
+        yield taught(folder), trained
     if plan.data is not None:
         dataset = open_dataset(plan.data)
         for name in trained.parts:
