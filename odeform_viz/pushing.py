@@ -130,7 +130,7 @@ def push_shown(column: Column, motion: Motion | RecordedMotion) -> ShownPush | N
         count = min(NEIGHBOURS, len(points))
         carriers = np.atleast_1d(KDTree(points).query(contact.point, count)[1])
         weights = np.full(count, 1.0 / count)
-    strongest = column.predictor.force_range(parameters)[1] if column.predictor else contacts.forces_on(name)[1]
+    strongest = column.predictor.force_range({OBJECT: name})[1] if column.predictor else contacts.forces_on(name)[1]
     # a place on the body moves with it when it sags; a loaded shape is only about where the body is
     offset = np.zeros(3) if len(carriers) == len(contact.barycentric) and weights is contact.barycentric else None
     offset = contact.point - weights @ points[carriers] if offset is None else offset
@@ -169,7 +169,7 @@ def push_excess(push: Push, forces: tuple[float, float], known: str = "trained")
     """Says in words in what a push is beyond those that are `known`, "trained" or "measured", and how far these go."""
     excess = {}
     if push.strength > forces[1] * (1.0 + 1e-6):
-        excess["force"] = f"{known} up to {forces[1]:g} N"
+        excess["force"] = f"{known} up to {forces[1]:.3g} N"
     if push.strength > 0.0 and push.steep:
         excess["direction"] = f"{known} up to {math.degrees(CONE):.0f}° off the inward normal"
     return excess

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from odeform.formats.bundled import moving_part
+from odeform.geometry.carried_colors import colored_like
 from odeform.models.base import Predictor
 from odeform.models.modal.taught_body import TaughtBodyPredictor, item_of, taught
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor, takes_user_bodies, user_body
 from odeform.simulation.objects.materials import material_of
 from odeform.simulation.objects.soft_object import SoftObject
+from odeform.types import Mesh
 from odeform_viz.columns import Column
 from odeform_viz.fitting import readable_shape
 
@@ -26,6 +28,7 @@ __all__ = [
     "simulated_item",
     "takes_user_bodies",
     "user_body_of",
+    "with_own_colors",
     "with_user_body",
     "without_user_body",
 ]
@@ -55,6 +58,13 @@ def describe_user_body(body: UserBody) -> str:
 def user_body_of(predictor: Predictor | None) -> UserBody | None:
     """The user's own body that a model moves, taught or not; None for trained bodies."""
     return predictor.user_body if isinstance(predictor, UserBodyPredictor | TaughtBodyPredictor) else None
+
+
+def with_own_colors(surface: Mesh, predictor: Predictor | None) -> Mesh:
+    """The surface that the simulator moves of the user's own body, in the colours of the shape; others as they are."""
+    body = user_body_of(predictor)
+    same = body is not None and np.array_equal(surface.faces, body.item.faces)
+    return colored_like(surface, body.fit.geometry) if same and body is not None else surface
 
 
 def simulated_item(predictor: Predictor | None, parameters: Mapping[str, Any]) -> SoftObject | None:

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from odeform.checkpoint import Checkpoint, arrays_of_object, write_checkpoint
 from odeform.errors import InputError
+from odeform.geometry.contact import SurfacePoint
 from odeform.geometry.upright import stand_up
 from odeform.loads.load import Load
 from odeform.loads.registry import PUSH, get_load, known_loads
@@ -24,7 +25,7 @@ from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, Parameters
-from odeform.simulation.contacts import complete_push
+from odeform.simulation.contacts import CONTACT, complete_push
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
@@ -273,7 +274,7 @@ class Predictor(ABC):
         if self.schema.objects:
             body = {OBJECT: self.schema.check_object(given.get(OBJECT, self.schema.objects[0]))}
             if self.surroundings is not None and self.surroundings.contacts is not None:
-                given = complete_push({**body, **given}, self.rest_of(body), self.force_range(body))
+                given = complete_push({**body, **given}, self.rest_of(body), partial(self._forces_there, body))
             given = {**self.model_of(body).own_values, **given}
         return self.schema.complete(given)
 
@@ -286,11 +287,16 @@ class Predictor(ABC):
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
         """Returns the weakest and strongest force in newton on the body that `parameters` select, in training.
 
+        A body of the user's own has smaller ones at contacts where it is thin; without a contact, the most anywhere.
         Raises `InputError` in scenes in which no sphere pushes.
         """
         if self.surroundings is None or self.surroundings.contacts is None:
             raise InputError(f"scene {self.schema.scene}: no sphere pushes its bodies")
         return self.surroundings.contacts.forces_on(str(parameters.get(OBJECT, "")))
+
+    def _forces_there(self, body: Mapping[str, Any], contact: SurfacePoint) -> tuple[float, float]:
+        named = {f"{CONTACT}_{axis}": float(x) for axis, x in zip("xyz", contact.point, strict=True)}
+        return self.force_range({**body, **named})
 
     def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
         """The trained body at rest that `parameters` select in a scene with objects; `rest` in all other scenes."""

@@ -107,6 +107,10 @@ class PerObject(Predictor):
     def model_of(self, parameters: Parameters) -> Predictor:
         return self.parts[parameters[OBJECT]]
 
+    def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
+        part = self.parts.get(parameters.get(OBJECT, ""))
+        return super().force_range(parameters) if part is None else part.force_range(parameters)
+
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         return self.parts[parameters[OBJECT]].settled(parameters)
 

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from odeform.geometry.contact import CONE, surface_point, touching_centre
+from odeform.simulation.contacts import Forces, forces_there
 from odeform.types import Floats, Ints, Mesh, Vector
 
 __all__ = ["contact_draws", "in_cone_about"]
@@ -12,7 +13,7 @@ BATCH = 256  # candidates at a time, a power of 2 as Sobol points want
 LEVELS = 10  # bits of each coordinate in the order of the faces
 
 
-def contact_draws(rest: Mesh, forces: tuple[float, float], count: int, seed: list[int]) -> list[tuple[Vector, Vector]]:
+def contact_draws(rest: Mesh, forces: Forces, count: int, seed: list[int]) -> list[tuple[Vector, Vector]]:
     """Draws `count` pairs of a contact (3,) m on the surface and a force (3,) N, of scrambled Sobol points.
 
     Contacts are uniform over the area where the sphere fits, directions over the cone about the inward normal, and
@@ -32,7 +33,8 @@ def contact_draws(rest: Mesh, forces: tuple[float, float], count: int, seed: lis
             if touching_centre(rest, contact) is None:
                 continue
             direction = in_cone_about(-contact.normal, u[3], u[4])
-            drawn.append((contact.point, (forces[0] + u[5] * (forces[1] - forces[0])) * direction))
+            weakest, strongest = forces_there(forces, contact)
+            drawn.append((contact.point, (weakest + u[5] * (strongest - weakest)) * direction))
             if len(drawn) == count:
                 break
     return drawn

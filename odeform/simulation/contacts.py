@@ -1,16 +1,30 @@
 """Scenes in which a sphere pushes a body: their parameters are `object`, `contact_x` to `_z`, `force_x` to `_z`."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from odeform.geometry.contact import nearest_on
+from odeform.geometry.contact import SurfacePoint, nearest_on
 from odeform.geometry.push import TOWARDS, Push, default_contact, push_of
 from odeform.schema import Parameters
 from odeform.types import Mesh, Vector
 
-__all__ = ["CONTACT", "FORCE", "MASS", "YOUNG", "complete_push", "contact_parameters", "push_from", "vector_of"]
+__all__ = [
+    "CONTACT",
+    "FORCE",
+    "MASS",
+    "YOUNG",
+    "Forces",
+    "complete_push",
+    "contact_parameters",
+    "forces_there",
+    "push_from",
+    "vector_of",
+]
+
+Forces: TypeAlias = tuple[float, float] | Callable[[SurfacePoint], tuple[float, float]]
+"""The weakest and the strongest push in newton: the same everywhere on a body, or those at a contact."""
 
 MIDDLING = 0.7  # from the weakest to the strongest force of an object: that of a push that is not given
 CONTACT, FORCE = "contact", "force"
@@ -18,10 +32,10 @@ MASS, YOUNG = "mass", "young"
 """Names the parameters of the body in kg and kPa, where they are parameters; otherwise it has its own."""
 
 
-def complete_push(given: Mapping[str, Any], rest: Mesh, forces: tuple[float, float]) -> dict[str, Any]:
+def complete_push(given: Mapping[str, Any], rest: Mesh, forces: Forces) -> dict[str, Any]:
     """A contact and a force for those that are not given, on a body at rest.
 
-    `forces` are the weakest and the strongest on it in newton. The contact is a visible point of its surface, on the
+    The contact is a visible point of its surface, on the
     side that a given force pushes from; the force is of middling strength, straight into the surface. What is given
     only in part, or is not a number, is left alone.
     """
@@ -36,9 +50,14 @@ def complete_push(given: Mapping[str, Any], rest: Mesh, forces: tuple[float, flo
         at = default_contact(rest, -force if pushed else TOWARDS)  # pyright: ignore[reportOptionalOperand]
     else:
         at = nearest_on(rest, contact)
-    weakest, strongest = forces
+    weakest, strongest = forces_there(forces, at)
     push = Push(at, weakest + MIDDLING * (strongest - weakest))
     return {**contact_parameters(push), **given}
+
+
+def forces_there(forces: Forces, contact: SurfacePoint) -> tuple[float, float]:
+    """Newton, weakest and strongest at a contact."""
+    return forces(contact) if callable(forces) else forces
 
 
 def _given(given: Mapping[str, Any], name: str) -> Vector | None:

@@ -3,12 +3,13 @@
 import math
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import viser
 
 from odeform.errors import InputError
-from odeform.geometry.contact import CONE, nearest_on, touching_centre
+from odeform.geometry.contact import CONE, SurfacePoint, nearest_on, touching_centre
 from odeform.geometry.push import Push, push_of
 from odeform.loads.registry import known_as
 from odeform.schema import OBJECT, Parameter
@@ -28,6 +29,7 @@ __all__ = ["PushPanel"]
 MARGIN = 1.5  # times the strongest trained force: the end of the slider
 WIDEST = 60.0  # degrees of each tilt
 STRAIGHT, BACK = "no tilt", "defaults"
+THIN = "Here the body is thin: {:.2g} to {:.2g} N suit it, elsewhere up to {:.2g} N."
 HINT = "Click the body to choose where {what}. Drag the ball at the arrow's tail to change the force."
 
 
@@ -108,7 +110,8 @@ class PushPanel(Panel):
         self._page.wake()
 
     def pick(self, column: Column | None, point: Vector) -> None:
-        """Move the contact to a point (3,) m of the shape at rest, with the same force in its frame.
+        """Move the contact to a point (3,) m of the shape at rest, with the same force in its frame, as strong for the
+        place as it was.
 
         Without a column nothing happens: a click on the floor is meant for nothing.
         """
@@ -121,7 +124,7 @@ class PushPanel(Panel):
                 contact = nearest_on(self._surface, point)
                 if self._sphere and touching_centre(self._surface, contact) is None:
                     raise InputError("The sphere does not fit there: the floor or a part of the body is in its way.")
-                self._adopt(push_from(parameters, self._surface).at(contact))
+                self._adopt(self._suited(push_from(parameters, self._surface), contact))
                 self._write()
         except InputError as error:
             self._page.notices.show("Contact not moved", str(error))
@@ -164,10 +167,17 @@ class PushPanel(Panel):
         assert predictor is not None
         return predictor.complete({OBJECT: name})
 
-    def _forces(self) -> tuple[float, float]:
+    def _forces(self, parameters: Mapping[str, Any] | None = None) -> tuple[float, float]:
+        """Newton, weakest and strongest at the contact of parameters; by default on the whole body."""
         predictor = self._page.model.predictor
         assert predictor is not None
-        return predictor.force_range(self._parameters)
+        return predictor.force_range(parameters or {OBJECT: self._parameters[OBJECT]})
+
+    def _suited(self, push: Push, contact: SurfacePoint) -> Push:
+        """The push at another contact: a body of the user's own takes less where it is thin."""
+        moved = push.at(contact)
+        here, there = (self._forces({**self._parameters, **contact_parameters(p)})[1] for p in (push, moved))
+        return replace(moved, strength=push.strength * there / here)
 
     def _of_body(self) -> list[Parameter]:
         """The properties of the body that is pushed."""
@@ -243,10 +253,13 @@ class PushPanel(Panel):
         with self._lock:
             parameters = self._parameters
             push = push_from(parameters, self._surface)
-        excess = push_excess(push, self._forces(), known_as(self._schema.scene))
+        forces, most = self._forces(parameters), self._forces()
+        excess = push_excess(push, forces, known_as(self._schema.scene))
         parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
         warning = f"⚠ **beyond what is known**: {parts}  \n" if excess else ""
-        set_content(self._text, warning + HINT.format(what="the sphere pushes" if self._sphere else "it is kicked"))
+        what = "the sphere pushes" if self._sphere else "it is kicked"
+        thin = f"  \n{THIN.format(forces[0], forces[1], most[1])}" if forces[1] < most[1] else ""
+        set_content(self._text, warning + HINT.format(what=what) + thin)
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
         # a coroutine runs soon where the message arrives, before a drag that follows it

@@ -33,10 +33,7 @@ def _motion(model: UserBodyPredictor | None) -> str:
     if model is None:
         return "It moves as the trained body would; no error is known"
     motion = model.describe_motion().capitalize()
-    if not model.knows_untrained_errors:
-        return f"{motion}; no error is known"
-    away = f"{100.0 * model.distance:.1f} % of its size"
-    return f"{motion}. Its error is estimated from other unseen shapes: it is {away} from the {model.user_body.like}"
+    return f"{motion}, {model.describe_error()}"
 
 
 class ShapeWarningPanel(Panel):

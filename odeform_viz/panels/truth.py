@@ -23,7 +23,7 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.panels.uploads import content_of, take_upload
 from odeform_viz.pushing import contacts_of
 from odeform_viz.runtime.jobs import Job, simulate_motion, simulate_user_body
-from odeform_viz.user_bodies import simulated_item
+from odeform_viz.user_bodies import simulated_item, with_own_colors
 from odeform_viz.view import Description
 from odeform_viz.words import constant_text, plain
 
@@ -125,7 +125,8 @@ class TruthPanel(Panel):
     def open(self, sequence: MotionSequence, origin: str = "") -> None:
         """Show a sequence as truth, and move the sliders to its parameters."""
         motion = RecordedMotion(self._schema, sequence)
-        self._columns.add(Column("truth", motion, motion.geometry, origin=origin))
+        shown = with_own_colors(motion.geometry, self._page.model.predictor)
+        self._columns.add(Column("truth", motion, shown, origin=origin))
         self._page.controls.set_parameters(sequence.parameters)
         self._page.columns_changed()
 

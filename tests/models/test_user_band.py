@@ -1,9 +1,18 @@
 """The error band of shapes that were not trained."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from odeform.models.modal.shape_band import ShapeBand, ShapeErrors, coverage, fit_shape_band
+from odeform.models.modal.shape_band import (
+    ShapeBand,
+    ShapeErrors,
+    calibrated_shape_band,
+    coverage,
+    coverages_left_out,
+    fit_shape_band,
+)
 
 TIMES = np.arange(1, 20) / 100.0
 
@@ -38,6 +47,38 @@ def test_errors_that_shrink_with_distance_do_not_narrow_the_band() -> None:
     band = fit_shape_band(shapes(20, 0, by_distance=-0.5), TIMES)
     assert band.by_distance == 0.0
     assert band.by_size > 0.0
+
+
+def one_by_one(count: int, seed: int) -> list[ShapeErrors]:
+    """Shapes of which each has a level of its own: of few of them, a fit is too sure of the next."""
+    rng = np.random.default_rng([seed, 1])
+    found = shapes(count, seed)
+    return [replace(one, errors=one.errors * np.exp(0.8 * rng.standard_normal())) for one in found]
+
+
+def test_a_band_that_is_calibrated_by_shapes_covers_nine_in_ten_of_the_next() -> None:
+    fitted, calibrated = [], []
+    for seed in range(8):
+        few, next_ones = one_by_one(12, seed), one_by_one(40, 100 + seed)
+        fitted.append(coverage(fit_shape_band(few, TIMES), next_ones))
+        calibrated.append(coverage(calibrated_shape_band(few, TIMES), next_ones))
+    assert np.mean(fitted) < 0.87
+    assert 0.88 < np.mean(calibrated) < 0.96
+
+
+def test_coverage_is_measured_on_shapes_that_are_left_out_in_turn() -> None:
+    known = one_by_one(14, 0)
+    found = coverages_left_out(known, TIMES)
+    assert len(found) == 14
+    assert 0.8 < np.mean(found) < 0.97
+    far = replace(known[0], errors=1e3 * known[0].errors)
+    assert coverages_left_out([far, *known[1:]], TIMES)[0] == 0.0, "it does not calibrate itself"
+
+
+def test_a_band_says_of_how_many_shapes_it_is() -> None:
+    band = replace(calibrated_shape_band(shapes(11, 0), TIMES), covered=0.91)
+    assert band.describe() == "as measured on 11 other unseen shapes, of which the 90 % band covers 91 % when left out"
+    assert ShapeBand.from_json(band.to_json()) == band
 
 
 def test_a_band_returns_from_json() -> None:

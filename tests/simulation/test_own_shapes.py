@@ -9,8 +9,10 @@ import pytest
 
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
+from odeform.geometry.contact import nearest_on
 from odeform.simulation.contacts import vector_of
 from odeform.simulation.objects.catalog import get_object
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.user_object import BODY, UserObject, object_name, read_user_object, write_user_object
 from odeform.simulation.scenes.user_object import scene_with
 from odeform.simulation.user_data import body_in, digest, simulate_item
@@ -47,8 +49,11 @@ def test_pushes_are_drawn_on_the_body_and_within_its_ranges() -> None:
     assert {row["object"] for row in rows} == {"ring"}
     assert not any(scene.schema.outside(row) for row in rows)
     strengths = [np.linalg.norm(vector_of(row, "force")) for row in rows]
-    weakest, strongest = item.forces
-    assert weakest <= min(strengths) < max(strengths) <= strongest
+    assert max(strengths) <= item.forces[1]
+    rest = item.rest_mesh()
+    for row, strength in zip(rows, strengths, strict=True):
+        weakest, strongest = forces_at(item, nearest_on(rest, vector_of(row, "contact")))
+        assert weakest - 1e-6 <= strength <= strongest + 1e-6
     assert scene_with("object-drop", item).sample(2, 0)[0]["object"] == "ring"
 
 

@@ -14,6 +14,7 @@ from odeform.cli import main
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
+from odeform.geometry.contact import nearest_on
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.modal.elastic_body import elastic_body
@@ -23,6 +24,8 @@ from odeform.models.modal.training import refine as refining
 from odeform.models.modal.user_body import UserBody, UserBodyPredictor
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load
+from odeform.simulation.contacts import vector_of
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.user_data import body_in, simulate_item
 from odeform.training import refine as refinement
 from odeform.training.refine import refine
@@ -74,6 +77,9 @@ def test_the_checkpoint_holds_the_body_that_can_be_simulated(dataset: Dataset, r
     assert np.array_equal(item.elements, body.item.elements)
     assert np.abs(item.settled - body.item.settled).max() < 1e-7
     assert refined.force_range({"object": "block"}) == body.item.forces
+    given = refined.complete({"object": "block"})
+    there = forces_at(item, nearest_on(refined.rest, vector_of(given, "contact")))
+    assert refined.force_range(given) == there
     assert item_of(load("contact-force"), {"object": "donut"}) is None
     kicked = refined.under("kick")
     assert kicked.force_range({"object": "block"})[1] > body.item.forces[1]

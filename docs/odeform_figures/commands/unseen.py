@@ -23,13 +23,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--shape", nargs="+", action="extend", default=[], metavar="MESH", help="scanned solids to measure as well"
     )
     parser.add_argument(
+        "--simulated",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="DIR",
+        help="folders of `odeform simulate contact-force --geometry FILE` to measure as well",
+    )
+    parser.add_argument(
         "--data",
         metavar="DATASET",
-        help="training data: each class is also predicted by contact parameters of the others",
+        help="training data: each class is also predicted as a shape that is like another class",
     )
     parser.add_argument(
         "--object", nargs="+", action="extend", default=[], metavar="NAME", help="classes of instances (default: all)"
     )
+    parser.add_argument("--no-instances", action="store_true", help="leave out other instances of the classes")
+    parser.add_argument("--code", action="store_true", help="measure shapes that are made by code as well")
     parser.add_argument("--pushes", type=int, default=10, metavar="N", help="simulated for each shape (default: 10)")
     add_seed(parser, "contacts and forces")
     parser.add_argument(
@@ -48,7 +58,19 @@ def run(args: argparse.Namespace) -> None:
     positive("--pushes", args.pushes)
     positive("--workers", args.workers)
     scans, objects = tuple(Path(path) for path in args.shape), tuple(args.object)
-    plan = Plan(Path(args.keep), args.pushes, args.seed, objects, scans, args.data, args.workers, args.kept_only)
+    plan = Plan(
+        Path(args.keep),
+        args.pushes,
+        args.seed,
+        objects,
+        not args.no_instances,
+        args.code,
+        scans,
+        tuple(Path(folder) for folder in args.simulated),
+        args.data,
+        args.workers,
+        args.kept_only,
+    )
     result = unseen(args.checkpoint, plan)
     write_json(result, args.json)
     print(_report(result))
@@ -76,9 +98,10 @@ def _report(result: dict[str, Any]) -> str:
     for name, reasons in result["not_simulated"].items():
         lines.append(f"{name}: no motion to compare with, {reasons[0]}")
     if result["coverage_90"] is not None:
-        found = result["coverage_90"]
+        found = list(result["coverage_90"].values())
+        least = min(result["coverage_90"], key=result["coverage_90"].__getitem__)
         lines.append(
-            f"90 % error band, fitted on half of the shapes, on the others: covers {100.0 * found['mean']:.0f} % "
-            f"(four in five halves: {100.0 * found['p10']:.0f} to {100.0 * found['p90']:.0f} %)"
+            f"90 % error band, calibrated by all other shapes: covers {100.0 * sum(found) / len(found):.0f} % of the "
+            f"frames of {len(found)} shapes, which count alike; least {100.0 * min(found):.0f} % ({least})"
         )
     return "\n".join(lines)

@@ -10,21 +10,41 @@ from typing import Any
 
 import numpy as np
 
+from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.formats.reading import read_geometry
 from odeform.io import atomic_open
 from odeform.parallel import parallel_map
-from odeform.schema import Parameters
+from odeform.schema import OBJECT, Parameters
 from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.files import arrays_of, object_of
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
+from odeform.simulation.objects.user_object import object_name
 from odeform.simulation.scenes.contact_force import simulate_object
-from odeform.types import MotionSequence
+from odeform.simulation.user_data import body_in
+from odeform.types import Geometry, MotionSequence
 
-__all__ = ["INSTANCE", "LEFT_OUT", "SCAN", "UnseenShape", "instance", "pushes_of", "scan", "shape_file", "simulated"]
+__all__ = [
+    "BY_CODE",
+    "INSTANCE",
+    "LEFT_OUT",
+    "SCAN",
+    "UnseenShape",
+    "by_code",
+    "codes",
+    "instance",
+    "pushes_of",
+    "scan",
+    "shape_file",
+    "simulated",
+    "taught",
+]
 
-INSTANCE, SCAN, LEFT_OUT = "other instance", "scanned shape", "class left out"
+MOTIONS = 10  # of a shape that is simulated already
+SPLITS = ("test", "val", "train")
+INSTANCE, SCAN, BY_CODE, LEFT_OUT = "other instance", "scanned shape", "shape by code", "class left out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +53,7 @@ class UnseenShape:
 
     name: str
     kind: str
-    """`INSTANCE`, `SCAN` or `LEFT_OUT`."""
+    """`INSTANCE`, `SCAN`, `BY_CODE` or `LEFT_OUT`."""
     like: str
     """The object whose material and forces it has."""
     item: SoftObject
@@ -51,16 +71,49 @@ def instance(key: str, name: str, factors: Mapping[str, float]) -> UnseenShape:
 
 def scan(path: Path) -> UnseenShape:
     """The body of a mesh, points or splats, aligned automatically. `InputError` for a file that holds no solid."""
+    return _placed(read_geometry(path), path.stem, SCAN)
+
+
+def codes() -> dict[str, str]:
+    """Names of shapes that are made by code, by names that a file can have."""
+    from odeform_figures.bodies.hard import HARD
+
+    return {object_name(name): name for name in HARD}
+
+
+def by_code(key: str, name: str) -> UnseenShape:
+    """The body of a shape of `codes`, called `key`. `InputError` for one that does not stand."""
+    from odeform_figures.bodies.hard import HARD
+
+    return _placed(HARD[name](), key, BY_CODE)
+
+
+def taught(folder: Path) -> UnseenShape:
+    """The body of a folder that `odeform simulate SCENE --geometry FILE` wrote, with its first motions."""
+    dataset, body = open_dataset(folder), body_in(folder)
+    if body is None:
+        raise InputError(f"{folder}: expected motions of a shape of your own")
+    window, finished = dataset.schema.window, [entry for split in SPLITS for entry in dataset.select(split)]
+    motions = (dataset.read(entry).frames(window.stop, window.rate) for entry in finished[:MOTIONS])
+    pushed = (replace(one, parameters={k: v for k, v in one.parameters.items() if k != OBJECT}) for one in motions)
+    return UnseenShape(folder.name, SCAN, body.like, body.item, tuple(pushed))
+
+
+def _placed(geometry: Geometry, name: str, kind: str) -> UnseenShape:
     from odeform.simulation.objects.from_mesh import placed_object
     from odeform.simulation.objects.settling import rested
 
-    placed = placed_object(read_geometry(path), path.stem)
-    return UnseenShape(path.stem, SCAN, placed.like, rested(placed.item))
+    placed = placed_object(geometry, name)
+    return UnseenShape(name, kind, placed.like, rested(placed.item))
 
 
-def pushes_of(item: SoftObject, count: int, seed: int) -> list[Parameters]:
-    """Draws `count` contacts and forces on a body, as parameters of the scene: the same draw for every shape."""
-    drawn = contact_draws(item.rest_mesh(), item.forces, count, [seed])
+def pushes_of(item: SoftObject, count: int, seed: int, own: bool = False) -> list[Parameters]:
+    """Draws `count` contacts and forces on a body, as parameters of the scene: the same draw for every shape.
+
+    On one of the user's `own` they are weaker where it is thin.
+    """
+    forces = partial(forces_at, item) if own else item.forces
+    drawn = contact_draws(item.rest_mesh(), forces, count, [seed])
     named = [(("contact", contact), ("force", force)) for contact, force in drawn]
     return [
         {f"{key}_{axis}": float(x) for key, vector in push for axis, x in zip("xyz", vector, strict=True)}
@@ -80,7 +133,7 @@ def simulated(
     if path.exists():
         return _read(path)
     shape = make()
-    pushes = pushes_of(shape.item, count, seed)
+    pushes = pushes_of(shape.item, count, seed, shape.kind in (SCAN, BY_CODE))
     done = parallel_map(f"simulate {shape.name}", partial(_run, shape.item), pushes, workers)
     motions = tuple(motion for motion in done if isinstance(motion, MotionSequence))
     shape = replace(shape, motions=motions, failed=tuple(reason for reason in done if isinstance(reason, str)))

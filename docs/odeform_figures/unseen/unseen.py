@@ -1,6 +1,5 @@
 """How well a mechanical model moves shapes that it was not trained on, against the simulator on these very shapes."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,24 +9,35 @@ from typing import Any
 import numpy as np
 
 from odeform.checkpoint import read_checkpoint, resolve_checkpoint, write_checkpoint
-from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
-from odeform.io import atomic_write
-from odeform.mechanics.contact_parameters import ContactParameters
-from odeform.models.modal.shape_band import SHAPE_BAND, ShapeErrors, coverage, fit_shape_band
+from odeform.models.modal.shape_band import SHAPE_BAND, ShapeErrors, calibrated_shape_band, coverages_left_out
 from odeform.models.modal.user_body import UserBodyPredictor, resting_body, takes_user_bodies
 from odeform.models.per_object import PerObject
 from odeform.models.registry import load
+from odeform.simulation.errors import SimulationError
 from odeform_figures.unseen.instances import factors_of
-from odeform_figures.unseen.left_out import contact_parameters_without, left_out_shape, without
+from odeform_figures.unseen.left_out import left_out_shape, without
 from odeform_figures.unseen.measure import Measured, measure
-from odeform_figures.unseen.shapes import INSTANCE, LEFT_OUT, SCAN, UnseenShape, instance, scan, shape_file, simulated
+from odeform_figures.unseen.shapes import (
+    BY_CODE,
+    INSTANCE,
+    LEFT_OUT,
+    SCAN,
+    UnseenShape,
+    by_code,
+    codes,
+    instance,
+    scan,
+    shape_file,
+    simulated,
+    taught,
+)
 
 __all__ = ["Plan", "attach_band", "unseen"]
 
-BARS = {INSTANCE: 1.5, SCAN: 2.5, LEFT_OUT: 4.0}
-HALVES = 50  # random halves of the shapes on which the error band is fitted, and its coverage measured on the others
+BARS = {INSTANCE: 1.5, SCAN: 2.5, BY_CODE: 2.5, LEFT_OUT: 4.0}
+FEWEST = 4  # shapes of which one is left out in turn
 
 
 @dataclass(frozen=True)
@@ -35,18 +45,24 @@ class Plan:
     """Settings of what is measured."""
 
     keep: Path
-    """Folder of simulated motions and contact parameters; what it holds is not made again."""
+    """Folder of simulated motions; what it holds is not made again."""
     pushes: int = 10
     """Number of pushes of each shape."""
     seed: int = 0
     objects: tuple[str, ...] = ()
     """Classes with other instances; none: those of the model."""
+    instances: bool = True
+    """Whether other instances of classes are measured."""
+    code: bool = False
+    """Whether shapes that are made by code (`odeform_figures.bodies.hard`) are measured."""
     scans: tuple[Path, ...] = ()
+    folders: tuple[Path, ...] = ()
+    """Folders of a body of one's own with motions that are simulated already."""
     data: str | None = None
     """Training data, to leave one class out; None: this is not measured."""
     workers: int | None = None
     kept_only: bool = False
-    """Whether shapes and contact parameters that the folder does not hold are left out instead of made."""
+    """Whether shapes that the folder does not hold are left out instead of made."""
 
 
 def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
@@ -59,8 +75,9 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
     if not isinstance(trained, PerObject) or not takes_user_bodies(trained):
         raise InputError(f"checkpoint {checkpoint}: expected a mechanical model of several objects")
     seen = trained.checkpoint.scores["per_object"]
-    found, failed = [], {}
-    for shape, model in _shapes(trained, plan):
+    found: list[Measured] = []
+    failed: dict[str, list[str]] = {}
+    for shape, model in _shapes(trained, plan, failed):
         if shape.motions:
             found.append(_measured(model, shape))
         else:
@@ -70,6 +87,8 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
     rows = {one.shape.name: one.to_json(seen[_class_of(one.shape)]) for one in found}
     errors = [ShapeErrors(one.distance, np.sqrt((one.predicted**2).mean(axis=1)), one.errors) for one in found]
     times = trained.schema.window.times[1:]
+    covered = coverages_left_out(errors, times) if len(errors) >= FEWEST else []
+    band = replace(calibrated_shape_band(errors, times), covered=float(np.mean(covered)) if covered else 0.0)
     return {
         "checkpoint": trained.checkpoint.sha256,
         "pushes": plan.pushes,
@@ -77,8 +96,8 @@ def unseen(checkpoint: str | Path, plan: Plan) -> dict[str, Any]:
         "shapes": rows,
         "not_simulated": failed,
         "kinds": {kind: _mean([row for row in rows.values() if row["kind"] == kind]) for kind in BARS},
-        "coverage_90": _held_out_coverage(errors, times),
-        SHAPE_BAND: fit_shape_band(errors, times).to_json(),
+        "coverage_90": dict(zip(rows, covered, strict=True)) if covered else None,
+        SHAPE_BAND: band.to_json(),
     }
 
 
@@ -89,22 +108,30 @@ def attach_band(checkpoint: str | Path, result: dict[str, Any]) -> None:
     write_checkpoint(path, replace(found, config={**found.config, SHAPE_BAND: result[SHAPE_BAND]}))
 
 
-def _shapes(trained: PerObject, plan: Plan) -> Iterator[tuple[UnseenShape, PerObject]]:
-    """All shapes with their motions, and the model that has not seen them."""
-    for name in plan.objects or tuple(trained.parts):
+def _shapes(trained: PerObject, plan: Plan, failed: dict[str, list[str]]) -> Iterator[tuple[UnseenShape, PerObject]]:
+    """All shapes with their motions, and the model that has not seen them. Why a shape is no body is added to
+    `failed`."""
+    for name in (plan.objects or tuple(trained.parts)) if plan.instances else ():
         for key, factors in factors_of(name).items():
             if _wanted(plan, _file(plan, key)):
                 yield _kept(plan, key, partial(instance, key, name, factors)), trained
-    for path in plan.scans:
-        if _wanted(plan, _file(plan, path.stem)):
-            yield _kept(plan, path.stem, partial(scan, path)), trained
+    own: dict[str, Callable[[], UnseenShape]] = {path.stem: partial(scan, path) for path in plan.scans}
+    own |= {key: partial(by_code, key, name) for key, name in (codes() if plan.code else {}).items()}
+    for key, make in own.items():
+        if _wanted(plan, _file(plan, key)):
+            try:
+                shape = _kept(plan, key, make)
+            except (InputError, SimulationError) as error:
+                failed[key] = [str(error)]
+            else:
+                yield shape, trained
+    for folder in plan.folders:
+        yield taught(folder), trained
     if plan.data is not None:
         dataset = open_dataset(plan.data)
         for name in trained.parts:
-            path = plan.keep / f"law-without-{name}.json"
-            if _wanted(plan, path):
-                model = without(trained, name, _contact_parameters(trained, dataset, name, path))
-                yield left_out_shape(dataset, name, model), model
+            model = without(trained, name)
+            yield left_out_shape(dataset, name, model), model
 
 
 def _file(plan: Plan, key: str) -> Path:
@@ -117,13 +144,6 @@ def _wanted(plan: Plan, path: Path) -> bool:
 
 def _kept(plan: Plan, key: str, make: Callable[[], UnseenShape]) -> UnseenShape:
     return simulated(_file(plan, key), make, plan.pushes, plan.seed, plan.workers)
-
-
-def _contact_parameters(trained: PerObject, dataset: Dataset, name: str, path: Path) -> ContactParameters:
-    if not path.exists():
-        contact_parameters = contact_parameters_without(trained, dataset, name, print)
-        atomic_write(path, json.dumps(contact_parameters.to_json(), indent=1).encode())
-    return ContactParameters.from_json(json.loads(path.read_text()))
 
 
 def _measured(model: PerObject, shape: UnseenShape) -> Measured:
@@ -149,16 +169,3 @@ def _mean(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "better_than_nearest": sum(row["model_mm"] < row["nearest_mm"] for row in rows),
         "better_than_rigid": sum(row["model_mm"] <= row["rigid_mm"] for row in rows),
     }
-
-
-def _held_out_coverage(errors: Sequence[ShapeErrors], times: np.ndarray) -> dict[str, float] | None:
-    """Coverage of bands that are fitted on a random half of the shapes, on the other half; None for few shapes."""
-    if len(errors) < 4:
-        return None
-    rng, found = np.random.default_rng(0), []
-    for _ in range(HALVES):
-        order = rng.permutation(len(errors))
-        one, other = ([errors[at] for at in part] for part in np.array_split(order, 2))
-        found.append(coverage(fit_shape_band(one, times), other))
-    low, high = np.quantile(found, [0.1, 0.9])
-    return {"mean": float(np.mean(found)), "p10": float(low), "p90": float(high)}

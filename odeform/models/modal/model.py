@@ -30,6 +30,7 @@ from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
 from odeform.models.modal.loaded import SUPPORT as SIDES
 from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
+from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
 from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
@@ -45,6 +46,7 @@ from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
 from odeform.motion.validity import Validity
 from odeform.schema import Parameters
 from odeform.simulation.contacts import MASS, YOUNG
+from odeform.simulation.objects.soft_object import SoftObject
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, Times, Vectors
 
@@ -190,6 +192,16 @@ class ModalModel(Model):
         """Mass in kg and Young's modulus in kPa of the body as it was measured, of those that are parameters."""
         known = {MASS: self.body.solid.mass, YOUNG: self._young}
         return {p.name: known[p.name] for p in self.schema.parameters if p.name in known}
+
+    @cached_property
+    def solid(self) -> SoftObject | None:
+        """Reads the solid of a user's own body that it was refined for; None for one of the scene's objects."""
+        return item_in(self.checkpoint.arrays, self.checkpoint.config)
+
+    def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
+        if self.solid is None:
+            return super().force_range(parameters)
+        return forces_in(self.solid, self.rest, parameters, self.load)
 
     def changed(self, parameters: Mapping[str, Any]) -> "ModalModel":
         """The model of this body with the mass and the stiffness that parameters give it."""

@@ -12,7 +12,6 @@ from odeform.models.modal.model import ModalModel
 from odeform.models.modal.user_body import UserBody
 from odeform.models.modal.user_part import item_in
 from odeform.models.per_object import PerObject
-from odeform.schema import OBJECT
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.types import Mesh
 
@@ -81,9 +80,6 @@ class TaughtBodyPredictor(ModalModel):
 
     def under(self, load: str) -> Predictor:
         return TaughtBodyPredictor(self.whole.under(load), self.user_body)
-
-    def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
-        return self.whole.force_range({OBJECT: self.whole.schema.objects[0]})
 
     @property
     def bodies(self) -> tuple[Mesh, ...]:

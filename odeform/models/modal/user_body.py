@@ -19,6 +19,7 @@ from odeform.models.modal.elastic_body import ElasticBody, elastic_body
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
 from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
+from odeform.models.modal.user_part import forces_in
 from odeform.models.per_object import PerObject
 from odeform.motion.recent import Recent
 from odeform.motion.validity import Validity
@@ -165,21 +166,22 @@ class UserBodyPredictor(ModalModel):
         return UserBodyPredictor(self.trained.under(load), self.user_body)
 
     def force_range(self, parameters: Mapping[str, Any]) -> tuple[float, float]:
-        return self.user_body.item.forces
+        return forces_in(self.user_body.item, self.rest, parameters, self.load)
 
     @cached_property
     def validity(self) -> Validity:
-        return replace(super().validity, untrained=f"{self.describe_motion()}, {self._describe_error()}")
+        return replace(super().validity, untrained=f"{self.describe_motion()}, {self.describe_error()}")
 
     def describe_motion(self) -> str:
         """Says what decides the motion of the body, as the start of a sentence in lower case."""
         return f"its motion follows from its shape, its material, and the {self.user_body.like}'s contact parameters"
 
-    def _describe_error(self) -> str:
+    def describe_error(self) -> str:
+        """Says what is known of its error: on how many other shapes it was measured, and how far this one is away."""
         if self._band is None:
             return "with an unknown error"
         away = 100.0 * self.distance
-        return f"with an error as measured on other unseen shapes; it is {away:.1f} % from the {self.user_body.like}"
+        return f"with an error {self._band.describe()}; it is {away:.1f} % from the {self.user_body.like}"
 
     @property
     def bodies(self) -> tuple[Mesh, ...]:

@@ -1,14 +1,19 @@
-"""The solid of a user's own body in a checkpoint, so that it can be simulated again."""
+"""The solid of a user's own body in a checkpoint, so that it can be simulated again, and the forces that suit it."""
 
 import json
 from collections.abc import Mapping
 from typing import Any
 
+from odeform.geometry.contact import nearest_on
+from odeform.loads.kick import STRONGER
+from odeform.loads.load import Load
+from odeform.simulation.contacts import CONTACT, vector_of
 from odeform.simulation.objects.files import arrays_of, object_of
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
-from odeform.types import Arrays
+from odeform.types import Arrays, Mesh
 
-__all__ = ["SOLID", "item_in", "parts_of_item"]
+__all__ = ["SOLID", "forces_in", "item_in", "parts_of_item"]
 
 SOLID = "solid"
 """The key of its settings, and the start of the names of its arrays."""
@@ -28,3 +33,13 @@ def item_in(arrays: Arrays, config: Mapping[str, Any]) -> SoftObject | None:
         return None
     own = {key.removeprefix(f"{SOLID}."): array for key, array in arrays.items() if key.startswith(f"{SOLID}.")}
     return object_of({**own, "about": json.dumps(config[SOLID])})
+
+
+def forces_in(item: SoftObject, rest: Mesh, parameters: Mapping[str, Any], load: Load | None) -> tuple[float, float]:
+    """Newton, weakest and strongest on a body that rests as `rest`: at the contact of `parameters`, if they have one,
+    else the most anywhere. Under a load other than a push these are the peaks of a kick."""
+    if f"{CONTACT}_x" in parameters:
+        weakest, strongest = forces_at(item, nearest_on(rest, vector_of(parameters, CONTACT)))
+    else:
+        weakest, strongest = item.forces
+    return (weakest, strongest) if load is None else (STRONGER * weakest, STRONGER * strongest)

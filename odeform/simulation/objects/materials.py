@@ -1,13 +1,16 @@
 """The materials of the seven objects and those to choose from, and the forces that dent a body visibly."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.geometry.contact import RADIUS
-from odeform.simulation.objects.soft_object import SoftMaterial
+from odeform.geometry.contact import RADIUS, SurfacePoint
+from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
+from odeform.simulation.objects.thickness import thickness_at
 from odeform.surroundings import GRAVITY
 
-__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_on", "material_name", "material_of"]
+__all__ = ["CHOICE", "FORCES", "MATERIALS", "forces_at", "forces_on", "material_name", "material_of"]
 
 SILICONE = "silicone Ecoflex 00-50, cast solid: 83 kPa at 100 %, 1,070 kg/m^3 (Smooth-On, technical bulletin)"
 FOAM = "flexible polyurethane foam: 10 to 200 kPa, 25 to 300 kg/m^3 (Gibson and Ashby 1997, Cellular Solids, ch. 5)"
@@ -38,11 +41,9 @@ FORCES: dict[str, tuple[float, float]] = {
 PLUSH = (
     "polyester filling, as the softest flexible foams: 10 kPa and more, 25 kg/m^3 and more (Gibson and Ashby, ch. 5)"
 )
-DOUGH = (
-    "wheat flour dough at small strain: 10 to 40 kPa, 1,100 to 1,200 kg/m^3 (Uthayakumaran et al. 2002, Rheol. Acta 41)"
-)
+DOUGH = "chosen: the order of magnitude of wheat dough at small strain (Uthayakumaran et al. 2002, Rheol. Acta 41)"
 NATURAL = "soft natural rubber of Shore A 20: 0.7 MPa (Gent 1958, Rubber Chem. Technol. 31, 896), 1,000 kg/m^3"
-BOARD = "corrugated board across its flutes, about 1 MPa and 150 kg/m^3 (an estimate of its order of magnitude)"
+BOARD = "chosen: corrugated board that is pressed flat, of which no published figure was found"
 CORK = "cork: 13 to 20 MPa, 170 kg/m^3, Poisson's ratio 0 to 0.1 (Gibson et al. 1981, Proc. R. Soc. A 377, 99)"
 
 CHOICE: dict[str, SoftMaterial] = {
@@ -79,7 +80,8 @@ def material_of(text: str) -> SoftMaterial:
 def material_name(material: SoftMaterial) -> str:
     """What `material_of` reads as that material: the name of one to choose from, or stiffness and density."""
     numbers = f"{1e-3 * material.young:g}:{material.density:g}"
-    return next((name for name, known in CHOICE.items() if known == material), numbers)
+    unnamed = replace(material, source="")  # its words may change
+    return next((name for name, known in CHOICE.items() if replace(known, source="") == unnamed), numbers)
 
 
 def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[float, float]:
@@ -88,3 +90,14 @@ def forces_on(material: SoftMaterial, thickness: float, mass: float) -> tuple[fl
     dents = 4.0 / 3.0 * stiffness * np.sqrt(RADIUS) * (DENT * thickness) ** 1.5
     strongest = float(min(dents, LIFTS * GRAVITY * mass))
     return WEAKEST * strongest, strongest
+
+
+def forces_at(item: SoftObject, contact: SurfacePoint) -> tuple[float, float]:
+    """Newton, weakest and strongest at a contact on the resting surface of a user's own body.
+
+    They are those of the body (`SoftObject.forces`), or less where it is thinner than in the median: what dents its
+    trunk visibly breaks an ear.
+    """
+    thickness = thickness_at(item.rest_mesh(), contact)
+    dents = forces_on(item.material, thickness, item.mass)
+    return min(item.forces[0], dents[0]), min(item.forces[1], dents[1])

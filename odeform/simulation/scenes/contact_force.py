@@ -11,7 +11,7 @@ from odeform.geometry.solids.tetrahedra import inside_out
 from odeform.loads.arrow import Arrow
 from odeform.schema import OBJECT, Parameter, Parameters, Schema, Window
 from odeform.simulation.contact_draws import contact_draws
-from odeform.simulation.contacts import MASS, YOUNG, vector_of
+from odeform.simulation.contacts import MASS, YOUNG, Forces, vector_of
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.objects.soft_object import SoftObject
@@ -149,8 +149,8 @@ def sample(name: str, count: int, seed: int) -> list[dict[str, Any]]:
     return drawn_on(item, item.forces, count, seed)
 
 
-def drawn_on(item: SoftObject, forces: tuple[float, float], count: int, seed: int) -> list[dict[str, Any]]:
-    """`count` contacts and forces on an object, from the weakest to the strongest of `forces` in newton."""
+def drawn_on(item: SoftObject, forces: Forces, count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` contacts and forces on an object, from the weakest to the strongest of `forces`."""
     drawn = contact_draws(item.rest_mesh(), forces, count, [seed, zlib.crc32(item.name.encode())])
     return [
         {

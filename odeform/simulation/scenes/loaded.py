@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from odeform.geometry.contact import SurfacePoint
 from odeform.loads.arrow import Arrow
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
@@ -13,6 +14,7 @@ from odeform.loads.obstacle import Obstacle
 from odeform.schema import OBJECT, Parameters, Schema
 from odeform.simulation.loaded import STEP, released, simulate_situation
 from odeform.simulation.objects.catalog import OBJECTS, get_object
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.physics import GRAVITY
 from odeform.simulation.scene import Scene
@@ -55,9 +57,10 @@ def start_of(load: Load, item: SoftObject, parameters: Parameters) -> Mesh:
     return Mesh(points[: item.surface_count].astype(np.float32), item.faces)
 
 
-def forces_of(item: SoftObject) -> tuple[float, float]:
-    """The weakest and the strongest peak of a kick on a body, in newton."""
-    return STRONGER * item.forces[0], STRONGER * item.forces[1]
+def forces_of(item: SoftObject, contact: SurfacePoint | None = None) -> tuple[float, float]:
+    """The weakest and the strongest peak of a kick on a body, in newton; at a contact, where one is given."""
+    weakest, strongest = item.forces if contact is None else forces_at(item, contact)
+    return STRONGER * weakest, STRONGER * strongest
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.loads.registry import load_of_scene
 from odeform.schema import Parameter, Parameters, Schema
-from odeform.simulation.contacts import CONTACT, FORCE, complete_push
+from odeform.simulation.contacts import CONTACT, FORCE, Forces, complete_push
+from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.contact_force import drawn_on, simulate_object
@@ -34,7 +36,9 @@ def scene_with(name: str, item: SoftObject) -> Scene:
         raise InputError(f"scene {name}: it has one body of its own; expected a scene of soft objects to push")
     load = load_of_scene(name)
     pushed = known.contacts is not None
-    forces = item.forces if load is None else forces_of(item)
+    forces, there = (
+        (item.forces, partial(forces_at, item)) if load is None else (forces_of(item), partial(forces_of, item))
+    )
 
     def simulate(parameters: Parameters, **options: Any) -> MotionSequence:
         return (
@@ -44,7 +48,7 @@ def scene_with(name: str, item: SoftObject) -> Scene:
         )
 
     def draw(_: str, count: int, seed: int) -> list[dict[str, Any]]:
-        return drawn_on(item, forces, count, seed)
+        return drawn_on(item, there, count, seed)
 
     sampler: Callable[..., Any] | None = draw if known.sampler is not None else None
     contacts = None
@@ -52,7 +56,7 @@ def scene_with(name: str, item: SoftObject) -> Scene:
         contacts = Contacts({item.name: forces}, known.contacts.pulse, known.contacts.radius)
     return replace(
         known,
-        schema=_schema(known.schema, item, forces if pushed else None),
+        schema=_schema(known.schema, item, forces[1], there if pushed else None),
         simulate=simulate,
         rest_mesh=item.rest_mesh,
         count=COUNT,
@@ -61,18 +65,19 @@ def scene_with(name: str, item: SoftObject) -> Scene:
     )
 
 
-def _schema(schema: Schema, item: SoftObject, forces: tuple[float, float] | None) -> Schema:
-    """The schema with one object; where a body is pushed, by up to `forces` N, with contacts and forces of its own."""
+def _schema(schema: Schema, item: SoftObject, strongest: float, there: Forces | None) -> Schema:
+    """The schema with one object; where a body is pushed, by up to `strongest` N, with contacts and forces of its
+    own."""
     schema = replace(schema, objects=(item.name,))
-    if forces is None:
+    if there is None:
         return schema
     rest = item.rest_mesh()
     points = rest.points.astype(float)
     slack = SLACK * float(np.ptp(points, axis=0).max())
     low, high = points.min(axis=0) - slack, points.max(axis=0) + slack
-    defaults = complete_push({}, rest, forces)
+    defaults = complete_push({}, rest, there)
     ranges = {f"{CONTACT}_{axis}": (low[i], high[i]) for i, axis in enumerate("xyz")}
-    ranges |= {f"{FORCE}_{axis}": (-forces[1], forces[1]) for axis in "xyz"}
+    ranges |= {f"{FORCE}_{axis}": (-strongest, strongest) for axis in "xyz"}
 
     def ranged(parameter: Parameter) -> Parameter:
         if parameter.name not in ranges:

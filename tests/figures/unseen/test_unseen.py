@@ -24,10 +24,12 @@ from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import PULSE, SCENE
 from odeform.types import Floats, Mesh, MotionSequence
 from odeform_figures.bodies.generate import generate
+from odeform_figures.bodies.hard import BAD
 from odeform_figures.unseen.left_out import without
 from odeform_figures.unseen.measure import measure
 from odeform_figures.unseen.predictions import nearest_motion
 from odeform_figures.unseen.shapes import INSTANCE, UnseenShape, pushes_of, shape_file, simulated
+from odeform_figures.unseen.unseen import Plan, unseen
 
 NAMES = ("donut", "bottle")
 QUALITIES = {name: {"method": "limex", "step": 5e-3, "dtype": "float64"} for name in ("draft", "balanced", "reference")}
@@ -158,11 +160,24 @@ def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, 
     assert NOMINAL == 0.9
 
 
-def test_an_object_that_is_left_out_is_gone_and_the_others_have_one_law(trained: PerObject) -> None:
-    contact_parameters = ContactParameters(floor_friction=0.123)
-    found = without(trained, "donut", contact_parameters)
-    assert tuple(found.parts) == ("bottle",)
-    assert found.parts["bottle"].contact_parameters == contact_parameters  # pyright: ignore[reportAttributeAccessIssue]
+def test_an_object_that_is_left_out_is_gone(trained: PerObject) -> None:
+    found = without(trained, "donut")
+    assert tuple(found.parts) == found.schema.objects == ("bottle",)
+
+
+def test_a_shape_by_code_that_is_no_body_is_named_with_the_reason(
+    checkpoint: Checkpoint, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("odeform_figures.bodies.hard.HARD", {"flat sheet": BAD["plane"]})
+    monkeypatch.setattr("odeform_figures.unseen.left_out.MOTIONS", 1)
+    path = tmp_path / "model.safetensors"
+    write_checkpoint(path, checkpoint)
+    plan = Plan(tmp_path / "keep", 1, instances=False, code=True, data="contact-force", workers=1)
+    found = unseen(path, plan)
+    assert "encloses no volume" in found["not_simulated"]["flat-sheet"][0]
+    assert set(found["shapes"]) == {"bottle", "donut"}
+    assert found["coverage_90"] is None, "too few shapes"
+    assert found["own_band"]["shapes"] == 2
 
 
 def test_finished_shapes_are_read_again_and_failed_pushes_are_named(

@@ -1,18 +1,21 @@
 """From foreign meshes to soft objects."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from odeform.errors import InputError
+from odeform.geometry.contact import nearest_on
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.canonical import most_like, plausible_scale
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.objects.files import arrays_of, read_object
 from odeform.simulation.objects.from_mesh import placed_object
-from odeform.simulation.objects.materials import CHOICE, forces_on, material_of
+from odeform.simulation.objects.materials import CHOICE, forces_at, forces_on, material_of
 from odeform.simulation.objects.settling import settle
-from odeform.simulation.objects.thickness import thicknesses
+from odeform.simulation.objects.thickness import thickness_at, thicknesses
 from odeform.types import Mesh
 
 
@@ -26,6 +29,25 @@ def shape_of(mesh: Mesh) -> trimesh.Trimesh:
 
 def test_the_thickness_of_a_ball_is_its_diameter():
     assert thicknesses(mesh_of(trimesh.creation.icosphere(3, 0.05))) == pytest.approx(0.1, rel=0.02)
+
+
+def test_what_is_long_behind_its_tip_is_as_thick_as_it_is_wide():
+    bar = mesh_of(trimesh.creation.cylinder(0.02, 0.3, sections=64).subdivide())
+    tip = thickness_at(bar, nearest_on(bar, np.array([0.003, 0.002, 0.15])))
+    assert 0.02 < tip < 0.04
+    plate = mesh_of(trimesh.creation.box((0.3, 0.3, 0.02)))
+    assert thickness_at(plate, nearest_on(plate, np.array([0.02, 0.03, 0.01]))) == pytest.approx(0.02, rel=1e-3)
+
+
+def test_a_thin_place_is_pushed_less_and_a_thick_one_never_more():
+    cat = replace(get_object("cat"), forces=(0.9, 3.0))
+    rest = cat.rest_mesh()
+    ear = nearest_on(rest, rest.points[thicknesses(rest).argmin()].astype(float))
+    belly = nearest_on(rest, rest.points.astype(float).mean(axis=0) + np.array([0.0, 0.3, 0.0]))
+    assert forces_at(cat, belly) == cat.forces
+    weak, strong = forces_at(cat, ear)
+    assert strong < 0.5 * cat.forces[1]
+    assert weak == pytest.approx(0.3 * strong)
 
 
 def test_a_file_returns_what_was_written(tmp_path):

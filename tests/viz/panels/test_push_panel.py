@@ -160,3 +160,36 @@ def test_mass_and_stiffness_are_sliders_of_the_object(serve) -> None:
     client.set("object", "chip")
     assert client.until(lambda: app.request().parameters["object"] == "chip")
     assert app.request().parameters["mass"] == pytest.approx(0.0041, rel=0.02)
+
+
+class ThinOnTop(PushedPredictor):
+    """A body that takes a tenth of the force on its upper half."""
+
+    def force_range(self, parameters):
+        weakest, strongest = super().force_range(parameters)
+        part = 0.1 if parameters.get("contact_z", 0.0) > 0.03 else 1.0
+        return part * weakest, part * strongest
+
+
+def test_where_a_body_is_thin_a_click_pushes_less_and_says_so(serve) -> None:
+    model = ThinOnTop()
+    app, client = serve(Column("stub", model, model.rest, origin=""), moment=0.02)
+    panel, body = app.panel(PushPanel), surface(app, DONUT)
+
+    def strength() -> float:
+        return float(np.linalg.norm(vector_of(app.request().parameters, "force")))
+
+    def side_and_top() -> tuple[np.ndarray, np.ndarray]:
+        points = body.points.astype(float)
+        return points[np.abs(points[:, 2] - 0.025).argmin()], points[points[:, 2].argmax()]
+
+    side, top = side_and_top()
+    panel.pick(app.page.model, side)
+    client.set("force (N)", 3.0)
+    assert client.until(lambda: strength() == pytest.approx(3.0))
+    panel.pick(app.page.model, top)
+    assert strength() == pytest.approx(0.3)
+    assert client.until(lambda: "Here the body is thin: 0.1 to 0.4 N suit it, elsewhere up to 4 N" in client.text())
+    panel.pick(app.page.model, side)
+    assert strength() == pytest.approx(3.0)
+    assert client.until(lambda: "Here the body is thin" not in client.text())
