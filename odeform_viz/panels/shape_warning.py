@@ -1,6 +1,7 @@
 """Always visible while a shape is shown that was not trained: how far it is from what was trained."""
 
 from collections.abc import Iterable
+from html import escape
 
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform_viz.page import Page, Panel
@@ -11,7 +12,7 @@ from odeform_viz.view import Description
 
 __all__ = ["ShapeWarningPanel", "shape_warning"]
 
-STYLE = "margin:-5px -10px;padding:5px 10px;border-radius:6px;background:#b54708;color:#fff;max-width:34em"
+STYLE = "margin:-5px -10px;padding:3px 10px;border-radius:6px;background:#b54708;color:#fff"
 
 
 def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBodyPredictor | None = None) -> str:
@@ -23,10 +24,9 @@ def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBod
     if not untrained:
         return ""
     worst = max(untrained, key=lambda similarity: similarity.mean)
-    return (
-        f'<div style="{STYLE}"><b>⚠ Shape not trained</b><br>Its surface is on average {1e3 * worst.mean:.0f} mm from '
-        f"the trained body's, at most {1e3 * worst.distance:.0f} mm. {_motion(model)}.</div>"
-    )
+    away = f"on average {1e3 * worst.mean:.0f} mm from the trained body's"
+    more = f"At most {1e3 * worst.distance:.0f} mm. {_motion(model)}."
+    return f'<div style="{STYLE}" title="{escape(more)}">⚠ <b>Shape not trained</b>: its surface is {away}</div>'
 
 
 def _motion(model: UserBodyPredictor | None) -> str:

@@ -1,5 +1,6 @@
 """How far the current frame can be trusted, what acts, and why a request cannot be met; always in view."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -12,11 +13,21 @@ from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.pushing import describe_push, first_push, outside_of_push
 from odeform_viz.view import ColumnFrame, Description, Frame
-from odeform_viz.words import known_range
+from odeform_viz.words import known_range, parameter_title
 
 __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
+INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
+PHYSICS, UNTESTED, REFUSED = "physics only", "not tested", "not modelled"
+WHY = {
+    INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
+    EXTRAPOLATED: "The model has not learned from simulations like this one; its motion is carried on from them.",
+    UNTRAINED: "The model has learned from simulations of other shapes.",
+    PHYSICS: "Elasticity and contacts move the body. Nothing was learned of this kind of motion but its contacts.",
+    UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
+    REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
+}
 UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
 
 
@@ -26,44 +37,51 @@ class Badge:
 
     level: str
     text: str
+    """A word or two; `WHY` has the rest."""
+    detail: str = ""
+    """What it is of, such as the parameters that are outside."""
     expected: str = ""
     """The error that is expected; empty where no model is in view."""
 
     @property
     def html(self) -> str:
-        """The text in the colour of its level, with the expected error."""
-        return f'<span class="odeform-badge {self.level}">{escape(self.text)}</span> {escape(self.expected)}'
+        """The text in the colour of its level, and beside it the detail with the expected error."""
+        beside = escape("; ".join(filter(None, (self.detail, self.expected))))
+        why = escape(WHY.get(self.text, ""))
+        return f'<span class="odeform-badge {self.level}" title="{why}">{escape(self.text)}</span> {beside}'
 
 
 def badge_of(frame: Frame) -> Badge:
     """The least that holds for all models in view."""
     models = [c for c in frame.columns if c.column.predictor]
     if not models:
-        return Badge("unknown", "only the truth is in view" if frame.columns else "no column is in view")
-    expected = _expected(models[0], alone=len(models) == 1)
+        return Badge("unknown", "no model in view", "only the truth" if frame.columns else "")
     for shown in models:
         if stop := shown.stop_at(frame.request.time):
-            return Badge("unknown", f"not modelled: {stop}")
+            return Badge("unknown", REFUSED, str(stop))
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
-            return Badge("unknown", f"not modelled: only t = {only:.3g} s is predicted, and shown")
-    schema = models[0].motion.schema
-    outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
-    if models[0].motion.extrapolates(frame.request.time):
-        outside.insert(0, "time")
-    where = f"extrapolated: {', '.join(outside)} outside the {known_range(schema)}" if outside else ""
+            return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
+    expected, outside = _expected(models[0], alone=len(models) == 1), _outside(frame, models)
     if untrained := [c for c in models if c.untrained]:
         known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
-        text = "; ".join(filter(None, ("shape not trained", where)))
-        return Badge("outside" if known else "unknown", text, expected)
-    if load_of_scene(schema.scene) is not None:
+        return Badge("outside" if known else "unknown", UNTRAINED, outside, expected)
+    if load_of_scene(models[0].motion.schema.scene) is not None:
         # amber: what moves it is modelled, and no data say how well under this load
-        text = "; ".join(filter(None, ("mechanics: only its contacts were fitted", where)))
-        return Badge("outside", text, expected)
+        return Badge("outside", PHYSICS, outside, expected)
     if any(c.changed for c in models):
-        where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
-        return Badge("unknown", where, expected)
-    return Badge("outside", where, expected) if outside else Badge("inside", "inside the trained range", expected)
+        return Badge("unknown", UNTESTED, "; ".join(filter(None, ("mass or stiffness", outside))), expected)
+    return Badge("outside", EXTRAPOLATED, outside, expected) if outside else Badge("inside", INSIDE, "", expected)
+
+
+def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:
+    """What is beyond the data, in words; empty if nothing is."""
+    schema = models[0].motion.schema
+    titles = {p.name: parameter_title(p) for p in schema.parameters}
+    names = [titles.get(name, name) for c in models for name in c.motion.outside] + outside_of_push(frame)
+    if models[0].motion.extrapolates(frame.request.time):
+        names.insert(0, "time")
+    return f"{' and '.join(dict.fromkeys(names))} beyond the {known_range(schema)}" if names else ""
 
 
 def _expected(shown: ColumnFrame, alone: bool) -> str:
@@ -73,7 +91,7 @@ def _expected(shown: ColumnFrame, alone: bool) -> str:
         return f"{of}error not known"
     # outside of what was measured the band is carried on
     rough = "roughly " if shown.motion.outside or shown.motion.extrapolates(shown.time) else ""
-    return f"{of}error in 9 of 10 cases {rough}below {band[0, 1]:.2g} mm"
+    return f"{of}error {rough}below {band[0, 1]:.2g} mm in 9 of 10 cases"
 
 
 def summarize(frame: Frame) -> str:
