@@ -212,7 +212,7 @@ def _large_plots(view: View) -> None:
 
 def _phone(view: View) -> None:
     view.show(MOMENT)
-    view.page.get_by_text("ODeform · kick").first.click()
+    view.page.get_by_text("ODeform · ball, kicked").first.click()
 
 
 def _stability(view: View) -> None:

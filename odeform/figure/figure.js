@@ -445,8 +445,8 @@ function main() {
   const tellTruth = () => {
     const frame = Math.round((state.time - figure.start) / figure.step);
     const known = compared.filter(({ axes, truth: { places: at } }) => at.every((x, k) => Math.abs(x - places[axes[k]]) < 1e-3));
-    const said = known.map(({ label, truth: { rmse_mm: errors } }) =>
-      `${columns.length > 1 ? `${label}: ` : ""}${errors[frame] === null ? "no truth at this time" : `${errors[frame].toFixed(2)} mm from the truth (RMSE)`}`);
+    const said = known.map(({ label, truth: { rms_mm: errors } }) =>
+      `${columns.length > 1 ? `${label}: ` : ""}${errors[frame] === null ? "no truth at this time" : `${errors[frame].toFixed(2)} mm from the truth (RMS)`}`);
     truth.lastChild.textContent = said.join(", ");
     truth.firstChild.hidden = known.length > 0;
   };

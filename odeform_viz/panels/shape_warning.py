@@ -31,7 +31,7 @@ def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBod
 
 def _motion(model: UserBodyPredictor | None) -> str:
     if model is None:
-        return "It moves as the trained body would; no error is known"
+        return "It is moved as the trained body; no error is known"
     motion = model.describe_motion().capitalize()
     if not model.knows_untrained_errors:
         return f"{motion}; no error is known"

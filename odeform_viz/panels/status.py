@@ -8,10 +8,11 @@ from odeform.models.base import Predictor
 from odeform.models.error_band import FEWEST
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.rest import rests_from
+from odeform.motion.truth_errors import DISTANCE
 from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until, shown_until
+from odeform_viz.view import ColumnFrame, Description, played_until, shown_until
 
 __all__ = ["StatusPanel", "describe_column"]
 

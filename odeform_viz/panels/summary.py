@@ -20,12 +20,15 @@ __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
 INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
 PHYSICS, UNTESTED, REFUSED = "physics only", "not tested", "not modelled"
+UNRELIABLE = "not reliable"
+LARGE = 0.2  # of the body's size: an error from which on nothing is told of where the body is
 WHY = {
     INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
     EXTRAPOLATED: "The model has not learned from simulations like this one; its motion is carried on from them.",
     UNTRAINED: "The model has learned from simulations of other shapes.",
     PHYSICS: "Elasticity and contacts move the body. Nothing was learned of this kind of motion but its contacts.",
     UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
+    UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
     REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
 }
 UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
@@ -62,7 +65,7 @@ def badge_of(frame: Frame) -> Badge:
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
             return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
-    expected, outside = _expected(models[0], alone=len(models) == 1), _outside(frame, models)
+    expected, outside = _expected(models), _outside(frame, models)
     if untrained := [c for c in models if c.untrained]:
         known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
         return Badge("outside" if known else "unknown", UNTRAINED, outside, expected)
@@ -71,6 +74,8 @@ def badge_of(frame: Frame) -> Badge:
         return Badge("outside", PHYSICS, outside, expected)
     if any(c.changed for c in models):
         return Badge("unknown", UNTESTED, "; ".join(filter(None, ("mass or stiffness", outside))), expected)
+    if outside and any(_useless(c) for c in models):
+        return Badge("unknown", UNRELIABLE, outside, expected)
     return Badge("outside", EXTRAPOLATED, outside, expected) if outside else Badge("inside", INSIDE, "", expected)
 
 
@@ -84,14 +89,45 @@ def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:
     return f"{' and '.join(dict.fromkeys(names))} beyond the {known_range(schema)}" if names else ""
 
 
-def _expected(shown: ColumnFrame, alone: bool) -> str:
-    """What is known of the error of the first model, which is named if it is not `alone`."""
-    band, of = shown.error_band(np.array([shown.time])), "" if alone else f"{shown.column.label}: "
-    if band is None:
-        return f"{of}error not known"
+def _below(shown: ColumnFrame) -> float | None:
+    """The RMS distance in mm that the error stays below in nine of ten cases; None if it is not known."""
+    band = shown.error_band(np.array([shown.time]))
+    return None if band is None else float(band[0, 1])
+
+
+def _useless(shown: ColumnFrame) -> bool:
+    """Whether the error that is expected is a large part of the body's size."""
+    below, size = _below(shown), float(np.ptp(shown.column.geometry.points, axis=0).max())
+    return below is not None and below > 1e3 * LARGE * size
+
+
+def _expected(models: Sequence[ColumnFrame]) -> str:
+    """What is known of the error of the models at this moment: the largest of several."""
+    bands = [_below(shown) for shown in models]
+    unknown = [shown.column.label for shown, band in zip(models, bands, strict=True) if band is None]
+    known = [band for band in bands if band is not None]
+    if not known:
+        return "error not known"
     # outside of what was measured the band is carried on
-    rough = "roughly " if shown.motion.outside or shown.motion.extrapolates(shown.time) else ""
-    return f"{of}error {rough}below {band[0, 1]:.2g} mm in 9 of 10 cases"
+    rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
+    of = "" if len(known) == 1 else f", the largest of {len(known)}"
+    text = f"expected error {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
+    return "; ".join([text, *(f"{label}: error not known" for label in unknown)])
+
+
+def _errors_now(frame: Frame) -> list[str]:
+    """The errors against the truth, and a remark where one is larger than expected."""
+    known = [(c, c.error.rms_mm) for c in frame.columns if c.error]
+    if not known:
+        return []
+    named = len(known) > 1
+    values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
+    lines = [f"error now: {values} (RMS distance from the truth)"]
+    above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
+    if above:
+        of = f" of {escape(', '.join(above))}" if named else ""
+        lines.append(f"⚠ the error{of} is above what is expected in 9 of 10 cases")
+    return lines
 
 
 def summarize(frame: Frame) -> str:
@@ -99,8 +135,7 @@ def summarize(frame: Frame) -> str:
     lines = [badge_of(frame).html]
     if (push := first_push(frame)) is not None:
         lines.append(describe_push(*push))
-    if errors := [f"{escape(c.column.label)} RMS {c.error.rms_mm:.2f} mm" for c in frame.columns if c.error]:
-        lines.append(f"error now: {', '.join(errors)}")
+    lines += _errors_now(frame)
     truth = frame.truth
     if truth is not None and truth.ended and truth.column.truth:
         lines.append(f"no truth after {truth.column.truth.end:.3g} s: its last moment is shown, pale")

@@ -7,7 +7,7 @@ import numpy as np
 from odeform.loads.registry import load_of_scene
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Floats, Pose, Vector
+from odeform.types import Floats, Points, Pose, Vector
 from odeform_viz.obstacles import obstacles_of
 from odeform_viz.pushing import push_shown
 from odeform_viz.rendering.framing import Axes, Box
@@ -17,6 +17,7 @@ __all__ = ["RISE", "ceiling_of", "direction_of", "outline_of"]
 
 MOMENTS = 60  # of a motion that are looked at
 POINTS = 200  # of a body
+AWAY = 5.0  # heights of a box alone, from which the camera looks at it
 RISE = 0.25  # of a body's size: what rises higher is followed, so that bodies that fall are not seen from far away
 
 
@@ -54,9 +55,19 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
         acting = acting + centres[0] - true[0]  # the arrow of a velocity goes with the body
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
     parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
-    corners = np.concatenate(parts)
-    across, upwards = corners @ axes.right, corners @ axes.above
-    return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
+    return _seen(np.concatenate(parts), axes)
+
+
+def _seen(corners: Points, axes: Axes) -> Box:
+    """The box of points (P, 3) m in the picture: what is nearer than the middle looks larger."""
+    flat = np.stack([corners @ axes.right, corners @ axes.above], axis=1)
+    middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    away = AWAY * max(float(np.ptp(flat[:, 1])), 1e-6)
+    nearer = 1.0 / (1.0 - np.minimum((corners @ axes.direction) / away, 0.5))
+    (left, low), (right, high) = (
+        (edge(middle + (flat - middle) * nearer[:, None], axis=0)).tolist() for edge in (np.min, np.max)
+    )
+    return Box(left, right, low, high)
 
 
 def _poses(shown: ColumnFrame) -> Pose:

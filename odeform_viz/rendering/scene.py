@@ -22,7 +22,7 @@ from odeform_viz.rendering.outline import RISE, ceiling_of, direction_of, outlin
 from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
 from odeform_viz.rendering.titles import title_of
-from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, Frame
+from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, Frame, Sight
 
 __all__ = ["SceneView"]
 
@@ -67,6 +67,11 @@ class SceneView:
     def fit(self) -> None:
         """Aim all cameras as they were before users turned them."""
         self._cameras.aim(self._framing)
+
+    def look(self, sight: Sight) -> None:
+        """Aim all cameras at `sight` with the next frame, instead of as they are at first."""
+        self._cameras.keep(sight)
+        self._framed = None
 
     def close(self) -> None:
         """Leave the cameras of browsers that stay connected to another page."""
