@@ -198,4 +198,4 @@ class App:
 
 def _title(columns: Sequence[Column]) -> str:
     schema = columns[0].source.schema
-    return f"ODeform · {subject_of(schema.scene, 'soft object' if schema.objects else '')}"
+    return f"ODeform · {'soft objects' if schema.objects else subject_of(schema.scene, '')}"

@@ -5,6 +5,8 @@ from odeform.loads.registry import load_of_scene
 __all__ = ["family_title", "subject_of"]
 
 FAMILIES = {
+    "odeform": "ODeform",
+    "odeform-rolling": "ODeform (rolling ball)",
     "latent": "ODeform",
     "rolling": "ODeform (rolling ball)",
     "modal": "ODeform (elastic body)",

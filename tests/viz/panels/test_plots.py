@@ -45,7 +45,7 @@ def test_an_error_is_plotted_with_gaps_where_the_truth_has_ended(line: Line, dro
     error = np.linspace(0.0, 2.0, len(line[2].times))
     error[50:] = np.nan
     html = plots_html([(*line[:2], replace(line[2], error=error))], drop.schema.window, rotates=False)
-    assert "error, RMS" in html
+    assert "error (dashed" in html
     assert "nan" not in html
 
 
@@ -135,7 +135,7 @@ def test_title_status_and_legend_say_the_same_at_any_moment(drop: Predictor, tim
     assert band is not None
     assert f"90 % below {band[0, 1]:.2f} mm" in status
     assert f"90 %: {band[0, 1]:.2f} mm" in legend
-    assert "9 in 10 stay below it throughout, by 50 that chose nothing" in status
+    assert "9 of 10 stay below it throughout; by 50 that chose nothing" in status
 
 
 def test_a_turn_is_counted_past_half_and_whole_turns(kick: Predictor) -> None:

@@ -80,5 +80,5 @@ def test_a_click_on_the_map_goes_there(kicked: tuple[App, LoopbackClient]) -> No
 def test_the_map_names_its_axes_and_shows_what_is_clamped() -> None:
     schema = odeform.load("kick").schema
     drawn = map_html(small(lambda _: None, "kick"), (schema.learned[0], schema.learned[1]))
-    assert all(text in drawn for text in ("mass, kg", "bending, N m", "2 s (2 × trained)", "≥ 4 mm", "clamped"))
+    assert all(text in drawn for text in ("mass, kg", "bending, N m", "2 s (2 × trained)", "≥ 4 mm", "stopped"))
     assert drawn.count("data-map=") == 2
