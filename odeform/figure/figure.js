@@ -182,9 +182,10 @@ void main() {
 // whether there is no graphics card: smooth edges then cost more than all else
 function drawnInSoftware() {
   const probe = document.createElement("canvas").getContext("webgl2");
-  const info = probe?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? probe.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
-  probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  const told = probe?.getParameter(probe.RENDERER) ?? "";
+  // Chromium tells it by an extension only, of which Firefox warns
+  const info = told.startsWith("WebKit") && probe.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? probe.getParameter(info.UNMASKED_RENDERER_WEBGL) : told;
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 

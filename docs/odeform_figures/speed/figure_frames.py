@@ -1,6 +1,7 @@
 """Frames per second of a figure with sliders while it plays, and while a slider is dragged, without a graphics card.
 
-`python -m odeform_figures.speed.figure_frames figure.html` prints them; with `--firefox` in Firefox, else in Chromium.
+`python -m odeform_figures.speed.figure_frames figure.html` prints them, of Chromium; of Firefox with `--firefox`,
+by `xvfb-run -a` where there is no display.
 """
 
 import argparse

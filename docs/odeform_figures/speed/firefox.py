@@ -1,7 +1,11 @@
-"""Firefox without a window, driven by its own protocol (Marionette), which needs nothing but Firefox itself."""
+"""Firefox, driven by its own protocol (Marionette), which needs nothing but Firefox itself.
+
+Where there is no display it needs a virtual one, as of `xvfb-run -a`: without a window Firefox has no WebGL.
+"""
 
 import json
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -26,6 +30,7 @@ PREFERENCES = {
     "datareporting.policy.dataSubmissionEnabled": False,
     "browser.shell.checkDefaultBrowser": False,
 }
+OWN = re.compile(r"RSLoader|resource://|chrome://")  # of Firefox itself
 COMPLAINTS = ("JavaScript error", "JavaScript warning", "console.error", "console.warn")
 
 
@@ -52,7 +57,7 @@ class Firefox:
     def complaints(self) -> list[str]:
         """Errors and warnings on the console since the browser began."""
         lines = self._log.read_text(errors="replace").splitlines()
-        return [line for line in lines if line.startswith(COMPLAINTS)]
+        return [line for line in lines if line.startswith(COMPLAINTS) and not OWN.search(line)]
 
     def _call(self, command: str, parameters: dict[str, Any]) -> Any:
         self._count += 1
@@ -79,7 +84,7 @@ def open_firefox() -> Iterator[Firefox]:
         profile, log = Path(folder), Path(folder) / "console.txt"
         lines = (f"user_pref({json.dumps(name)}, {json.dumps(value)});" for name, value in PREFERENCES.items())
         (profile / "user.js").write_text("\n".join(lines))
-        command = [FIREFOX, "--headless", "--marionette", "--no-remote", "--profile", folder]
+        command = [FIREFOX, "--marionette", "--no-remote", "--profile", folder]
         with log.open("wb") as output:
             browser = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         try:
