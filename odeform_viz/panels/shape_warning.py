@@ -12,7 +12,8 @@ from odeform_viz.view import Description
 
 __all__ = ["ShapeWarningPanel", "shape_warning"]
 
-STYLE = "margin:-5px -10px;padding:3px 10px;border-radius:6px;background:#b54708;color:#fff"
+STYLE = "margin:-5px -10px;padding:3px 10px;border-radius:6px;color:#fff;background:"
+GUESSED, UNKNOWN = "#b06a00", "#b3260c"  # of the badge: whether an error is known
 
 
 def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBodyPredictor | None = None) -> str:
@@ -24,9 +25,10 @@ def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBod
     if not untrained:
         return ""
     worst = max(untrained, key=lambda similarity: similarity.mean)
+    color = GUESSED if model is not None and model.knows_untrained_errors else UNKNOWN
     away = f"on average {1e3 * worst.mean:.0f} mm from the trained body's"
     more = f"At most {1e3 * worst.distance:.0f} mm. {_motion(model)}."
-    return f'<div style="{STYLE}" title="{escape(more)}">⚠ <b>Shape not trained</b>: its surface is {away}</div>'
+    return f'<div style="{STYLE}{color}" title="{escape(more)}">⚠ <b>Shape not trained</b>: its surface is {away}</div>'
 
 
 def _motion(model: UserBodyPredictor | None) -> str:

@@ -111,4 +111,4 @@ class _Attached:
         if share > 0.995:
             return self.arrow.label
         value, _, unit = self.arrow.label.partition(" ")
-        return f"{share * float(value):.2g} {unit} (peak {self.arrow.label})"
+        return f"{share * float(value):.3g} {unit} (peak {self.arrow.label})"
