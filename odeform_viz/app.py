@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
 from odeform.locks import Lock
+from odeform.models.titles import subject_of
 from odeform_viz.browser.scripts import run_scripts
 from odeform_viz.columns import Column, Columns, columns_under
 from odeform_viz.layout import Layout
@@ -95,7 +96,8 @@ class App:
         extent = float(np.ptp(columns[0].geometry.points, axis=0).max())
         controls = self.page.controls
         self.scene = SceneView(self.server, extent, self._worker.wake, controls.pick, controls.pull)
-        controls.fit_view, self.page.shown = self.scene.fit, lambda: self.presenter.frame
+        controls.fit_view, controls.look = self.scene.fit, self.scene.look
+        self.page.shown = lambda: self.presenter.frame
         self.presenter = Presenter(
             self.session, self.clock, self._read, self, self.recording, lambda: self._worker.up_to_date
         )
@@ -195,4 +197,5 @@ class App:
 
 
 def _title(columns: Sequence[Column]) -> str:
-    return f"ODeform · {columns[0].source.schema.scene}"
+    schema = columns[0].source.schema
+    return f"ODeform · {'soft objects' if schema.objects else subject_of(schema.scene, '')}"

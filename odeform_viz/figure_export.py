@@ -11,6 +11,7 @@ from odeform.schema import OBJECT, Parameter, Schema
 from odeform_viz.pushing import contacts_of
 from odeform_viz.session import settings_of
 from odeform_viz.view import ViewRequest
+from odeform_viz.words import parameter_title
 
 __all__ = ["figure_choices", "figure_sources"]
 
@@ -23,9 +24,9 @@ def figure_choices(schema: Schema) -> dict[str, tuple[str, ...]]:
 
     Contacts are left out: they lie on surfaces.
     """
-    names = [p.name for p in schema.parameters if p.role != "azimuth" and not p.name.startswith("contact_")]
-    chosen = [*itertools.combinations(names, 2), *((name,) for name in names)]
-    return {", ".join(each): each for each in chosen}
+    taken = [p for p in schema.parameters if p.role != "azimuth" and not p.name.startswith("contact_")]
+    chosen = [*itertools.combinations(taken, 2), *((each,) for each in taken)]
+    return {", ".join(map(parameter_title, each)): tuple(p.name for p in each) for each in chosen}
 
 
 def figure_sources(request: ViewRequest, names: tuple[str, ...]) -> list[tuple[str, Source]]:

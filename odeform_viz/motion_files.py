@@ -14,6 +14,7 @@ from typing import IO
 import numpy as np
 
 from odeform.geometry.shape import FittedShape
+from odeform.models.titles import subject_of
 from odeform.motion.base import Motion
 from odeform.motion.caveats import caveats
 from odeform.schema import OBJECT
@@ -25,7 +26,7 @@ from odeform_viz.runtime.access import Access
 from odeform_viz.runtime.server import open_server, stop_server
 from odeform_viz.session import visible_deformation
 from odeform_viz.view import ColumnFrame, DisplayOptions, Frame, ViewRequest
-from odeform_viz.words import parameter_title, subject_of, unit_text
+from odeform_viz.words import parameter_title, unit_text
 
 __all__ = ["write_html", "write_rrd"]
 

@@ -18,7 +18,7 @@ from odeform_viz.runtime.notices import Notices
 from odeform_viz.session import Session
 from odeform_viz.state import PageState, capture, columns_of, state_from_json, state_to_json
 from odeform_viz.user_bodies import read_user_body, takes_user_bodies, with_user_body
-from odeform_viz.view import Description, DisplayOptions, Frame, ViewRequest
+from odeform_viz.view import Description, DisplayOptions, Frame, Sight, ViewRequest
 from odeform_viz.workspace import Workspace
 
 __all__ = ["Controls", "Page", "Panel"]
@@ -79,6 +79,8 @@ class Controls:
     """How bodies are drawn, but for `overlay`."""
     fit_view: Callable[[], None] = lambda: None
     """Aims the cameras at all columns again."""
+    look: Callable[[Sight], None] = lambda _: None
+    """Aims the cameras at a sight that was saved, once."""
     arranging: Callable[[], bool] = lambda: False
     """Whether a shape is being placed, for which all columns are overlaid."""
 
@@ -169,10 +171,11 @@ class Page:
             command.on_trigger(lambda _: action())
         self.hotkeys[keys] = label
 
-    def save(self) -> bytes:
-        """Returns the state of the page as a file."""
+    def save(self, camera: Sight | None = None) -> bytes:
+        """Returns the state of the page as a file, with the `camera` of a browser."""
         clock = self.clock
-        return state_to_json(capture(self.schema.scene, self.request(), self.options(), clock.speed, clock.loop))
+        looks = self.options(), clock.speed, clock.loop, camera
+        return state_to_json(capture(self.schema.scene, self.request(), *looks))
 
     def restore(self, data: bytes) -> Sequence[str]:
         """Move everything to a saved state; returns notes of what it could not hold.
@@ -189,5 +192,7 @@ class Page:
         self.columns.replace_all(columns)
         for panel in self.panels:
             panel.restore(state)
+        if state.camera is not None:
+            self.controls.look(state.camera)
         self.columns_changed()
         return state.notes

@@ -171,19 +171,19 @@ def push_excess(push: Push, forces: tuple[float, float], known: str = "trained")
     if push.strength > forces[1] * (1.0 + 1e-6):
         excess["force"] = f"{known} up to {forces[1]:.3g} N"
     if push.strength > 0.0 and push.steep:
-        excess["direction"] = f"{known} up to {math.degrees(CONE):.0f}° off the inward normal"
+        excess["direction"] = f"{known} up to {math.degrees(CONE):.0f}° from straight in"
     return excess
 
 
 def describe_push(push: Push, name: str) -> str:
     """One line of HTML: the force, and where it acts on the object called `name`."""
     upward, height = push.contact.normal[2], 1e3 * push.contact.point[2]
-    where = "top" if upward > 0.5 else "underside" if upward < -0.5 else "side"
+    where = "upper side" if upward > 0.5 else "underside" if upward < -0.5 else "side"
     place = f"the {escape(name)}'s {where}, {height:.0f} mm above the floor"
     if push.strength == 0.0:
         return f"<b>no force</b> on {place}: nothing moves"
     angle = math.degrees(push.angle)
-    tilt = "along the inward normal" if angle < 0.5 else f"{angle:.0f}° off the inward normal"
+    tilt = "straight into the surface" if angle < 0.5 else f"{angle:.0f}° from straight in"
     return f"<b>{push.strength:.3g} N</b> on {place}, {tilt}"
 
 

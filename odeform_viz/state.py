@@ -16,7 +16,7 @@ from odeform_viz.columns import Column, truth_column
 from odeform_viz.fitting import fit_to_json
 from odeform_viz.recording.provenance import origin_of
 from odeform_viz.user_bodies import user_body_of
-from odeform_viz.view import COLOR_BY, DisplayOptions, ViewRequest
+from odeform_viz.view import COLOR_BY, DisplayOptions, Sight, ViewRequest
 
 __all__ = ["PageState", "capture", "columns_of", "state_from_json", "state_to_json"]
 
@@ -46,12 +46,19 @@ class PageState:
     speed: float | None = None
     """Of playing, in times real time; None for the page's own."""
     loop: bool = True
+    camera: Sight | None = None
+    """Where the camera of the browser that saved it was; None for the page's own."""
 
 
 def capture(
-    scene: str, request: ViewRequest, display: DisplayOptions, speed: float | None = None, loop: bool = True
+    scene: str,
+    request: ViewRequest,
+    display: DisplayOptions,
+    speed: float | None = None,
+    loop: bool = True,
+    camera: Sight | None = None,
 ) -> PageState:
-    """The state that `request` and `display` describe. What is in no file cannot be saved; the notes say so."""
+    """The state that the arguments describe. What is in no file cannot be saved; the notes say so."""
     truth = next((c for c in request.columns if c.truth), None)
     fit = next((c.fit for c in request.columns if c.fit), None)
     body = next((b for c in request.columns if (b := user_body_of(c.predictor))), None)
@@ -74,9 +81,8 @@ def capture(
     )
     material = {} if body is None else {"material": material_name(body.item.material)}
     shape = {**fit_to_json(fit), **material} if fit and fit.origin else None
-    return PageState(
-        scene, request.parameters, request.time, request.quality, columns, shape, display, tuple(notes), speed, loop
-    )
+    of_request = (scene, request.parameters, request.time, request.quality)
+    return PageState(*of_request, columns, shape, display, tuple(notes), speed, loop, camera)
 
 
 def columns_of(state: PageState, schema: Schema) -> list[Column]:
@@ -116,6 +122,7 @@ def state_to_json(state: PageState) -> bytes:
         "momentary": display.momentary,
         "speed": state.speed,
         "loop": state.loop,
+        "camera": state.camera and {"position": state.camera.position, "look_at": state.camera.look_at},
         "notes": state.notes,
     }
     return json.dumps(raw, indent=1).encode()
@@ -128,8 +135,9 @@ def state_from_json(data: bytes, scene: str) -> PageState:
         if not isinstance(raw, dict) or raw.pop("odeform_state", None) != FORMAT:
             raise InputError(f"state: expected a state file of ODeform, format {FORMAT}")
         raw["columns"], raw["notes"] = tuple(raw["columns"]), tuple(raw["notes"])
-        display = _display(raw)
-        state = PageState(**raw, display=display)
+        display, sight = _display(raw), raw.pop("camera", None)
+        camera = None if sight is None else Sight.of(sight["position"], sight["look_at"])
+        state = PageState(**raw, display=display, camera=camera)
         _check(state, scene)
         return state
     except InputError:

@@ -1,24 +1,25 @@
 """Defines requests of the user and what is displayed: plain values between session, presenter and panels."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from odeform.errors import InputError
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.limits import DEPTH
 from odeform.motion.plausibility import Stop
 from odeform.motion.recorded import RecordedMotion
+from odeform.motion.truth_errors import DISTANCE
 from odeform.schema import Window
 from odeform.types import Floats, Geometry, Perpoint, Times
 from odeform_viz.columns import Column
 
 __all__ = [
     "COLOR_BY",
-    "DISTANCE",
     "INVISIBLE",
     "REACH",
     "ColorScale",
@@ -29,6 +30,7 @@ __all__ = [
     "DisplayOptions",
     "Error",
     "Frame",
+    "Sight",
     "ViewRequest",
     "peak_of",
     "played_until",
@@ -36,7 +38,6 @@ __all__ = [
     "shown_until",
 ]
 
-DISTANCE = math.sqrt(3.0)  # RMS of distances, in RMS of their three coordinates
 INVISIBLE = 1e-4  # m; a third of a pixel for a body of 0.1 m that is 720 pixels high
 REACH = 2.0  # length of the time slider in trained windows, at least
 WHOLE = 1.0  # s; what goes on after a shorter window is shown, and played, up to here
@@ -62,6 +63,23 @@ class ViewRequest:
     quality: str
     """Settings of all integrations: a name such as "balanced", or `SolverSettings` as JSON."""
     columns: tuple[Column, ...]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """From where to where a camera looks, (3,) m each."""
+
+    position: tuple[float, ...]
+    look_at: tuple[float, ...]
+
+    @classmethod
+    def of(cls, position: Iterable[float], look_at: Iterable[float]) -> "Sight":
+        """`InputError` for anything but three finite metres each, at two places."""
+        sight = cls(tuple(map(float, position)), tuple(map(float, look_at)))
+        finite = all(map(math.isfinite, (*sight.position, *sight.look_at)))
+        if len(sight.position) != 3 or len(sight.look_at) != 3 or not finite or sight.position == sight.look_at:
+            raise InputError(f"camera: expected two places of three metres, got {sight.position} and {sight.look_at}")
+        return sight
 
 
 COLOR_BY: tuple[str, ...] = ("own colours", "displacement", "strain", "error")

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 
-from odeform.loads.registry import known_as, load_of_scene
+from odeform.loads.registry import known_as
 from odeform.models.base import Predictor
+from odeform.models.titles import family_title
 from odeform.schema import Parameter, Schema
 from odeform.simulation.scenes.registry import find_scene
 
@@ -16,28 +17,10 @@ __all__ = [
     "origin_title",
     "parameter_title",
     "plain",
-    "subject_of",
     "unit_text",
 ]
 
-MODELS = {
-    "latent": "ODeform (latent)",
-    "rolling": "ODeform (rolling)",
-    "modal": "ODeform (modal)",
-    "odeform-per-point": "ODeform per point",
-    "gp": "kernel regression",
-    "pod-rbf": "POD + RBF",
-    "nearest": "nearest training motion",
-    "node": "neural ODE per point",
-    "rnn": "recurrent network",
-    "direct": "direct network",
-    "pe-gnn": "graph network",
-    "occupancy-flow": "occupancy flow",
-    "released": "authors' network",
-    "clamped": "clamped body",
-}
 PARAMETERS = {"young": "stiffness"}
-SCENES = {"kick": "ball, kicked", "mass-elastic": "ball, dropped", "clamped": "clamped body, let go"}
 CONSTANTS = {
     "young": "Young's modulus",
     "poisson": "Poisson's ratio",
@@ -66,28 +49,18 @@ UNITS = {
 
 def model_title(predictor: Predictor) -> str:
     """What a model is called over its column; plugged families keep their own names."""
-    return MODELS.get(predictor.model, predictor.model)
+    return family_title(predictor.model)
 
 
 def origin_title(name: str) -> str:
     """What a bundled checkpoint SCENE/MODEL is called in a list."""
-    model = name.rpartition("/")[2]
-    return MODELS.get(model, model)
+    return family_title(name.rpartition("/")[2])
 
 
 def known_range(schema: Schema) -> str:
     """What the range of a parameter is: that of the training data, or, under a load for which nothing was trained, that
     in which errors were measured."""
     return f"{known_as(schema.scene)} range"
-
-
-def subject_of(scene: str, body: str) -> str:
-    """What is seen, such as "donut, thrown"; `body` is empty where the scene has one only."""
-    if not body:
-        return SCENES.get(scene, scene)
-    load = load_of_scene(scene)
-    what = "pushed" if load is None else load.happened or load.title.lower()
-    return f"{body}, {what}"
 
 
 def parameter_title(parameter: Parameter) -> str:

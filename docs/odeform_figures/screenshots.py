@@ -212,7 +212,7 @@ def _large_plots(view: View) -> None:
 
 def _phone(view: View) -> None:
     view.show(MOMENT)
-    view.page.get_by_text("ODeform · kick").first.click()
+    view.page.get_by_text("ODeform · ball, kicked").first.click()
 
 
 def _stability(view: View) -> None:
@@ -312,6 +312,7 @@ FILM = (
     Shot(lambda: _loaded("drop"), {"object": "dog", "preset": "on an edge"}, np.linspace(0.0, 0.6, 16)),
     Shot(lambda: _loaded("throw"), {"object": "donut", "preset": "a somersault"}, np.linspace(0.0, 0.75, 20)),
     Shot(lambda: _loaded("kick"), {"object": "bottle"}, np.linspace(0.0, 0.9, 18)),
+    Shot(lambda: _loaded("hold"), {"object": "flip-flop"}, np.linspace(0.0, 0.8, 16)),
     Shot(lambda: _push("flip-flop"), {}, np.linspace(0.0, 0.19, 14)),
 )
 

@@ -12,6 +12,7 @@ from odeform.figure import Source, column_bytes, figure_page, interpolated, pars
 from odeform.geometry.shape import FittedShape
 from odeform.io import atomic_write
 from odeform.models.base import Predictor
+from odeform.models.titles import family_title
 from odeform.motion.caveats import caveats
 from odeform.types import Times
 
@@ -40,7 +41,7 @@ def write_figure(
     predictor, fit, fixed = shape_of(args, predictor, fixed)
     fixed = {name: value for name, value in fixed.items() if name not in ranges}
     source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality)
-    column = interpolated(predictor.model, source, times, column_bytes(1), _report)
+    column = interpolated(family_title(predictor.model), source, times, column_bytes(1), _report)
     if truth is not None and truth_error(column, truth) is None:
         raise InputError(f"--truth {args.truth}: expected a sequence of this scene with parameters under the sliders")
     page = figure_page([column], truth)
@@ -48,7 +49,7 @@ def write_figure(
     error = column.error
     print(
         f"{counted(len(column.table.weights), 'motion')} in {len(page) / 1e6:.2f} MB to {args.out}; from the model: "
-        f"{error.rmse:.2g} mm RMSE, half within {error.half:.2g}, 90 % within {error.most:.2g} mm"
+        f"{error.rms:.2g} mm RMS distance, half within {error.half:.2g}, 90 % within {error.most:.2g} mm"
     )
     for caveat in caveats(source.middle, times):
         print(f"note: {caveat}", file=sys.stderr)
@@ -58,4 +59,4 @@ def write_figure(
 
 
 def _report(motions: int, most: int, error: float) -> None:
-    print(f"{counted(motions, 'motion')} of at most {most}: {error:.3g} mm RMSE", file=sys.stderr, flush=True)
+    print(f"{counted(motions, 'motion')} of at most {most}: {error:.3g} mm RMS distance", file=sys.stderr, flush=True)

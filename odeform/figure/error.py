@@ -21,9 +21,9 @@ Moments = Float[np.ndarray, " moments"]
 
 @dataclass(frozen=True)
 class FigureError:
-    """RMSE in mm over the coordinates of all points, at random times of random motions."""
+    """RMS distance of the points in mm, at random times of random motions."""
 
-    rmse: float
+    rms: float
     """Of all motions together."""
     half: float
     """That half of the motions stay within."""
@@ -53,7 +53,7 @@ class Probes:
         squares = []
         for y, points in zip(motions, self.points, strict=True):
             shown = body.points(between(y, times, self.moments))
-            squares.append(np.square(shown - points, dtype=float).mean())
+            squares.append(np.square(shown - points, dtype=float).sum(axis=-1).mean())
         each = 1e3 * np.sqrt(squares)
         half, most = np.quantile(each, [0.5, 0.9])
         return FigureError(1e3 * math.sqrt(np.mean(squares)), float(half), float(most), float(each.max()))

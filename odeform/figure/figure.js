@@ -182,9 +182,10 @@ void main() {
 // whether there is no graphics card: smooth edges then cost more than all else
 function drawnInSoftware() {
   const probe = document.createElement("canvas").getContext("webgl2");
-  const info = probe?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? probe.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
-  probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  const told = probe?.getParameter(probe.RENDERER) ?? "";
+  // Chromium tells it by an extension only, of which Firefox warns
+  const info = told.startsWith("WebKit") && probe.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? probe.getParameter(info.UNMASKED_RENDERER_WEBGL) : told;
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
@@ -445,8 +446,8 @@ function main() {
   const tellTruth = () => {
     const frame = Math.round((state.time - figure.start) / figure.step);
     const known = compared.filter(({ axes, truth: { places: at } }) => at.every((x, k) => Math.abs(x - places[axes[k]]) < 1e-3));
-    const said = known.map(({ label, truth: { rmse_mm: errors } }) =>
-      `${columns.length > 1 ? `${label}: ` : ""}${errors[frame] === null ? "no truth at this time" : `${errors[frame].toFixed(2)} mm from the truth (RMSE)`}`);
+    const said = known.map(({ label, truth: { rms_mm: errors } }) =>
+      `${columns.length > 1 ? `${label}: ` : ""}${errors[frame] === null ? "no truth at this time" : `${errors[frame].toFixed(2)} mm from the truth (RMS)`}`);
     truth.lastChild.textContent = said.join(", ");
     truth.firstChild.hidden = known.length > 0;
   };

@@ -11,6 +11,7 @@ from odeform.figure.body import FigureBody
 from odeform.figure.error import FigureError, Probes, between, draw_probes
 from odeform.figure.sampling import Source
 from odeform.figure.table import Table, compressed, cubic_weights, product_weights
+from odeform.motion.truth_errors import DISTANCE
 from odeform.types import Floats, Frames, Times
 
 __all__ = ["BAND_FRACTION", "FigureColumn", "interpolated"]
@@ -20,7 +21,10 @@ BAND_FRACTION = 0.2
 motions stay within, and that which 90 % stay within."""
 FIRST = 5  # values of each parameter
 MOST_MOTIONS = 9000
-UNKNOWN = 2e-3, 6e-3  # of the size of the body: what errors may be where those of the model are not known
+UNKNOWN = (
+    2e-3,
+    6e-3,
+)  # of the size of the body, over coordinates: what errors may be where those of the model are not known
 RANKS = 64  # patterns that are reckoned with before they are counted
 MOST_PATTERNS = 320
 LEFT_OUT = 0.3  # of the tolerance, by patterns that are left out
@@ -32,7 +36,7 @@ MARGIN = 0.95  # of the tolerance, by the grid; the rest is for 16 bits and patt
 EXPANDED = 4.0 / 3.0  # bytes of base64 of each byte
 
 Report = Callable[[int, int, float], None]
-"""Called with the motions that are solved, the most there can be, and the RMSE so far in mm."""
+"""Called with the motions that are solved, the most there can be, and the RMS distance from the model so far in mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +52,9 @@ class FigureColumn:
     error: FigureError
     """What is shown against the model, at parameters off the grid and times off the frames."""
     band_mm: tuple[float, float] | None
-    """The model's own error over the sliders: RMSE that half, and 90 %, of unseen motions stay within."""
+    """The model's own error over the sliders: RMS distance that half, and 90 %, of unseen motions stay within."""
     tolerance_mm: tuple[float, float]
-    """RMSE that half, and 90 %, of the motions that are shown are to stay within."""
+    """RMS distance that half, and 90 %, of the motions that are shown are to stay within."""
 
     @property
     def fine(self) -> bool:
@@ -82,7 +86,7 @@ def interpolated(
     body, probes = source.body, draw_probes(source, times)
     band = _band(source, probes.places, times)
     size = float(np.ptp(body.rest, axis=0).max())
-    own = [1e3 * size * part / BAND_FRACTION for part in UNKNOWN] if band is None else band
+    own = [1e3 * size * DISTANCE * part / BAND_FRACTION for part in UNKNOWN] if band is None else band
     tolerance = BAND_FRACTION * own[0], BAND_FRACTION * own[1]
     room = most_bytes / EXPANDED - sum(array.nbytes for array in body.arrays().values())
     if room < 2 * FEWEST * len(times) * len(body.scale):
@@ -94,7 +98,7 @@ def interpolated(
     most = int(min(MOST_MOTIONS, room / (2 * expected) - row))
     grid = _refined(source, fine, probes, tolerance, most, report)
     ranks = int(min(MOST_PATTERNS, (room - 4 * row) / (2 * (row + len(grid.motions)) + 4)))
-    table = compressed(grid.motions, grid.counts, body.scale, 1e-3 * LEFT_OUT * tolerance[0], ranks)
+    table = compressed(grid.motions, grid.counts, body.scale, 1e-3 * LEFT_OUT * tolerance[0] / DISTANCE, ranks)
     error = probes.error(body, map(table.at, probes.places), fine)
     return FigureColumn(label, source, body, table, fine, error, band, tolerance)
 
@@ -121,7 +125,7 @@ def _refined(
     while True:
         error = probes.error(source.body, map(grid.at, probes.places), times)
         known.append((error.relative(tolerance), grid.counts))
-        report(len(grid.motions), most, error.rmse)
+        report(len(grid.motions), most, error.rms)
         helped = len(known) < 4 or min(known[-3:])[0] < GAIN * min(known[:-3])[0]
         if known[-1][0] <= MARGIN or not helped or not grid.refine(most):
             break
@@ -197,5 +201,5 @@ def _band(source: Source, places: Float[np.ndarray, "sets sweeps"], times: Times
     found = [band for band in bands if band is not None]
     if not found:
         return None
-    median, most = np.sqrt(np.square(found).mean(axis=(0, 1)))  # pooled, as errors are
+    median, most = DISTANCE * np.sqrt(np.square(found).mean(axis=(0, 1)))  # pooled, as errors are
     return float(median), float(most)

@@ -16,6 +16,7 @@ from odeform.figure.grid import FigureColumn
 from odeform.figure.sweep import Sweep
 from odeform.figure.truth import truth_error
 from odeform.loads.registry import known_as
+from odeform.models.titles import subject_of
 from odeform.motion.caveats import caveats
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import OBJECT
@@ -44,7 +45,9 @@ def figure_page(columns: Sequence[FigureColumn], truth: RecordedMotion | None = 
     if not sweeps:
         raise InputError("figure: expected a model that is not pinned at parameters of its own")
     schema = columns[0].source.predictor.schema
-    title = f"{columns[0].label} · {schema.scene}" if len(columns) == 1 else schema.scene
+    body = columns[0].source.complete(np.full(len(columns[0].source.sweeps), 0.5)).get(OBJECT, "")
+    subject = subject_of(schema.scene, str(body))
+    title = f"{subject} · {columns[0].label}" if len(columns) == 1 else subject
     page = (files("odeform.figure") / "figure.html").read_text(encoding="utf-8")
     script = (files("odeform.figure") / "figure.js").read_text(encoding="utf-8")
     data = json.dumps(_data(columns, sweeps, truth), ensure_ascii=True).replace("<", "\\u003c")
@@ -87,8 +90,8 @@ def _compared(column: FigureColumn, truth: RecordedMotion | None) -> dict[str, A
     found = None if truth is None else truth_error(column, truth)
     if found is None:
         return None
-    errors = [round(error, 4) if math.isfinite(error) else None for error in found.rmse_mm.tolist()]
-    return {"places": found.places.tolist(), "rmse_mm": errors}
+    errors = [round(error, 4) if math.isfinite(error) else None for error in found.rms_mm.tolist()]
+    return {"places": found.places.tolist(), "rms_mm": errors}
 
 
 def _slider(sweep: Sweep) -> dict[str, Any]:
@@ -136,9 +139,8 @@ def _cell(columns: Sequence[FigureColumn]) -> float:
 
 
 def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
-    """What does not move: the body, and parameters without a slider that were given."""
+    """What does not move: parameters without a slider that were given."""
     first, swept = columns[0].source, {sweep.name for sweep in sweeps}
-    body = first.complete(np.full(len(first.sweeps), 0.5)).get(OBJECT)
     units = {p.name: p.unit for p in first.predictor.schema.parameters}
     given = [
         f"{name} {float(value):.4g} {units[name]}".strip()
@@ -147,7 +149,7 @@ def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
     ]
     cell = _cell(columns)
     grid = f"grid {100 * cell:g} cm" if cell < 1.0 else f"grid {cell:g} m"
-    return ", ".join([*([str(body)] if body else []), *given, grid])
+    return ", ".join([*given, grid])
 
 
 def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str]:
@@ -169,10 +171,10 @@ def _column_note(column: FigureColumn, several: bool) -> str:
         shown = (
             f"{who}{'i' if several else 'I'}nterpolated between {grid} motions. At other parameters and times, half of "
             f"the motions are within {error.half:.2g} mm of the model and 90 % within {error.most:.2g} mm; "
-            f"{error.rmse:.2g} mm together (RMSE)."
+            f"{error.rms:.2g} mm together (RMS distance of the points)."
         )
     else:
-        shown = f"{who}one motion, at any time within {error.rmse:.2g} mm of the model (RMSE)."
+        shown = f"{who}one motion, at any time within {error.rms:.2g} mm of the model (RMS distance of the points)."
     if column.band_mm is None:
         band = "The error of the model itself is not known."
     else:

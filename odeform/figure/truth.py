@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from odeform.figure.grid import FigureColumn
 from odeform.motion.recorded import RecordedMotion
-from odeform.motion.truth_errors import truth_errors
+from odeform.motion.truth_errors import DISTANCE, truth_errors
 from odeform.types import Times
 
 __all__ = ["TruthError", "truth_error"]
@@ -19,8 +19,8 @@ class TruthError:
 
     places: Float[np.ndarray, " sweeps"]
     """(A,) of the truth's parameters on the sliders, from 0 to 1."""
-    rmse_mm: Times
-    """(T,) over the coordinates of all vertices, at the frames of the figure; NaN after the end of the truth."""
+    rms_mm: Times
+    """(T,) RMS distance of the vertices, at the frames of the figure; NaN after the end of the truth."""
 
 
 def truth_error(column: FigureColumn, truth: RecordedMotion) -> TruthError | None:
@@ -35,4 +35,4 @@ def truth_error(column: FigureColumn, truth: RecordedMotion) -> TruthError | Non
         return None
     body = source.predictor.to_body_frame(truth.geometry, parameters)
     motion = source.predictor.solve(body, parameters, source.quality)
-    return TruthError(places, truth_errors(motion, truth, column.times)[:, 0])
+    return TruthError(places, DISTANCE * truth_errors(motion, truth, column.times)[:, 0])

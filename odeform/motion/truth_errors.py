@@ -1,12 +1,16 @@
 """Errors of a predicted motion against a recorded one."""
 
+import math
+
 import numpy as np
 
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import Floats, Times
 
-__all__ = ["truth_errors"]
+__all__ = ["DISTANCE", "truth_errors"]
+
+DISTANCE = math.sqrt(3.0)  # RMS of distances, in RMS of their three coordinates
 
 
 def truth_errors(motion: Motion, truth: RecordedMotion, times: Times) -> Floats:

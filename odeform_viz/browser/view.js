@@ -12,10 +12,12 @@ style.textContent = `
     padding: 12px ${SIDE}px 84px 12px;
   }
   #odeform-view > * {
-    pointer-events: auto; border-radius: 6px; padding: 5px 10px; max-width: 46em;
+    border-radius: 6px; padding: 5px 10px; max-width: 46em;
     background: color-mix(in srgb, var(--mantine-color-body) 86%, transparent);
   }
   #odeform-view > :empty { display: none; }
+  /* texts let the pointer through, to what is dragged below them */
+  #odeform-view > [data-odeform-view=timeline], #odeform-view [title], #odeform-view [data-hotkey] { pointer-events: auto; }
   .odeform-badge { display: inline-block; padding: 1px 9px; border-radius: 1em; color: #fff; font-weight: 600; }
   .odeform-badge.inside { background: #1b7f4b; }
   .odeform-badge.outside { background: #b06a00; }
@@ -67,7 +69,7 @@ style.textContent = `
   }
   @media (max-width: 60em) {
     #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
-    .odeform-aside, .odeform-track span.until { display: none !important; }
+    .odeform-fine, .odeform-aside, .odeform-track span.until { display: none !important; }
     .odeform-buttons, .odeform-buttons > a { gap: 0; padding: 0 2px; margin: 0; }
   }
   @media (max-width: 48em) {

@@ -13,6 +13,7 @@ from odeform_viz.view import Coloring, ColumnFrame, Frame
 
 __all__ = ["Colorist"]
 
+FAR = 5.0  # times the largest values of the middle column, beyond which a column ends no scale
 USED = 0.99  # quantile of the values that the scale reaches: single vertices do not set it
 
 
@@ -87,4 +88,7 @@ class Colorist:
 
 
 def _largest(values: Mapping[int, Perpoint]) -> float:
-    return max(float(np.quantile(found, USED)) for found in values.values())
+    """Where the scale ends: at the largest values, without columns so far off that no other had colours."""
+    tops = sorted(float(np.quantile(found, USED)) for found in values.values())
+    usual = FAR * tops[(len(tops) - 1) // 2]
+    return max(top for top in tops if top <= usual or top == tops[0])

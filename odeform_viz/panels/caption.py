@@ -4,6 +4,7 @@ import re
 from html import escape, unescape
 from pathlib import Path
 
+from odeform.models.titles import subject_of
 from odeform.schema import OBJECT
 from odeform.types import Floats
 from odeform_viz.coloring.scale import gradient_html
@@ -12,7 +13,7 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.view import ColorScale, Description, DisplayOptions, Frame
-from odeform_viz.words import model_title, subject_of
+from odeform_viz.words import model_title
 
 __all__ = ["CaptionPanel", "caption_html", "scale_html", "subject_text"]
 
@@ -56,14 +57,15 @@ def _subject(frame: Frame) -> str:
     if not frame.columns:
         return "no column is in view"
     models = list(dict.fromkeys(model_title(c.column.predictor) for c in frame.columns if c.column.predictor))
-    truth = ["simulated truth"] if frame.truth else []
+    truth = " beside the truth" if frame.truth and models else "the truth" if frame.truth else ""
     fit = next((c.column.fit for c in frame.columns if c.column.fit), None)
     own = str(frame.columns[0].motion.parameters.get(OBJECT, ""))
-    scene, names = frame.columns[0].motion.schema.scene, ", ".join([*models, *truth])
+    scene, names = frame.columns[0].motion.schema.scene, ", ".join(models) + truth
     shape = "" if fit is None else Path(fit.origin).name or "uploaded shape"
     moves = subject_of(scene, own if fit is None or not own else shape)
-    of = f" · on {escape(shape)}" if shape and not own else ""
-    return f"<b>{escape(moves)}</b> · {escape(names)}{of}"
+    if shape and not own:
+        return f"<b>{escape(shape)}</b>, moved as the {escape(moves)} · {escape(names)}"
+    return f"<b>{escape(moves)}</b> · {escape(names)}"
 
 
 def _legend(frame: Frame) -> str:

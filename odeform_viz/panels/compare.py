@@ -18,7 +18,7 @@ from odeform_viz.page import Page, Panel
 from odeform_viz.pushing import contacts_of
 from odeform_viz.state import PageState
 from odeform_viz.user_bodies import user_body_of, with_user_body
-from odeform_viz.words import model_title, origin_title, plain
+from odeform_viz.words import model_title, origin_title, parameter_title, plain, unit_text
 
 __all__ = ["ComparePanel", "pinned_label", "sweep", "swept_names"]
 
@@ -58,7 +58,10 @@ def sweep(column: Column, parameters: Mapping[str, Any], schema: Schema, name: s
     else:
         swept = next(p for p in schema.learned if p.name == name)
         values = [swept.denormalise(2.0 * index / (SWEEP - 1) - 1.0) for index in range(SWEEP)]
-        rows = [(f"{name} {value:.3g} {swept.unit}", {**parameters, name: value}) for value in values]
+        rows = [
+            (f"{parameter_title(swept)} {value:.3g} {unit_text(swept.unit)}", {**parameters, name: value})
+            for value in values
+        ]
     ranks = [None if name == OBJECT else index / (len(rows) - 1) for index in range(len(rows))]
     return [
         replace(column, label=label, pinned=pinned, visible=True, rank=rank)
@@ -99,13 +102,17 @@ class ComparePanel(Panel):
             add.on_click(lambda _: self._guarded("Model not added", self._add))
         pin = gui.add_button("Pin these parameters", color="gray", hint="add a copy that keeps the present parameters")
         pin.on_click(lambda _: self._guarded("Parameters not pinned", self._pin))
-        self._swept = gui.add_dropdown("parameter", swept_names(self._schema))
+        self._sweeps = {self._titled(name): name for name in swept_names(self._schema)}
+        self._swept = gui.add_dropdown("parameter", tuple(self._sweeps))
         over = gui.add_button(
             "Sweep it",
             color="gray",
             hint=f"{SWEEP} columns over its trained range, or one for each object; the others stay the same",
         )
         over.on_click(lambda _: self._guarded("Sweep not added", self._sweep))
+
+    def _titled(self, name: str) -> str:
+        return next((parameter_title(p) for p in self._schema.parameters if p.name == name), name)
 
     def restore(self, state: PageState) -> None:
         self._overlay.value = state.display.overlay
@@ -136,8 +143,8 @@ class ComparePanel(Panel):
         self._columns.add(replace(model, label=label, pinned=parameters, visible=True))
 
     def _sweep(self) -> None:
-        before = self._columns.all
-        self._columns.add(*sweep(self._page.model, self._page.controls.parameters(), self._schema, self._swept.value))
+        before, name = self._columns.all, self._sweeps.get(self._swept.value, self._swept.value)
+        self._columns.add(*sweep(self._page.model, self._page.controls.parameters(), self._schema, name))
         for column in before:
             self._columns.set_visible(column.key, False)
 

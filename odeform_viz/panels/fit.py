@@ -21,9 +21,7 @@ __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
 NEXT = "the push that would narrow the widest interval of the body most"
-NO_TRUTH = (
-    "Choose a test sequence above, or open or simulate a motion: the parameters that explain it are then estimated."
-)
+NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within."
 FAILED = "⚠ **The fit failed**: {}"
@@ -70,7 +68,9 @@ class FitPanel(Panel):
         gui = page.server.gui
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
-            self._start = gui.add_button("Fit to the truth", hint="find the parameters that explain the visible truth")
+            self._start = gui.add_button(
+                "Fit to the truth", hint="find the parameters that reproduce the visible truth"
+            )
             self._start.on_click(lambda _: self._begin())
             self._cancel = gui.add_button("Cancel the fit", color="gray", visible=False)
             self._cancel.on_click(lambda _: self.close())

@@ -5,6 +5,7 @@ import viser
 from odeform.errors import InputError
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.uploads import content_of, take_upload
+from odeform_viz.view import Sight
 
 __all__ = ["StatePanel"]
 
@@ -16,7 +17,8 @@ class StatePanel(Panel):
         self._page, gui = page, page.server.gui
         self._file = f"odeform-{page.schema.scene}.json"
         with gui.add_folder("State of the page"):
-            save = gui.add_button("Save state", color="gray", hint="columns, parameters and time, as a small file")
+            hint = "columns, parameters, time and camera, as a small file"
+            save = gui.add_button("Save state", color="gray", hint=hint)
             save.on_click(lambda event: self._save(event.client))
             restore = gui.add_upload_button("Restore state", color="gray", mime_type="application/json")
             restore.on_upload(lambda event: self._restore(take_upload(event)))
@@ -25,7 +27,8 @@ class StatePanel(Panel):
         if client is None:
             return
         try:
-            client.send_file_download(self._file, self._page.save(), save_immediately=True)
+            sight = Sight.of(client.camera.position, client.camera.look_at)
+            client.send_file_download(self._file, self._page.save(sight), save_immediately=True)
         except InputError as error:
             self._page.notices.show("State not saved", str(error))
 

@@ -23,7 +23,7 @@ from odeform_viz.words import description_of, known_range, parameter_title, unit
 
 __all__ = ["ParameterPanel", "presets", "slider_range"]
 
-NO_PRESET = "–"
+NO_PRESET = "own values"
 MARGIN = 0.2  # of the trained span, by which a slider reaches beyond it
 BINS = 160  # along a slider; training samples in one bin share a mark
 

@@ -14,17 +14,20 @@ __all__ = ["ENLARGE", "legend_html", "values_html"]
 ENLARGE = "B"  # the hot key of the size of the plots
 STYLE = "padding:0 0.8em 0.3em;font:11px/1.5 sans-serif;color:var(--mantine-color-text)"
 QUIET = "opacity:0.65"
-CUT = "The axes fit the time before the orange part. ↑ marks what is cut off in it."
+CUT = (
+    "The axes fit the time before the orange part; ↑ is the largest value after it. Deformation and errors are RMS "
+    "distances over the body; dashed is the error that is expected, nine of ten are below it."
+)
 
 
-def legend_html(lines: Sequence[Line], time: float, large: bool) -> str:
-    """Returns one line: the time, the columns, and a button that presses the hot key `ENLARGE`."""
+def legend_html(lines: Sequence[Line], large: bool) -> str:
+    """Returns one line: the columns, and a button that presses the hot key `ENLARGE`."""
     names = "".join(f"<span>{_swatch(color)}{escape(label)}</span>" for label, color, _ in lines)
     size = "smaller" if large else "larger"
     button = f'<a data-hotkey="{ENLARGE}" style="margin-left:auto;cursor:pointer">{size} ⤢</a>'
     return (
         f'<div title="{CUT}" style="display:flex;gap:1.2em;white-space:nowrap;overflow:hidden;{STYLE}">'
-        f'<span style="{QUIET}">{time:.3f} s</span>{names}{button}</div>'
+        f"{names}{button}</div>"
     )
 
 

@@ -74,7 +74,7 @@ class PlotPanel(Panel):
         frame, lines = description.frame, self._lines
         time = frame.request.time
         set_content(self._cursor, cursor_css(self._window, time))
-        legend = legend_html(lines, time, self._large)
+        legend = legend_html(lines, self._large)
         if self._large:
             legend += values_html(frame.columns, lines, quantities_of(lines, self._rotates), time)
         set_content(self._legend, legend)

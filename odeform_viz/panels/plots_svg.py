@@ -35,7 +35,7 @@ QUANTITIES = (
     Quantity("height", "height of the centre", "m", 3),
     Quantity("rotation", "rotation", "°", 1),
     Quantity("deformation", "deformation, RMS", "mm", 2),
-    Quantity("error", "error, RMS (dashed: 90 %)", "mm", 2),
+    Quantity("error", "error (dashed: expected)", "mm", 2),
 )
 
 STYLE = """<style>
@@ -90,9 +90,7 @@ def _plot(quantity: Quantity, lines: Sequence[Line], window: Window) -> str:
     trained = WIDE * (window.stop - window.start) / (end - window.start)
     largest = max((float(np.nanmax(v, initial=high)) for _, _, v, _ in curves), default=high)
     cut = (
-        f'<text x="{WIDE - 2}" y="9" text-anchor="end" class="quiet">to {_short(largest)} ↑</text>'
-        if largest > high
-        else ""
+        f'<text x="{WIDE}" y="-6" text-anchor="end" class="quiet">↑ {_short(largest)}</text>' if largest > high else ""
     )
     return (
         f'<g transform="translate({LEFT},{TOP})">'

@@ -1,6 +1,7 @@
 """Always visible while a shape is shown that was not trained: how far it is from what was trained."""
 
 from collections.abc import Iterable
+from html import escape
 
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform_viz.page import Page, Panel
@@ -11,7 +12,8 @@ from odeform_viz.view import Description
 
 __all__ = ["ShapeWarningPanel", "shape_warning"]
 
-STYLE = "margin:-5px -10px;padding:5px 10px;border-radius:6px;background:#b54708;color:#fff;max-width:34em"
+STYLE = "margin:-5px -10px;padding:3px 10px;border-radius:6px;color:#fff;background:"
+GUESSED, UNKNOWN = "#b06a00", "#b3260c"  # of the badge: whether an error is known
 
 
 def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBodyPredictor | None = None) -> str:
@@ -23,15 +25,15 @@ def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBod
     if not untrained:
         return ""
     worst = max(untrained, key=lambda similarity: similarity.mean)
-    return (
-        f'<div style="{STYLE}"><b>⚠ Shape not trained</b><br>Its surface is on average {1e3 * worst.mean:.0f} mm from '
-        f"the trained body's, at most {1e3 * worst.distance:.0f} mm. {_motion(model)}.</div>"
-    )
+    color = GUESSED if model is not None and model.knows_untrained_errors else UNKNOWN
+    away = f"on average {1e3 * worst.mean:.0f} mm from the trained body's"
+    more = f"At most {1e3 * worst.distance:.0f} mm. {_motion(model)}."
+    return f'<div style="{STYLE}{color}" title="{escape(more)}">⚠ <b>Shape not trained</b>: its surface is {away}</div>'
 
 
 def _motion(model: UserBodyPredictor | None) -> str:
     if model is None:
-        return "It moves as the trained body would; no error is known"
+        return "It is moved as the trained body; no error is known"
     motion = model.describe_motion().capitalize()
     return f"{motion}, {model.describe_error()}"
 

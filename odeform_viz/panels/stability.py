@@ -6,8 +6,10 @@ from collections.abc import Callable
 from odeform.errors import InputError
 from odeform.stress.stability import StabilityMap
 from odeform_viz.page import Page, Panel
-from odeform_viz.panels.stability_svg import map_html, place_of
+from odeform_viz.panels.callbacks import set_content
+from odeform_viz.panels.stability_svg import here_css, map_html, place_of
 from odeform_viz.runtime.jobs import Job, map_stability
+from odeform_viz.view import Description
 
 __all__ = ["StabilityPanel"]
 
@@ -15,7 +17,9 @@ EXPLAINED = (
     "How far the body deforms for parameters inside and outside the trained range, within the trained window and after "
     "it. Takes about 20 s."
 )
-FOUND = "From {} motions. White frame: the trained range. Click a place to go there; sliders stop at their ends."
+FOUND = (
+    "From {} motions. White frame: the trained range; orange: the sliders. A click moves them there, up to their ends."
+)
 
 
 class StabilityPanel(Panel):
@@ -37,13 +41,18 @@ class StabilityPanel(Panel):
         self._bar = gui.add_progress_bar(0.0, visible=False)
         self._cancel = gui.add_button("Cancel the map", color="gray", visible=False)
         self._cancel.on_click(lambda _: self.close())
-        self._map = gui.add_html("", visible=False)
+        self._here, self._map = gui.add_html(""), gui.add_html("", visible=False)  # the box follows the map
         # the page hides it: a click on the map writes into it
         self._place = gui.add_text("place on the map", "", visible=False)
         self._place.on_update(lambda _: self._go())
         self._found: StabilityMap | None = None
         self._work: Callable[..., StabilityMap] = map_stability
         self._job: Job | None = None
+
+    def describe(self, description: Description) -> None:
+        if self._found is not None:
+            first, second = self._page.schema.learned[:2]
+            set_content(self._here, here_css(description.frame.request.parameters, self._found, (first, second)))
 
     def close(self) -> None:
         with self._lock:
@@ -73,6 +82,7 @@ class StabilityPanel(Panel):
         self._text.content = FOUND.format(found.solved)
         first, second = self._page.schema.learned[:2]
         self._place.visible = True  # before the map: clicks look for it
+        self._here.content = here_css(self._page.controls.parameters(), found, (first, second))
         self._map.content = map_html(found, (first, second))
         self._map.visible = True
 

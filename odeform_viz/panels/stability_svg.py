@@ -3,6 +3,7 @@
 import base64
 import io
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from PIL import Image
@@ -14,9 +15,9 @@ from odeform_viz.coloring.scale import colors_of
 from odeform_viz.view import ColorScale
 from odeform_viz.words import parameter_title
 
-__all__ = ["map_html", "place_of"]
+__all__ = ["here_css", "map_html", "place_of"]
 
-SIDE, LEFT, TOP, FOOT, GAP = 150, 44, 20, 34, 14  # units of the drawing
+SIDE, LEFT, TOP, FOOT, GAP = 150, 44, 20, 34, 22  # units of the drawing
 CLAMPED = (70, 70, 74)
 TICKS = (-3.0, -1.0, 1.0, 3.0)  # halves of the trained range, from its middle
 
@@ -34,14 +35,16 @@ def map_html(plot: StabilityMap, parameters: tuple[Parameter, Parameter]) -> str
     drawing = (
         f'<svg class="odeform-map" viewBox="0 0 {width} {TOP + SIDE + FOOT}" width="100%" style="max-height:230px">'
         f"<style>.odeform-map text{{font:9px sans-serif;fill:var(--mantine-color-text)}}"
-        f".odeform-map image{{cursor:crosshair;image-rendering:pixelated}}</style>{panels}{names}</svg>"
+        f".odeform-map image{{cursor:crosshair;image-rendering:pixelated}}"
+        f".odeform-map .here{{fill:#d66030;stroke:#fff;stroke-width:1.5}}</style>{panels}{names}</svg>"
     )
     bar = _png(colors_of(np.linspace(0.0, top, 256), _scale(top))[None])
     legend = (
         '<div style="display:flex;gap:0.5em;align-items:center;font:11px sans-serif;padding:0 0.8em 0.6em">'
-        f'<span>RMS deformation 0</span><img src="{bar}" style="flex:1;height:10px;max-width:16em">'
+        f'<span>change of shape (RMS) 0</span><img src="{bar}" style="flex:1;height:10px;max-width:16em">'
         f"<span>≥ {top:.3g} mm</span>"
-        f'<span style="width:1em;height:10px;background:rgb{CLAMPED}"></span><span>clamped: not valid any more</span>'
+        f'<span style="width:1em;height:10px;background:rgb{CLAMPED}"></span>'
+        "<span>stopped: not possible any more</span>"
         "</div>"
     )
     return drawing + legend
@@ -56,6 +59,15 @@ def place_of(text: str, plot: StabilityMap, parameters: tuple[Parameter, Paramet
         raise ValueError(f"expected fractions from 0 to 1, got {text!r}")
     values = {p.name: p.denormalise(unit) for p, unit in zip(parameters, units, strict=True)}
     return values, float(plot.times[int(moment)])
+
+
+def here_css(values: Mapping[str, float], plot: StabilityMap, parameters: tuple[Parameter, Parameter]) -> str:
+    """A style that marks parameters of these values on the map; nowhere where they are not on it."""
+    units = [float(p.normalise(values[p.name])) / _reach(plot) for p in parameters]
+    if not all(abs(unit) <= 1.0 for unit in units):
+        return "<style>.odeform-map .here{display:none}</style>"
+    x, y = 0.5 * SIDE * (1.0 + units[0]), 0.5 * SIDE * (1.0 - units[1])
+    return f"<style>.odeform-map .here{{transform:translate({x:.1f}px,{y:.1f}px)}}</style>"
 
 
 def _reach(plot: StabilityMap) -> float:
@@ -90,6 +102,7 @@ def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Paramete
         f'preserveAspectRatio="none" data-map="{index}"/>',
         f'<rect x="{left + low:.1f}" y="{TOP + low:.1f}" width="{high - low:.1f}" height="{high - low:.1f}" '
         'fill="none" stroke="#fff" stroke-width="1.5" pointer-events="none"/>',
+        f'<g transform="translate({left},{TOP})" pointer-events="none"><circle class="here" r="3.5"/></g>',
     ]
     for unit in TICKS:
         x, y = left + at(unit), TOP + SIDE - at(unit)

@@ -1,6 +1,8 @@
 """How each column was computed, and how large its errors are."""
 
 import math
+from collections.abc import Sequence
+from html import escape
 
 import numpy as np
 
@@ -8,12 +10,20 @@ from odeform.models.base import Predictor
 from odeform.models.error_band import FEWEST
 from odeform.motion.base import Motion, SolveStats
 from odeform.motion.rest import rests_from
+from odeform.motion.truth_errors import DISTANCE
 from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import DISTANCE, ColumnFrame, Description, played_until, shown_until
+from odeform_viz.view import ColumnFrame, Description, played_until, shown_until
 
-__all__ = ["StatusPanel", "describe_column"]
+__all__ = ["StatusPanel", "describe_column", "status_html"]
+
+STYLE = """<style>
+.odeform-status{width:100%;border-spacing:0;font:12px/1.4 sans-serif;color:var(--mantine-color-text);padding:0 0.6em}
+.odeform-status th{text-align:left;padding:0.5em 0 0.2em}
+.odeform-status td{vertical-align:top;padding:1px 0;border-top:1px solid #8883}
+.odeform-status td:first-child:not([colspan]){opacity:0.7;width:38%;padding-right:0.6em}
+</style>"""
 
 
 def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> str:
@@ -27,7 +37,7 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     if column.predictor is None:
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
-        lines.append(f"solver {stats.solver} · {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms")
+        lines.append(f"computed: {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms by {stats.solver}")
         lines.append(_solver_error(stats, shown.motion.schema.window) if settled else "solver error: …")
     else:
         lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.1f} ms")
@@ -73,8 +83,8 @@ def _calibrated(shown: ColumnFrame, predictor: Predictor) -> list[str]:
     """Says what nine in ten are of."""
     motions = 0 if shown.untrained else predictor.band_motions(shown.motion.parameters)
     if not motions:
-        return ["that is of single moments"]
-    return [f"that is of whole motions: 9 in 10 stay below it throughout, by {motions} that chose nothing"]
+        return ["expected of: single moments"]
+    return [f"expected of: whole motions, 9 of 10 stay below it throughout; by {motions} that chose nothing"]
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
@@ -97,14 +107,28 @@ def _rest(motion: Motion, settled: bool) -> list[str]:
     return [f"still moves at {until:.2g} s" if begin is None else f"at rest from t = {begin:.2f} s on"]
 
 
+def status_html(texts: Sequence[str]) -> str:
+    """A table: a heading for each text of `describe_column`, and below it what is said, by what it is of."""
+    return f'{STYLE}<table class="odeform-status">{"".join(map(_rows, texts))}</table>'
+
+
+def _rows(text: str) -> str:
+    title, *lines = (escape(line).replace("**", "") for line in text.split("  \n"))
+    rows = [f'<tr><th colspan="2">{title}</th></tr>']
+    for line in lines:
+        of, colon, what = line.partition(": ")
+        rows.append(f"<tr><td>{of}: </td><td>{what}</td></tr>" if colon else f'<tr><td colspan="2">{line}</td></tr>')
+    return "".join(rows)
+
+
 class StatusPanel(Panel):
-    """One paragraph per column."""
+    """A table with a part for each column."""
 
     def __init__(self, page: Page) -> None:
         with page.server.gui.add_folder("Status"):
-            self._text = page.server.gui.add_markdown("")
+            self._text = page.server.gui.add_html("")
 
     def describe(self, description: Description) -> None:
         frame = description.frame
-        columns = (describe_column(c, frame.request.time, description.settled) for c in frame.columns)
-        set_content(self._text, "\n\n".join(columns))
+        columns = [describe_column(c, frame.request.time, description.settled) for c in frame.columns]
+        set_content(self._text, status_html(columns))

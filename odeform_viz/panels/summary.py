@@ -1,5 +1,6 @@
 """How far the current frame can be trusted, what acts, and why a request cannot be met; always in view."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -12,11 +13,26 @@ from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.pushing import describe_push, first_push, outside_of_push
 from odeform_viz.view import ColumnFrame, Description, Frame
-from odeform_viz.words import known_range
+from odeform_viz.words import known_range, parameter_title
 
 __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
+INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
+PHYSICS, UNTESTED, REFUSED = "physics only", "not tested", "not modelled"
+UNRELIABLE, LIMITED, UNLEARNED = "not reliable", "too much deformation", "mechanics only"
+LARGE = 0.2  # of the body's size: an error from which on nothing is told of where the body is
+WHY = {
+    INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
+    EXTRAPOLATED: "The model has not learned from simulations like this one; its motion is carried on from them.",
+    UNTRAINED: "The model has learned from simulations of other shapes.",
+    PHYSICS: "Elasticity and contacts move the body. Nothing was learned of this kind of motion but its contacts.",
+    UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
+    UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
+    LIMITED: "The body deforms more than the model can follow: how it moves as a whole is computed, its shape is a guess.",
+    UNLEARNED: "The elasticity of the body moves it. Nothing of it was learned from motions.",
+    REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
+}
 UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
 
 
@@ -26,56 +42,96 @@ class Badge:
 
     level: str
     text: str
+    """A word or two; `WHY` has the rest."""
+    detail: str = ""
+    """What it is of, such as the parameters that are outside."""
     expected: str = ""
     """The error that is expected; empty where no model is in view."""
 
     @property
     def html(self) -> str:
-        """The text in the colour of its level, with the expected error."""
-        return f'<span class="odeform-badge {self.level}">{escape(self.text)}</span> {escape(self.expected)}'
+        """The text in the colour of its level, and beside it the detail with the expected error."""
+        beside = escape("; ".join(filter(None, (self.detail, self.expected))))
+        why = escape(WHY.get(self.text, ""))
+        return f'<span class="odeform-badge {self.level}" title="{why}">{escape(self.text)}</span> {beside}'
 
 
 def badge_of(frame: Frame) -> Badge:
     """The least that holds for all models in view."""
     models = [c for c in frame.columns if c.column.predictor]
     if not models:
-        return Badge("unknown", "only the truth is in view" if frame.columns else "no column is in view")
-    expected = _expected(models[0], alone=len(models) == 1)
+        return Badge("unknown", "no model in view", "only the truth" if frame.columns else "")
     for shown in models:
         if stop := shown.stop_at(frame.request.time):
-            return Badge("unknown", f"not modelled: {stop}")
+            return Badge("unknown", LIMITED if stop.limited else REFUSED, str(stop))
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
-            return Badge("unknown", f"not modelled: only t = {only:.3g} s is predicted, and shown")
-    schema = models[0].motion.schema
-    outside = list(dict.fromkeys([*(name for c in models for name in c.motion.outside), *outside_of_push(frame)]))
-    if models[0].motion.extrapolates(frame.request.time):
-        outside.insert(0, "time")
-    where = f"extrapolated: {', '.join(outside)} outside the {known_range(schema)}" if outside else ""
+            return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
+    expected, outside = _expected(models), _outside(frame, models)
     if untrained := [c for c in models if c.untrained]:
         known = all(c.column.predictor and c.column.predictor.knows_untrained_errors for c in untrained)
-        text = "; ".join(filter(None, ("shape not trained", where)))
-        return Badge("outside" if known else "unknown", text, expected)
-    if load_of_scene(schema.scene) is not None:
+        return Badge("outside" if known else "unknown", UNTRAINED, outside, expected)
+    if load_of_scene(models[0].motion.schema.scene) is not None:
         # amber: what moves it is modelled, and no data say how well under this load
-        text = "; ".join(filter(None, ("mechanics: only its contacts were fitted", where)))
-        return Badge("outside", text, expected)
-    if schema.scene == CLAMPED:
-        return Badge("outside", "; ".join(filter(None, ("mechanics: nothing of it is learned", where))), expected)
+        return Badge("outside", PHYSICS, outside, expected)
+    if models[0].motion.schema.scene == CLAMPED:
+        return Badge("outside", UNLEARNED, outside, expected)
     if any(c.changed for c in models):
-        where = "; ".join(filter(None, ("no data have this mass or stiffness", where)))
-        return Badge("unknown", where, expected)
-    return Badge("outside", where, expected) if outside else Badge("inside", "inside the trained range", expected)
+        return Badge("unknown", UNTESTED, "; ".join(filter(None, ("mass or stiffness", outside))), expected)
+    if outside and any(_useless(c) for c in models):
+        return Badge("unknown", UNRELIABLE, outside, expected)
+    return Badge("outside", EXTRAPOLATED, outside, expected) if outside else Badge("inside", INSIDE, "", expected)
 
 
-def _expected(shown: ColumnFrame, alone: bool) -> str:
-    """What is known of the error of the first model, which is named if it is not `alone`."""
-    band, of = shown.error_band(np.array([shown.time])), "" if alone else f"{shown.column.label}: "
-    if band is None:
-        return f"{of}error not known"
+def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:
+    """What is beyond the data, in words; empty if nothing is."""
+    schema = models[0].motion.schema
+    titles = {p.name: parameter_title(p) for p in schema.parameters}
+    names = [titles.get(name, name) for c in models for name in c.motion.outside] + outside_of_push(frame)
+    if models[0].motion.extrapolates(frame.request.time):
+        names.insert(0, "time")
+    return f"{' and '.join(dict.fromkeys(names))} beyond the {known_range(schema)}" if names else ""
+
+
+def _below(shown: ColumnFrame) -> float | None:
+    """The RMS distance in mm that the error stays below in nine of ten cases; None if it is not known."""
+    band = shown.error_band(np.array([shown.time]))
+    return None if band is None else float(band[0, 1])
+
+
+def _useless(shown: ColumnFrame) -> bool:
+    """Whether the error that is expected is a large part of the body's size."""
+    below, size = _below(shown), float(np.ptp(shown.column.geometry.points, axis=0).max())
+    return below is not None and below > 1e3 * LARGE * size
+
+
+def _expected(models: Sequence[ColumnFrame]) -> str:
+    """What is known of the error of the models at this moment: the largest of several."""
+    bands = [_below(shown) for shown in models]
+    unknown = [shown.column.label for shown, band in zip(models, bands, strict=True) if band is None]
+    known = [band for band in bands if band is not None]
+    if not known:
+        return "error not known"
     # outside of what was measured the band is carried on
-    rough = "roughly " if shown.motion.outside or shown.motion.extrapolates(shown.time) else ""
-    return f"{of}error in 9 of 10 cases {rough}below {band[0, 1]:.2g} mm"
+    rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
+    of = "" if len(known) == 1 else f", the largest of {len(known)}"
+    text = f"expected error {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
+    return "; ".join([text, *(f"{label}: error not known" for label in unknown)])
+
+
+def _errors_now(frame: Frame) -> list[str]:
+    """The errors against the truth, and a remark where one is larger than expected."""
+    known = [(c, c.error.rms_mm) for c in frame.columns if c.error]
+    if not known:
+        return []
+    named = len(known) > 1
+    values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
+    lines = [f"error now: {values} (RMS distance from the truth)"]
+    above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
+    if above:
+        of = f" of {escape(', '.join(above))}" if named else ""
+        lines.append(f"⚠ the error{of} is above what is expected in 9 of 10 cases")
+    return lines
 
 
 def summarize(frame: Frame) -> str:
@@ -83,8 +139,7 @@ def summarize(frame: Frame) -> str:
     lines = [badge_of(frame).html]
     if (push := first_push(frame)) is not None:
         lines.append(describe_push(*push))
-    if errors := [f"{escape(c.column.label)} RMS {c.error.rms_mm:.2f} mm" for c in frame.columns if c.error]:
-        lines.append(f"error now: {', '.join(errors)}")
+    lines += _errors_now(frame)
     truth = frame.truth
     if truth is not None and truth.ended and truth.column.truth:
         lines.append(f"no truth after {truth.column.truth.end:.3g} s: its last moment is shown, pale")

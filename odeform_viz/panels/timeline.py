@@ -36,14 +36,14 @@ def timeline_html(
     window."""
     play = _button("K", _icon("pause" if playing else "play"), "pause" if playing else "play")
     steps = (
-        _button("0", _icon("0"), "go to the start", wide=True)
-        + _button("J", _icon("J"), "previous frame", wide=True)
+        _button("0", _icon("0"), "go to the start", "wide")
+        + _button("J", _icon("J"), "previous frame", "fine")
         + play
-        + _button("L", _icon("L"), "next frame", wide=True)
-        + _button("P", "peak", "go to the largest deformation", wide=True)
+        + _button("L", _icon("L"), "next frame", "fine")
+        + _button("P", "peak", "go to the largest deformation", "fine")
     )
-    pace = _button("S", speed if "/" not in speed else f"{speed} speed", "another speed of playing", wide=True)
-    again = _button("R", "loop" if loop else "once", "play again and again, or once", wide=True)
+    pace = _button("S", speed if "/" not in speed else f"{speed} speed", "another speed of playing", "wide")
+    again = _button("R", "loop" if loop else "once", "play again and again, or once", "fine")
     return (
         f'<div class="odeform-buttons">{steps}</div><div class="odeform-moment"></div>'
         f"{_track(window, slider, marks, known)}"
@@ -60,8 +60,9 @@ def moment_css(window: Window, time: float) -> str:
     )
 
 
-def _button(key: str, content: str, title: str, wide: bool = False) -> str:
-    kind = ' class="odeform-wide"' if wide else ""
+def _button(key: str, content: str, title: str, narrow: str = "") -> str:
+    """What is `narrow` = "wide" is left out on phones, and what is "fine" in narrow windows too."""
+    kind = f' class="odeform-{narrow}"' if narrow else ""
     return f'<a role="link" data-hotkey="{key}" title="{title} ({key})"{kind}>{content}</a>'
 
 

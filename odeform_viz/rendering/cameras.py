@@ -1,11 +1,13 @@
 """The cameras of the browsers that look at the page."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import viser
 
 from odeform_viz.rendering.framing import Framing, Viewport
+from odeform_viz.view import Sight
 
 __all__ = ["Cameras"]
 
@@ -20,6 +22,7 @@ class Cameras:
         """`resized` is called when a browser appears or changes its size."""
         self._server, self._resized = server, resized
         self._framing: Framing | None = None
+        self._kept: Sight | None = None  # for the next aim
         server.scene.set_up_direction("+z")
         server.on_client_connect(self._connected)
 
@@ -33,13 +36,18 @@ class Cameras:
         """Aim no camera any more."""
         self._framing = None
 
+    def keep(self, sight: Sight) -> None:
+        """Let the next `aim` be at `sight` in the browsers that are there."""
+        self._kept = sight
+
     def aim(self, framing: Framing) -> None:
         """Aim the cameras of all browsers, and of those that connect later."""
-        self._framing = framing
+        self._framing, kept = framing, self._kept
+        self._kept = None
         initial, camera = self._server.initial_camera, framing.camera(self.viewport)
         initial.position, initial.look_at, initial.fov = tuple(camera.position), tuple(camera.look_at), camera.fov
         for client in self._server.get_clients().values():
-            _aim(client, framing)
+            _aim(client, framing, kept)
 
     async def _connected(self, client: viser.ClientHandle) -> None:
         size = _size(client)
@@ -74,8 +82,10 @@ class Cameras:
         )
 
 
-def _aim(client: viser.ClientHandle, framing: Framing) -> None:
+def _aim(client: viser.ClientHandle, framing: Framing, kept: Sight | None = None) -> None:
     camera = framing.camera(_size(client))
+    if kept is not None:
+        camera = replace(camera, position=np.array(kept.position), look_at=np.array(kept.look_at))
     with client.atomic():
         # position first: setting it also translates the target
         client.camera.position = camera.position

@@ -20,7 +20,8 @@ AZIMUTH = math.radians(213.7)  # of the camera around bodies on which nothing ac
 ASIDE = math.radians(35.0)  # between the plane of the view and what acts: seen from the side, its tail in front
 ALONE, SEVERAL = 0.35, 0.16  # rad; vertical field of view for one place and for a grid
 STAGE = 0.72  # radius of the floor under each of several columns, in sizes of the body
-SIDE, BOTTOM, TOP, EDGE = 350, 262, 88, 16  # px covered by the panels, and left free around everything
+SIDE, BOTTOM, TOP, EDGE = 350, 262, 100, 16  # px covered by the panels, and left free around everything
+NOTED = 36  # px that one more line of text over the scene takes
 PHONE = 768  # px; narrower pages have their panel at the bottom
 PHONE_TOP, PHONE_BOTTOM = 96, 200  # px there
 TITLE = 46  # px below each of several columns, for two lines
@@ -100,10 +101,12 @@ class Framing:
     """Width that is free for a title, in px."""
     stage: float
     """Radius in m of the floor under each column."""
+    noted: bool = False
+    """Whether one more line of text lies over the scene."""
 
     def camera(self, viewport: Viewport) -> Camera:
         """The camera of a browser of that size: all columns are within its free area."""
-        left, top, right, bottom = free_area(viewport)
+        left, top, right, bottom = free_area(viewport, self.noted)
         alone = len({tuple(offset) for offset in self.offsets}) == 1
         free = FILL[alone] * np.array([right - left, bottom - top])
         pixels = max(float((free / self.span).min()), 1e-3)  # per metre
@@ -115,22 +118,31 @@ class Framing:
         return Camera(look_at + distance * self.axes.direction, look_at, fov)
 
 
-def free_area(viewport: Viewport) -> tuple[float, float, float, float]:
-    """Left, top, right and bottom, in px, of what panels leave free in a page of that size."""
+def free_area(viewport: Viewport, noted: bool = False) -> tuple[float, float, float, float]:
+    """Left, top, right and bottom, in px, of what panels leave free in a page of that size; less of it where it is
+    `noted` that something is wrong with what is in view."""
     width, height = viewport
+    more = NOTED if noted else 0
     if width < PHONE:
-        return (EDGE, PHONE_TOP, width - EDGE, max(height - PHONE_BOTTOM, 0.5 * height))
-    return (EDGE, TOP, width - SIDE, max(height - BOTTOM, 0.4 * height))
+        return (EDGE, PHONE_TOP + more, width - EDGE, max(height - PHONE_BOTTOM, 0.5 * height))
+    return (EDGE, TOP + more, width - SIDE, max(height - BOTTOM, 0.4 * height))
 
 
 def frame_columns(
-    count: int, axes: Axes, body: Box, extent: float, viewport: Viewport, together: bool, level: bool
+    count: int,
+    axes: Axes,
+    body: Box,
+    extent: float,
+    viewport: Viewport,
+    together: bool,
+    level: bool,
+    noted: bool = False,
 ) -> Framing:
     """Place `count` bodies of `extent` m, each of which covers `body`, for a browser of size `viewport`.
 
-    `together` puts all in one place; `level` keeps several on one floor, in one row.
+    `together` puts all in one place; `level` keeps several on one floor, in one row; see `free_area` for `noted`.
     """
-    left, top, right, bottom = free_area(viewport)
+    left, top, right, bottom = free_area(viewport, noted)
     places = 1 if together else count
     alone = places == 1
     stage = STAGE * extent
@@ -155,7 +167,8 @@ def frame_columns(
     span = (wide, tall) if alone else (columns * pitch, rows * step)
     looked_at = middle if alone or level else np.zeros(3)
     title = across * axes.right + box.low * axes.above
-    return Framing(axes, tuple(offsets * (count if together else 1)), looked_at, span, title, pitch * pixels, stage)
+    places_of = tuple(offsets * (count if together else 1))
+    return Framing(axes, places_of, looked_at, span, title, pitch * pixels, stage, noted)
 
 
 def _cell(index: int, places: int, columns: int, rows: int, pitch: float, step: float, axes: Axes) -> Floats:

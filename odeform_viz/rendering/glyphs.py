@@ -106,6 +106,9 @@ class _Attached:
         return (end, end + vector) if self.arrow.leaves else (end - vector, end)
 
     def label(self, time: float) -> str:
-        """The strength now, of the largest."""
+        """The strength now, and the largest."""
         share = self.arrow.strength(time)
-        return self.arrow.label if share > 0.995 else f"{100.0 * share:.0f} % of {self.arrow.label}"
+        if share > 0.995:
+            return self.arrow.label
+        value, _, unit = self.arrow.label.partition(" ")
+        return f"{share * float(value):.3g} {unit} (peak {self.arrow.label})"

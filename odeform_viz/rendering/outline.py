@@ -1,19 +1,24 @@
 """What a body covers in the plane of the view while it moves, and what acts on it."""
 
+import math
+
 import numpy as np
 
+from odeform.loads.registry import load_of_scene
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Floats, Pose, Vector
+from odeform.types import Floats, Points, Pose, Vector
 from odeform_viz.obstacles import obstacles_of
 from odeform_viz.pushing import push_shown
 from odeform_viz.rendering.framing import Axes, Box
 from odeform_viz.view import ColumnFrame
 
-__all__ = ["climb_of", "direction_of", "outline_of"]
+__all__ = ["RISE", "ceiling_of", "direction_of", "outline_of"]
 
 MOMENTS = 60  # of a motion that are looked at
 POINTS = 200  # of a body
+AWAY = 5.0  # heights of a box alone, from which the camera looks at it
+RISE = 0.25  # of a body's size: what rises higher is followed, so that bodies that fall are not seen from far away
 
 
 def _acting_on(shown: ColumnFrame) -> Floats | None:
@@ -28,26 +33,41 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
     return np.stack([arrows[0].start, arrows[0].start + arrows[0].vector]) if arrows else None
 
 
-def outline_of(shown: ColumnFrame, axes: Axes, travels: bool) -> Box:
+def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math.inf) -> Box:
     """The box of the body within the trained window, of what acts on it, and of the middle of obstacles.
 
-    Where it goes along the floor counts if it `travels` through the view, and not if the view follows it.
+    Where it goes along the floor counts if it `travels` through the view, and not if the view follows it, as it does
+    where the centre is more than `most` m above its lowest.
     """
     poses = _poses(shown)
     points = np.asarray(shown.column.geometry.points, dtype=float)
     points = points[:: max(len(points) // POINTS, 1)]
     centre = points.mean(axis=0)
     turned = np.einsum("tij,nj->tni", poses[:, :3, :3], points - centre)
-    centres = poses[:, :3, :3] @ centre + poses[:, :3, 3]
+    true = poses[:, :3, :3] @ centre + poses[:, :3, 3]
+    centres = true.copy()
     if not travels:
         centres[:, :2] = centre[:2]
+    centres[:, 2] = np.minimum(true[:, 2], true[:, 2].min() + most)
     turned += centres[:, None]
     acting = _acting_on(shown)
+    if acting is not None and _flies(shown):
+        acting = acting + centres[0] - true[0]  # the arrow of a velocity goes with the body
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
     parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
-    corners = np.concatenate(parts)
-    across, upwards = corners @ axes.right, corners @ axes.above
-    return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
+    return _seen(np.concatenate(parts), axes)
+
+
+def _seen(corners: Points, axes: Axes) -> Box:
+    """The box of points (P, 3) m in the picture: what is nearer than the middle looks larger."""
+    flat = np.stack([corners @ axes.right, corners @ axes.above], axis=1)
+    middle = 0.5 * (flat.min(axis=0) + flat.max(axis=0))
+    away = AWAY * max(float(np.ptp(flat[:, 1])), 1e-6)
+    nearer = 1.0 / (1.0 - np.minimum((corners @ axes.direction) / away, 0.5))
+    (left, low), (right, high) = (
+        (edge(middle + (flat - middle) * nearer[:, None], axis=0)).tolist() for edge in (np.min, np.max)
+    )
+    return Box(left, right, low, high)
 
 
 def _poses(shown: ColumnFrame) -> Pose:
@@ -56,10 +76,16 @@ def _poses(shown: ColumnFrame) -> Pose:
     return shown.motion.pose(np.linspace(window.start, window.stop, MOMENTS))
 
 
-def climb_of(shown: ColumnFrame) -> float:
-    """Metres by which the centre of the body rises at most within the trained window."""
+def ceiling_of(shown: ColumnFrame, most: float) -> float:
+    """Metres above the floor up to which the centre of the body rises in the view: at most `most` above its lowest."""
     centre, poses = np.asarray(shown.column.geometry.points, dtype=float).mean(axis=0), _poses(shown)
-    return float((poses[:, 2, :3] @ centre + poses[:, 2, 3]).max() - centre[2])
+    heights = poses[:, 2, :3] @ centre + poses[:, 2, 3]
+    return float(min(heights.max(), heights.min() + most))
+
+
+def _flies(shown: ColumnFrame) -> bool:
+    load = load_of_scene(shown.motion.schema.scene)
+    return load is not None and load.flies
 
 
 def direction_of(shown: ColumnFrame) -> Vector | None:

@@ -1,5 +1,6 @@
 """Shows frames in viser's scene: columns on a grid in the plane of the view, or all in one place."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,11 +18,11 @@ from odeform_viz.rendering.column_view import ColumnView
 from odeform_viz.rendering.framing import Axes, Box, Framing, Viewport, frame_columns
 from odeform_viz.rendering.lights import Lights
 from odeform_viz.rendering.look import Colors, Look
-from odeform_viz.rendering.outline import climb_of, direction_of, outline_of
+from odeform_viz.rendering.outline import RISE, ceiling_of, direction_of, outline_of
 from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
 from odeform_viz.rendering.titles import title_of
-from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, Frame
+from odeform_viz.view import INVISIBLE, Coloring, ColumnFrame, DisplayOptions, Frame, Sight
 
 __all__ = ["SceneView"]
 
@@ -53,7 +54,7 @@ class SceneView:
         if pick is not None:
             server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
         self._framed: object = None  # what the framing was made for
-        self._climb = 0.0  # m by which bodies rise in it
+        self._ceiling = 0.0  # m above the floor up to which the centres of bodies rise in it
         start = Box(-extent, extent, 0.0, extent)
         self._framing = frame_columns(1, Axes.beside(None), start, extent, self.viewport, together=True, level=False)
         self._lights = Lights(server)
@@ -66,6 +67,11 @@ class SceneView:
     def fit(self) -> None:
         """Aim all cameras as they were before users turned them."""
         self._cameras.aim(self._framing)
+
+    def look(self, sight: Sight) -> None:
+        """Aim all cameras at `sight` with the next frame, instead of as they are at first."""
+        self._cameras.keep(sight)
+        self._framed = None
 
     def close(self) -> None:
         """Leave the cameras of browsers that stay connected to another page."""
@@ -128,14 +134,16 @@ class SceneView:
     def _frame_columns(self, frame: Frame, row: list[int], options: DisplayOptions, together: bool) -> Framing:
         """Places the columns. The cameras are aimed only when that changes, or the body does."""
         shapes = [id(shown.column.geometry) for shown in frame.columns]
-        reasons = (row, shapes, together, options.viewport, frame.still is None)
+        noted = any(shown.untrained for shown in frame.columns)
+        reasons = (row, shapes, together, options.viewport, frame.still is None, options.follow, noted)
         if frame.columns and self._framed != reasons:
             axes = Axes.beside(direction_of(frame.columns[0]))
-            outlines = [outline_of(c, axes, together and bool(obstacles_of(c.motion))) for c in frame.columns]
-            box, extent = _around(outlines), max(map(self._size, frame.columns))
-            level = frame.still is not None
-            self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level)
-            self._climb = max(map(climb_of, frame.columns))
+            extent, level = max(map(self._size, frame.columns)), frame.still is not None
+            travels = together and bool(obstacles_of(frame.columns[0].motion))
+            most = RISE * extent if together and options.follow and not (travels or level) else math.inf
+            box = _around([outline_of(c, axes, travels, most) for c in frame.columns])
+            self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level, noted)
+            self._ceiling = max(ceiling_of(c, most) for c in frame.columns)
             self._cameras.aim(self._framing)
             self._lights.aim(self._framing, everywhere=level)
             self._framed = reasons  # last: a request cancelled on the way is framed anew
@@ -170,9 +178,10 @@ class SceneView:
         if discs or not options.follow or not frame.columns or obstacles_of(frame.columns[0].motion):
             return np.zeros(3)
         first = frame.columns[0]
-        # in invisible steps, so that a body that falls straight down moves nothing
-        x, y, z = np.round(self._views[first.column.key][1].displacement(first) / INVISIBLE) * INVISIBLE
-        return -np.array([x, y, max(z - self._climb, 0.0)])
+        view = self._views[first.column.key][1]
+        moved = np.array([*view.displacement(first)[:2], max(view.centre(first)[2] - self._ceiling, 0.0)])
+        # in invisible steps, so that a body that falls straight down within the frame moves nothing
+        return -np.round(moved / INVISIBLE) * INVISIBLE
 
 
 @dataclass(frozen=True, eq=False)

@@ -96,7 +96,7 @@ def test_outside_the_trained_range_the_page_says_so(stubbed: View) -> None:
     _, client = stubbed
     client.set("time (s)", 1.2)
     client.set("mass (kg)", 1.1)
-    assert client.until(lambda: "extrapolated: time, mass outside the trained range" in client.text())
+    assert client.until(lambda: "time and mass beyond the trained range" in client.text())
 
 
 def test_a_port_in_use_is_refused(stubbed: View, port: int) -> None:

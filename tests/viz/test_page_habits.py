@@ -171,7 +171,7 @@ def test_on_a_phone_the_panel_is_folded_until_tapped(dark: Tab) -> None:
     try:
         page.goto(dark.app.url)
         start = page.get_by_role("tab", name="Explore", exact=True)
-        bar = page.get_by_text("ODeform · kick").first
+        bar = page.get_by_text("ODeform · ball, kicked").first
         bar.wait_for(timeout=1e3 * PATIENCE)
         assert until(lambda: not start.is_visible())
         until(lambda: bar.bounding_box()["y"] > 700)  # pyright: ignore[reportOptionalSubscript]

@@ -91,7 +91,7 @@ def test_nothing_is_claimed_of_a_load_that_was_not_measured(serve: Any, column: 
     assert client.until(lambda: _shows(app, "object-drop"))
     badge = badge_of(app.presenter.frame)
     assert badge.level == "outside"
-    assert "only its contacts were fitted" in badge.text
+    assert badge.text == "physics only"
     assert badge.expected == "error not known"
 
 

@@ -13,12 +13,13 @@ from odeform.dataset.index import Dataset
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
+from odeform.motion.truth_errors import DISTANCE
 from odeform.types import GaussianSplats
 from odeform_viz.columns import Column, Columns
-from odeform_viz.panels.status import describe_column
+from odeform_viz.panels.status import describe_column, status_html
 from odeform_viz.panels.summary import badge_of, summarize
 from odeform_viz.session import Session, visible_deformation
-from odeform_viz.view import INVISIBLE, ViewRequest
+from odeform_viz.view import INVISIBLE, Error, ViewRequest
 
 
 @pytest.fixture
@@ -174,6 +175,38 @@ def test_the_summary(session: Session, view_request: ViewRequest) -> None:
     assert "time" in late
     heavy = summarize(session.frame(replace(view_request, parameters={**view_request.parameters, "mass": 1.6})))
     assert "mass" in heavy
+
+
+def test_an_error_above_the_expected_one_is_remarked_and_a_large_one_is_not_reliable() -> None:
+    session, view_request = _alone(odeform.load("kick"))
+    frame = session.frame(view_request)
+    (shown,) = frame.columns
+    band = shown.error_band(np.array([shown.time]))
+    assert band is not None
+    for share, remarked in ((0.5, False), (1.5, True)):
+        of_coordinates = share * float(band[0, 1]) / DISTANCE
+        error = Error(np.full(len(shown.column.geometry.points), 1e-3), of_coordinates, of_coordinates)
+        text = summarize(replace(frame, columns=(replace(shown, error=error),)))
+        assert "error now: " in text
+        assert ("above what is expected" in text) == remarked
+    late = session.frame(replace(view_request, time=2.0 * session.schema.window.stop))
+    assert (badge_of(late).level, badge_of(late).text) == ("unknown", "not reliable")
+
+
+def test_of_several_models_the_largest_error_is_expected() -> None:
+    session, view_request = _alone(odeform.load("kick"))
+    (model,) = view_request.columns
+    columns = Columns.of([model, replace(model, pinned={**view_request.parameters, "force": 160.0})]).all
+    frame = session.frame(replace(view_request, columns=columns))
+    bands = [float(band[0, 1]) for c in frame.columns if (band := c.error_band(np.array([c.time]))) is not None]
+    assert f"below {max(bands):.2g} mm in 9 of 10 cases, the largest of 2" in badge_of(frame).expected
+
+
+def test_status_is_a_table() -> None:
+    session, view_request = _alone(odeform.load("kick"))
+    html = status_html([describe_column(session.frame(view_request).columns[0], view_request.time)])
+    assert "<td>solver error: </td>" in html
+    assert html.count("<th") == 1
 
 
 def test_a_body_below_the_floor_is_remarked(session: Session, view_request: ViewRequest) -> None:

@@ -17,7 +17,7 @@ from odeform.models.registry import load
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import fit_from_json, fit_to_json, shape_from
 from odeform_viz.state import capture, columns_of, state_from_json, state_to_json
-from odeform_viz.view import DisplayOptions, ViewRequest
+from odeform_viz.view import DisplayOptions, Sight, ViewRequest
 
 SCENE = "mass-elastic"
 MODEL = {"origin": SCENE, "label": "m", "pinned": None, "shown": True, "truth": False}
@@ -37,10 +37,11 @@ def view_request() -> ViewRequest:
 
 def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
     looks = DisplayOptions(overlay=True, color_by="strain", exaggeration=2.5, ghost=True, momentary=True)
-    state = state_from_json(state_to_json(capture(SCENE, view_request, looks, 0.5, False)), SCENE)
+    sight = Sight.of((1.0, 2.0, 0.5), (0.0, 0.1, 0.2))
+    state = state_from_json(state_to_json(capture(SCENE, view_request, looks, 0.5, False, sight)), SCENE)
     columns = columns_of(state, view_request.columns[0].source.schema)
-    again = capture(SCENE, ViewRequest(state.parameters, state.time, state.quality, tuple(columns)), looks, 0.5, False)
-    assert again == state
+    shown = ViewRequest(state.parameters, state.time, state.quality, tuple(columns))
+    assert capture(SCENE, shown, looks, 0.5, False, sight) == state
     assert state.display.momentary
     assert [c.label for c in columns] == ["odeform", "heavy", "truth"]
     assert [c.visible for c in columns] == [False, True, True]
@@ -58,6 +59,11 @@ def test_what_is_restored_is_what_was_saved(view_request: ViewRequest) -> None:
         (lambda s: json.dumps({**s, "time": "soon"}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "time": float("nan")}).encode(), "time in seconds"),
         (lambda s: json.dumps({**s, "speed": -1.0}).encode(), "speed above zero"),
+        (
+            lambda s: json.dumps({**s, "camera": {"position": [0, 0, 1], "look_at": [0, 0]}}).encode(),
+            "camera: expected",
+        ),
+        (lambda s: json.dumps({**s, "camera": {"position": 3}}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "columns": [7]}).encode(), "not a state file"),
         (lambda s: json.dumps({**s, "columns": []}).encode(), "a model under the sliders"),
         (lambda s: json.dumps([s]).encode(), "format 1"),

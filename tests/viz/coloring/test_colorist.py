@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,3 +73,18 @@ def test_nothing_is_kept_of_a_removed_column_or_truth(left: str) -> None:
     del record, truth, other, frame
     gc.collect()
     assert [reference() for reference in removed] == [None, None]
+
+
+def test_one_column_far_off_does_not_take_the_colours_of_the_others() -> None:
+    stub = StubPredictor()
+    record = RecordedMotion(stub.schema, recorded(stub, {"mass": 0.5}))
+    truth = Column("truth", record, record.geometry)
+    frame = _frame(Column("near", stub, stub.rest), Column("also near", stub, stub.rest), truth)
+    near, also, shown = frame.columns
+    assert near.error is not None
+    bad = replace(near.error, distances=100.0 * near.error.distances)
+    spoilt = replace(frame, columns=(near, replace(also, error=bad), shown))
+    alone = replace(frame, columns=(replace(near, error=bad), shown))
+    tops = [c.scale.top for each in (frame, spoilt, alone) if (c := Colorist().color(each, "error")) is not None]
+    assert tops[1] == tops[0]
+    assert tops[2] > 50.0 * tops[0]

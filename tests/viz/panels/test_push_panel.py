@@ -63,7 +63,7 @@ def test_a_tilt_turns_the_force_off_the_normal(pushed: View) -> None:
     body = surface(app, DONUT)
     assert client.until(lambda: math.degrees(push_from(app.request().parameters, body).angle) == pytest.approx(20.0))
     assert push_from(app.request().parameters, body).strength == pytest.approx(3.0)
-    assert client.until(lambda: "20° off the inward normal" in client.text())
+    assert client.until(lambda: "20° from straight in" in client.text())
     client.set("tilt sideways (°)", 50.0)
     assert client.until(lambda: "direction (trained up to 45°" in client.text())
 
@@ -99,8 +99,8 @@ def test_a_push_beyond_training_is_extrapolated_in_every_place(pushed: View) -> 
     _, client = pushed
     assert client.until(lambda: "inside the trained range" in client.text())
     client.set("tilt up (°)", 58.0)
-    assert client.until(lambda: "direction (trained up to 45° off the inward normal)" in client.text())
-    assert client.until(lambda: "extrapolated: direction outside the trained range" in client.text())
+    assert client.until(lambda: "direction (trained up to 45° from straight in)" in client.text())
+    assert client.until(lambda: "direction beyond the trained range" in client.text())
     assert client.until(lambda: "inside the trained range" not in client.text())
 
 

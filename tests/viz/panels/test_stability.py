@@ -10,7 +10,7 @@ from odeform.stress.stability import StabilityMap
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.panels.stability import StabilityPanel
-from odeform_viz.panels.stability_svg import map_html
+from odeform_viz.panels.stability_svg import here_css, map_html
 from odeform_viz.runtime.jobs import Report
 
 
@@ -80,5 +80,15 @@ def test_a_click_on_the_map_goes_there(kicked: tuple[App, LoopbackClient]) -> No
 def test_the_map_names_its_axes_and_shows_what_is_clamped() -> None:
     schema = odeform.load("kick").schema
     drawn = map_html(small(lambda _: None, "kick"), (schema.learned[0], schema.learned[1]))
-    assert all(text in drawn for text in ("mass, kg", "bending, N m", "2 s (2 × trained)", "≥ 4 mm", "clamped"))
+    assert all(text in drawn for text in ("mass, kg", "bending, N m", "2 s (2 × trained)", "≥ 4 mm", "stopped"))
     assert drawn.count("data-map=") == 2
+
+
+@pytest.mark.parametrize(("mass", "shown"), [(0.8, True), (50.0, False)])
+def test_the_map_marks_the_sliders_where_they_are_on_it(mass: float, shown: bool) -> None:
+    schema = odeform.load("kick").schema
+    mark = here_css(
+        {"mass": mass, "bending": 0.6}, small(lambda _: None, "kick"), (schema.learned[0], schema.learned[1])
+    )
+    assert ("translate(" in mark) == shown
+    assert ("display:none" in mark) != shown

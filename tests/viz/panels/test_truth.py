@@ -57,7 +57,7 @@ def test_a_test_sequence_moves_the_sliders_and_stands_beside_the_model(dropped: 
         assert client.until(lambda expected=expected: app.panel(ParameterPanel).parameters() == expected)
     assert [c.label for c in app.columns.all] == ["odeform", "truth"]
     assert client.until(lambda: "error now:" in client.text() and "distance from the truth" in client.text())
-    assert client.until(lambda: "error, RMS (dashed: 90 %), mm" in client.text())
+    assert client.until(lambda: "error (dashed: expected), mm" in client.text())
 
 
 def test_away_from_its_parameters_nothing_is_compared_and_there_is_a_way_back(dropped: View) -> None:
