@@ -19,6 +19,7 @@ LOADS: dict[str, str] = {
     "step": "odeform.loads.step:LOAD",
     "slope": "odeform.loads.slope:LOAD",
     "hold": "odeform.loads.hold:LOAD",
+    "meet": "odeform.loads.meet:LOAD",
 }
 """Load name to "module:attribute", imported when the load is first asked for."""
 
