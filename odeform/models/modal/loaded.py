@@ -18,6 +18,7 @@ from odeform.mechanics.obstacles import Obstacles
 from odeform.mechanics.push import PARTS, Push, held, kicked, no_push
 from odeform.mechanics.step import Mechanics
 from odeform.mechanics.warping import Turning
+from odeform.models.modal.settled import rested
 from odeform.schema import Schema
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Points, Rotations, Vector
@@ -68,6 +69,24 @@ class LoadedBody:
         if push.hold is not None:
             push = replace(push, hold=push.hold.begun(unpacked(starts, False)))
         return Beginning(push, starts, 0.0, all(situation.flight is None for situation in situations))
+
+    def begin_pair(self, situation: Situation) -> tuple[Push, Float[np.ndarray, "2 state"]]:
+        """Two like bodies, and where they begin: the one in the air, and the other one where it stands."""
+        assert situation.flight is not None
+        assert situation.twin is not None
+        push, twin, other = no_push(self.mechanics.body, self.soft), situation.twin, self._standing.copy()
+        shift, turn, *_ = parts_of(other[None])
+        other[shift] += [*(twin.place - self.anchor[:2]), 0.0]
+        other[turn] = (twin.turn @ other[turn].reshape(3, 3)).ravel()
+        starts = np.stack([self._flying(situation.flight, push.eigenvalues.shape[1]), other])
+        return _together([push, push]), starts
+
+    @cached_property
+    def _standing(self) -> Float[np.ndarray, " state"]:
+        """The flat state of a body that stands, as one that has landed does."""
+        state = rested(self.mechanics, self.soft)[0]
+        state[parts_of(state[None])[-1]] = 0.0
+        return state
 
     def _acted(self, situation: Situation) -> Push:
         pulse = situation.pulse
