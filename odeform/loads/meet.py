@@ -47,7 +47,7 @@ LOAD = Load(
     title="Throw it at another",
     happened="thrown at another",
     parameters=(
-        Parameter("distance", "m", 0.35, 0.6, 0.45, description="of the other one's middle, along x"),
+        Parameter("distance", "m", 0.35, 0.6, 0.55, description="of the other one's middle, along x"),
         Parameter("beside", "m", -0.06, 0.06, 0.0, description="of the other one's middle, along y"),
         Parameter("other_turn", "deg", -180.0, 180.0, 0.0, description="turn of the other one about z"),
         *PARAMETERS,
@@ -60,11 +60,11 @@ LOAD = Load(
     until=2.0,
     situation=situation,
     presets={
-        "head on": {"height": 0.05, "velocity_z": 0.3, "spin_y": 0.0},
+        "head on": {"height": 0.1, "velocity_x": 3.0, "velocity_z": 0.3, "spin_y": 0.0},
         "from above": {"distance": 0.4, "height": 0.4, "velocity_x": 1.5, "velocity_z": 1.5},
-        "a glancing blow": {"beside": 0.06, "height": 0.06, "velocity_x": 3.0, "velocity_z": 0.3, "spin_y": 0.0},
+        "a glancing blow": {"beside": 0.06, "height": 0.1, "velocity_x": 3.0, "velocity_z": 0.3, "spin_y": 0.0},
         "spinning into it": {"height": 0.1, "velocity_x": 3.0, "spin_y": 0.0, "spin_z": 10.0},
-        "one beside the other": {"other_turn": 90.0, "height": 0.05, "velocity_x": 2.0, "velocity_z": 0.5},
+        "one beside the other": {"other_turn": 90.0, "height": 0.1, "velocity_x": 2.0, "velocity_z": 0.5},
     },
     notes=(
         "The body begins in the air, without stress, and is thrown at another one that stands on the floor and is as it "

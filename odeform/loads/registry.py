@@ -6,7 +6,18 @@ from pathlib import Path
 from odeform.errors import InputError
 from odeform.loads.load import SCENES_OF_LOADS, Load
 
-__all__ = ["LOADS", "PUSH", "get_load", "known_as", "known_loads", "load_of_scene", "register_load", "split_load"]
+__all__ = [
+    "LOADS",
+    "PUSH",
+    "first_body",
+    "get_load",
+    "known_as",
+    "known_loads",
+    "load_of_scene",
+    "meets_twin",
+    "register_load",
+    "split_load",
+]
 
 PUSH = "push"
 """What happens in the scene `contact-force`, for which models are trained: a sphere pushes."""
@@ -58,6 +69,18 @@ def load_of_scene(scene: str) -> Load | None:
     """The load that acts in the scene of that name; None in other scenes."""
     name = scene.removeprefix(SCENES_OF_LOADS)
     return get_load(name) if name != scene and name in {*LOADS, *_registered} else None
+
+
+def meets_twin(scene: str) -> bool:
+    """Whether motions of the scene of that name are those of two like bodies."""
+    load = load_of_scene(scene)
+    return load is not None and load.pairs
+
+
+def first_body(scene: str, count: int) -> slice:
+    """Which of `count` points, of a motion of the scene of that name, are those of the body that something happens to:
+    all, or the first half."""
+    return slice(count // 2) if meets_twin(scene) else slice(count)
 
 
 def known_as(scene: str) -> str:

@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
-from odeform.geometry.solids.of_mesh import enclosed_by_mesh
+from odeform.geometry.solids.overlap import signed_distances
 from odeform.types import Floats, Ints, Mesh, Points, Vector
 
 __all__ = ["Inside", "inside_of"]
 
+CELLS, AROUND = 48, 4  # along the longest side of the body, and around it
 SWEEPS = 2  # times that the sample that carries a point is looked up
 SMALL = 1e-9  # in place of 0 / 0
 
@@ -74,11 +75,14 @@ class Inside:
 
 
 def inside_of(mesh: Mesh, samples: Points) -> Inside:
-    """The grid of a closed mesh at rest, m from its mass centre, with samples (S, 3) m of its surface. `InputError` for
-    a mesh that encloses nothing."""
-    grid = enclosed_by_mesh(mesh).distance
-    slopes = np.stack(np.gradient(grid.values, grid.cell), axis=-1)
-    values = np.concatenate([grid.values[..., None], slopes], axis=-1)
-    owners = KDTree(samples).query(grid.corners)[1].reshape(grid.values.shape)
-    return Inside(np.ascontiguousarray(values, dtype=float), owners, np.asarray(grid.origin, dtype=float), grid.cell)
+    """The grid of a closed mesh at rest, m from its mass centre, with samples (S, 3) m of its surface."""
+    points = np.asarray(mesh.points, dtype=float)
+    cell = float(np.ptp(points, axis=0).max()) / CELLS
+    low, high = points.min(axis=0) - AROUND * cell, points.max(axis=0) + AROUND * cell
+    axes = [low[axis] + cell * np.arange(int(np.ceil((high - low)[axis] / cell)) + 1) for axis in range(3)]
+    shape, corners = tuple(map(len, axes)), np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    distances = signed_distances(corners, mesh).reshape(shape)
+    slopes = np.stack(np.gradient(distances, cell), axis=-1)
+    values = np.ascontiguousarray(np.concatenate([distances[..., None], slopes], axis=-1))
+    return Inside(values, KDTree(samples).query(corners)[1].reshape(shape), low, cell)
 

@@ -1,9 +1,10 @@
 """The motion of two like bodies: the points of the one, then those of the other."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from odeform.geometry.shape_similarity import ShapeSimilarity
 from odeform.motion.base import Motion, SolveStats
@@ -13,7 +14,7 @@ from odeform.motion.ground import Ground
 from odeform.motion.plausibility import PlausibilityCheck, Sample
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.trajectory import Trajectory
-from odeform.motion.validity import Validity
+from odeform.motion.validity import UNKNOWN, Validity
 from odeform.schema import Parameters, Schema
 from odeform.types import Frames, Geometry, Matrices, Points, Pose, Times
 
@@ -40,7 +41,9 @@ class PairMotion(Motion):
     geometry: Geometry
     """Both where they rest, in one place."""
     both: tuple[One, One]
-    validity: Validity
+    keep_apart: Callable[[Times, Float[np.ndarray, "times 2 points 3"]], None]
+    """Moves points of both, m at (T,) s, out of each other."""
+    validity: Validity = UNKNOWN
 
     @classmethod
     def of(
@@ -53,6 +56,7 @@ class PairMotion(Motion):
         validity: Validity,
         body: CheckedBody,
         ground: Ground | None,
+        keep_apart: Callable[[Times, Float[np.ndarray, "times 2 points 3"]], None],
     ) -> "PairMotion":
         """Two bodies of the shape of `evaluated`, which `geometry` has twice, on two trajectories."""
 
@@ -77,7 +81,7 @@ class PairMotion(Motion):
             )
             for trajectory in trajectories
         )
-        return cls(schema, parameters, geometry, (one, other), validity)
+        return cls(schema, parameters, geometry, (one, other), keep_apart, validity)
 
     def _make_check(self) -> PlausibilityCheck | None:
         return self.both[0].plausibility
@@ -96,7 +100,12 @@ class PairMotion(Motion):
         return self.both[0].last_good
 
     def vertices(self, t: float | Times) -> Points | Frames:
-        return np.concatenate([one.vertices(t) for one in self.both], axis=-2)
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        out = np.stack([one.vertices(times) for one in self.both], axis=1)
+        if len(times):
+            self.keep_apart(self._clock(times), out)
+        out = out.reshape(len(times), -1, 3)
+        return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
         return self.both[0].pose(t)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from odeform.loads.registry import first_body, meets_twin
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Floats, Pose, Vector
@@ -34,7 +35,7 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool) -> Box:
     Where it goes along the floor counts if it `travels` through the view, and not if the view follows it.
     """
     poses = _poses(shown)
-    points = np.asarray(shown.column.geometry.points, dtype=float)
+    points = _points(shown)
     points = points[:: max(len(points) // POINTS, 1)]
     centre = points.mean(axis=0)
     turned = np.einsum("tij,nj->tni", poses[:, :3, :3], points - centre)
@@ -45,9 +46,24 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool) -> Box:
     acting = _acting_on(shown)
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
     parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
+    if meets_twin(shown.motion.schema.scene):
+        parts.append(_twin(shown))
     corners = np.concatenate(parts)
     across, upwards = corners @ axes.right, corners @ axes.above
     return Box(float(across.min()), float(across.max()), float(upwards.min()), float(upwards.max()))
+
+
+def _points(shown: ColumnFrame) -> Floats:
+    """(N, 3) m: the body at rest that the pose moves."""
+    points = np.asarray(shown.column.geometry.points, dtype=float)
+    return points[first_body(shown.motion.schema.scene, len(points))]
+
+
+def _twin(shown: ColumnFrame) -> Floats:
+    """(M, 3) m: where the other body is, at its start and at the end of the trained window."""
+    window = shown.motion.schema.window
+    frames = shown.motion.vertices(np.array([window.start, window.stop]))
+    return frames[:, first_body(shown.motion.schema.scene, frames.shape[1]).stop :].reshape(-1, 3).astype(float)
 
 
 def _poses(shown: ColumnFrame) -> Pose:
@@ -58,7 +74,7 @@ def _poses(shown: ColumnFrame) -> Pose:
 
 def climb_of(shown: ColumnFrame) -> float:
     """Metres by which the centre of the body rises at most within the trained window."""
-    centre, poses = np.asarray(shown.column.geometry.points, dtype=float).mean(axis=0), _poses(shown)
+    centre, poses = _points(shown).mean(axis=0), _poses(shown)
     return float((poses[:, 2, :3] @ centre + poses[:, 2, 3]).max() - centre[2])
 
 

@@ -274,8 +274,9 @@ class ModalModel(Model):
         if not self._pairs:
             return super(ModalModel, changed)._solve(geometry, parameters, settings, until, observed)
         both, evaluated = self.shown(geometry), changed.evaluate_basis(self._shapes.one(geometry), 0.0)
-        solved = changed.trajectory(changed.inputs(parameters), evaluated, settings, until)
-        return pair_motion(changed, both, evaluated, parameters, solved)
+        assert settings is not None
+        solved = changed.integrate(changed.inputs(parameters), evaluated, settings, until)
+        return pair_motion(changed, both, evaluated, parameters, solved, changed._loaded, changed._inside)
 
     def _solve_batch(
         self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float

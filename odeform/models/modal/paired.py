@@ -7,15 +7,16 @@ from jaxtyping import Float
 
 from odeform.geometry.twins import are_twins, half_of, twins_of
 from odeform.loads.situation import Situation
+from odeform.mechanics.apart import Apart
 from odeform.mechanics.inside import Inside
 from odeform.mechanics.pair import Pair
 from odeform.models.modal.loaded import LoadedBody
 from odeform.models.reduced_model import ReducedModel
-from odeform.models.solved import Problem
+from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.pair_motion import PairMotion
 from odeform.motion.recent import Recent, geometry_key
-from odeform.motion.trajectory import Adjusted, Shown, Trajectory
+from odeform.motion.trajectory import Adjusted, Shown
 from odeform.schema import Parameters
 from odeform.types import Floats, Geometry, Times
 
@@ -28,7 +29,7 @@ SHAPES = 4  # that are kept
 def pair_problem(body: LoadedBody, inside: Inside, situation: Situation, readout: Callable[[Floats], Readout]) -> Problem:
     """The problem of two bodies, of which the first one is thrown at the other one. `readout` makes that of one body
     from its directions of deformation."""
-    push, starts = body.begin_pair(situation)
+    push, starts = body.both, body.begin_pair(situation)
     read = readout(push.modes[0])
 
     def both(times: Times, states: Floats) -> Floats:
@@ -66,13 +67,16 @@ def pair_motion(
     both: Geometry,
     evaluated: EvaluatedBasis,
     parameters: Parameters,
-    trajectory: Trajectory,
+    trajectory: SolvedTrajectory,
+    body: LoadedBody,
+    inside: Inside,
 ) -> PairMotion:
     """The motion of two shapes, from the basis on one of them and a trajectory of both, (T, 2, 6 + K)."""
+    apart = Apart(inside, body.both, body.anchor, trajectory.states)
     kept, ground = Shown(trajectory, lambda _, y: y), model.ground_of(parameters)
     trajectories = tuple(Adjusted(kept, _of(index)) for index in range(2))
     return PairMotion.of(
-        model.schema, parameters, both, evaluated, trajectories, model.validity, model.checked_body, ground
+        model.schema, parameters, both, evaluated, trajectories, model.validity, model.checked_body, ground, apart
     )
 
 
