@@ -17,6 +17,7 @@ from odeform.types import Floats, Ints, Perpoint
 
 __all__ = ["BOTH", "SHARE", "Meeting", "Met"]
 
+NOTHING = np.zeros(0, dtype=np.int64)
 BOTH = ((0, 1), (1, 0))  # samples of the one meet the surface of the other
 SHARE = 0.25
 """Of the stiffness of a sample on the floor: two springs in series are half as stiff, and both surfaces have them."""
@@ -47,7 +48,8 @@ class Meeting:
         self._reach, self._most = reach, most
         self._samples = np.ascontiguousarray(push.points[0].T)
         grip = SHARE * parameters.floor_regularisation * push.masses[0]
-        self._springs = np.stack([SHARE * stiffness, grip])
+        self.springs = np.stack([SHARE * stiffness, grip])
+        self._extents = np.sqrt((push.rows[:, :3] ** 2).sum(axis=(1, 3)).max(axis=1))
 
     def near(self, state: State, step: float) -> Met:
         """The samples that may touch the other body in a step of so many seconds."""
@@ -55,11 +57,14 @@ class Meeting:
         spin = np.sqrt((velocity[:, 3:6] ** 2).sum(axis=1)).sum()
         speed = float(np.linalg.norm(velocity[0, :3] - velocity[1, :3]) + self._reach * spin)
         margin = MARGIN + (2.0 * step + self._parameters.floor_damping) * speed
+        extents = self._reach + self._extents * np.sqrt((state.modes * state.modes).sum(axis=1))
+        if np.linalg.norm(state.shift[0] - state.shift[1]) >= extents.sum() + margin:
+            return Met(self, (NOTHING, NOTHING))
         turning, place = bent(self._push.points, self._push.rows, state)
         turns, found = turning.rotations, []
         for one, other in BOTH:
             local = self._seen(place[one], state, one, other)
-            close = np.flatnonzero((local**2).sum(axis=1) < (np.sqrt((place[other] ** 2).sum(0).max()) + margin) ** 2)
+            close = np.flatnonzero((local * local).sum(axis=1) < (extents[other] + margin) ** 2)
             gap = self._inside.met(local[close], self._samples, place[other].T, turns[other])[0]
             below = np.flatnonzero(gap < margin)
             if len(below) > self._most:
@@ -87,7 +92,7 @@ class Meeting:
             out[:, :, other] *= -1.0
             parts.append(out.reshape(len(some), 3, 2 * size))
             gaps.append(gap)
-        stiffness, grip = self._springs[:, np.concatenate(chosen)]
+        stiffness, grip = self.springs[:, np.concatenate(chosen)]
         parameters, each = self._parameters, np.ones((1, len(stiffness)))
         return Contacts(
             np.concatenate(parts)[None],

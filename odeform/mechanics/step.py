@@ -133,12 +133,16 @@ class Steps:
         half steps less a whole one. Also returns its error (B,) in m: how far the two half steps are from the whole
         one."""
         # the whole step and the first half begin with the same contacts
-        near, middle = self._touching[state.pushed].near(state, step), time + 0.5 * np.asarray(step)
+        near, middle = self.near(state, step), time + 0.5 * np.asarray(step)
         begun = self._implicit(state, near, np.array([step, 0.5 * step]), np.array([time + np.asarray(step), middle]))
         end = np.array([time + np.asarray(step)])
         whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step]), end).after(0)
         between = apart(fine, whole)
         return extrapolated(whole, fine, between), self._size(between, fine.velocity - whole.velocity)
+
+    def near(self, state: State, step: float | Floats) -> Near:
+        """What may touch something in a step of `step` seconds, one or (B,)."""
+        return self._touching[state.pushed].near(state, step)
 
     def _size(self, between: Floats, speed: Floats) -> Floats:
         """(B,) about the RMS distance in m, now and with the velocities of each `AHEAD` from now."""

@@ -18,6 +18,7 @@ from odeform.loads.situation import Situation
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion
 from odeform.mechanics.inside import Inside, inside_of
+from odeform.mechanics.pair import Pair
 from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.pushed_batch import pushed_bodies
@@ -208,7 +209,8 @@ class ModalModel(Model):
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
-        vars(out).pop("_loaded", None)
+        for name in ("_loaded", "_pair"):
+            vars(out).pop(name, None)
         # a softer body deforms more before it is lost
         largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
         out.space = replace(self.space, largest=largest)
@@ -234,7 +236,7 @@ class ModalModel(Model):
         out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
         if (settled := self.settled_body) is not None:
             out.settled_body = replace(settled, mechanics=replace(settled.mechanics, parameters=contact_parameters))
-        for name in ("_loaded", "_mechanics"):
+        for name in ("_loaded", "_mechanics", "_pair"):
             vars(out).pop(name, None)
         return out
 
@@ -342,6 +344,11 @@ class ModalModel(Model):
         body = self._loaded.mechanics.body
         return inside_of(Mesh(self.body.points - self.body.anchor, self.body.faces), body.support.points)
 
+    @cached_property
+    def _pair(self) -> Pair:
+        """The right-hand side of two like bodies."""
+        return Pair(self._loaded.mechanics, self._loaded.both, self._inside)
+
     def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
         """Reads out states in the directions of deformation of one push."""
         return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
@@ -356,7 +363,8 @@ class ModalModel(Model):
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
         if self._pairs:
-            return pair_problem(self._loaded, self._inside, self._situation(theta), self._readout)
+            read = self._readout(self._loaded.both.modes[0])
+            return pair_problem(self._loaded, self._pair, self._situation(theta), read)
         begun = self._begin(theta[None])
         pushed = PushedBody(self._moving, begun.push, begun.pulse)
         return Problem(pushed, begun.start[0], self._readout(begun.push.modes[0]), at_rest=begun.at_rest)

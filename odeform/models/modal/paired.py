@@ -26,17 +26,14 @@ Readout = Callable[[Times, Floats], Floats]
 SHAPES = 4  # that are kept
 
 
-def pair_problem(body: LoadedBody, inside: Inside, situation: Situation, readout: Callable[[Floats], Readout]) -> Problem:
-    """The problem of two bodies, of which the first one is thrown at the other one. `readout` makes that of one body
-    from its directions of deformation."""
-    push, starts = body.both, body.begin_pair(situation)
-    read = readout(push.modes[0])
+def pair_problem(body: LoadedBody, pair: Pair, situation: Situation, read: Readout) -> Problem:
+    """The problem of two bodies, of which the first one is thrown at the other one. `read` is the readout of one."""
 
     def both(times: Times, states: Floats) -> Floats:
         each = states.reshape(len(states), 2, -1)
         return np.stack([read(times, each[:, index]) for index in range(2)], axis=1)
 
-    return Problem(Pair(body.mechanics, push, inside), starts.ravel(), both, at_rest=False)
+    return Problem(pair, body.begin_pair(situation).ravel(), both, at_rest=False)
 
 
 class Shapes:
