@@ -10,11 +10,14 @@ from odeform.mechanics.inside import Inside
 from odeform.mechanics.push import Push
 from odeform.mechanics.state import State
 from odeform.mechanics.warping import bent
-from odeform.types import Floats, Times, Vector
+from odeform.types import Floats, Ints, Times, Vector
 
 __all__ = ["Apart"]
 
 BOTH = ((0, 1), (1, 0))
+SHARES = (0.5, 0.5, 0.5, 0.5, 1.0)
+"""Of the depth that is left by which points of both are moved, one time after the other: where only the one gives way,
+as a nose that sinks into a flank does, it takes more than its half."""
 
 
 class Apart:
@@ -40,12 +43,25 @@ class Apart:
         reach = np.sqrt((place * place).sum(axis=1).max(axis=1))
         if np.linalg.norm(state.shift[0] - state.shift[1]) > reach.sum():
             return
-        turns, moves = turning.rotations, []
-        for one, other in BOTH:
-            local = (frame[one] - state.shift[other]) @ state.rotation[other]
-            close = np.flatnonzero((local * local).sum(axis=1) < reach[other] ** 2)
-            gap, normal, _ = self._inside.met(local[close], self._samples, place[other].T, turns[other])
-            inside = gap < 0.0
-            moves.append((close[inside], (0.5 * gap[:, None] * normal)[inside] @ state.rotation[other].T))
-        for points, (some, move) in zip(frame, moves, strict=True):
-            points[some] -= move.astype(points.dtype)
+        turns, samples = turning.rotations, (state.rotation @ place).swapaxes(1, 2) + state.shift[:, None]
+        # samples of each surface go along, so that it is known where it has been moved to
+        points = np.concatenate([frame, samples], axis=1)
+        chosen = [self._close(points[one], state, other, reach[other]) for one, other in BOTH]
+        for share in SHARES:
+            moved, moves = points[:, frame.shape[1] :] - samples, []
+            for (one, other), some in zip(BOTH, chosen, strict=True):
+                local = (points[one, some] - state.shift[other]) @ state.rotation[other]
+                gap, normal, owner = self._inside.met(local, self._samples, place[other].T, turns[other])
+                normal = normal @ state.rotation[other].T
+                gap = np.minimum(gap - (moved[other, owner] * normal).sum(axis=1), 0.0)
+                moves.append(share * gap[:, None] * normal)
+            for each, some, move in zip(points, chosen, moves, strict=True):
+                each[some] -= move
+            # what is outside of the other one stays so, as that only gives way
+            chosen = [some[move.any(axis=1)] for some, move in zip(chosen, moves, strict=True)]
+        frame[:] = points[:, : frame.shape[1]]
+
+    @staticmethod
+    def _close(points: Floats, state: State, other: int, reach: float) -> Ints:
+        away = points - state.shift[other]
+        return np.flatnonzero((away * away).sum(axis=1) < reach**2)

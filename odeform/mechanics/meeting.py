@@ -15,12 +15,10 @@ from odeform.mechanics.touching import MARGIN, axes_of
 from odeform.mechanics.warping import bent
 from odeform.types import Floats, Ints, Perpoint
 
-__all__ = ["BOTH", "SHARE", "Meeting", "Met"]
+__all__ = ["BOTH", "Meeting", "Met"]
 
 NOTHING = np.zeros(0, dtype=np.int64)
 BOTH = ((0, 1), (1, 0))  # samples of the one meet the surface of the other
-SHARE = 0.25
-"""Of the stiffness of a sample on the floor: two springs in series are half as stiff, and both surfaces have them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +45,8 @@ class Meeting:
         self._push, self._inside, self._parameters = push, inside, parameters
         self._reach, self._most = reach, most
         self._samples = np.ascontiguousarray(push.points[0].T)
-        grip = SHARE * parameters.floor_regularisation * push.masses[0]
-        self.springs = np.stack([SHARE * stiffness, grip])
+        # a sample presses on another body as it does on the floor
+        self.springs = np.stack([stiffness, parameters.floor_regularisation * push.masses[0]])
         self._extents = np.sqrt((push.rows[:, :3] ** 2).sum(axis=(1, 3)).max(axis=1))
 
     def near(self, state: State, step: float) -> Met:
