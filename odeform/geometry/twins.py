@@ -3,13 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Int
 
 from odeform.types import Faces, GaussianSplats, Geometry, Mesh
 
 __all__ = ["are_twins", "half_of", "twin_faces", "twins_of"]
 
 
-def twin_faces(faces: Faces, count: int) -> Faces:
+def twin_faces(faces: Faces, count: int) -> Int[np.ndarray, "both 3"]:
     """(2 F, 3) triangles of two bodies of `count` vertices each, from those of one, (F, 3)."""
     return np.concatenate([faces, faces + np.asarray(count, dtype=faces.dtype)])
 

@@ -20,7 +20,7 @@ FARTHEST = 100.0  # m
 
 def twin_of(parameters: Parameters) -> Twin:
     """Where the other one stands; `InputError` for a place that no throw reaches, and for what is no angle."""
-    place = np.array([float(parameters[name]) for name in ("distance", "beside")])
+    place = np.array([float(parameters[name]) for name in ("distance", "beside")] + [0.0])
     if not np.linalg.norm(place) <= FARTHEST:
         raise InputError(f"distance, beside: expected at most {FARTHEST:g} m, got {place[0]:g} and {place[1]:g}")
     turn = math.radians(float(parameters["other_turn"]))

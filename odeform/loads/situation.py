@@ -90,14 +90,14 @@ class Twin:
     """A second body like the first one, which stands on the floor at rest."""
 
     place: Vector
-    """(2,) m along the floor: where its mass centre is, from that of the first one."""
+    """(3,) m along the floor: where its mass centre is, from where that of the first one begins."""
     turn: Rotations = field(default_factory=lambda: np.eye(3))
     """(3, 3), about the vertical, from how the first one rests on the floor."""
 
     def placed(self, rest: Points, centre: Vector) -> Points:
         """Where points (N, 3) m of a body are that rests on the floor with its mass centre at `centre` (3,) m."""
         level = centre * [1.0, 1.0, 0.0]
-        return (rest - level) @ self.turn.T + [*self.place, 0.0]
+        return (rest - level) @ self.turn.T + self.place
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ class Apart:
     def __call__(self, times: Times, points: Float[np.ndarray, "times 2 points 3"]) -> None:
         """Move those of the points of both bodies, m at (T,) s, that are inside the other one."""
         shift, rotation, modes = body_motion(self._states(times).reshape(2 * len(times), -1))
-        none = np.zeros((2, 0))
+        none = np.zeros((2, 1))
         for index, frame in enumerate(points):
             both = slice(2 * index, 2 * index + 2)
             self._keep(State(shift[both] + self._anchor, rotation[both], modes[both], none, none), frame)

@@ -104,7 +104,7 @@ class PairMotion(Motion):
         out = np.stack([one.vertices(times) for one in self.both], axis=1)
         if len(times):
             self.keep_apart(self._clock(times), out)
-        out = out.reshape(len(times), -1, 3)
+        out = out.reshape(len(times), len(self.geometry.points), 3)
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:

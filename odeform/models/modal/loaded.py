@@ -84,7 +84,7 @@ class LoadedBody:
         assert situation.twin is not None
         twin, other = situation.twin, self._standing.copy()
         shift, turn, *_ = parts_of(other[None])
-        other[shift] += [*(twin.place - self.anchor[:2]), 0.0]
+        other[shift] += twin.place - self.anchor * [1.0, 1.0, 0.0]
         other[turn] = (twin.turn @ other[turn].reshape(3, 3)).ravel()
         return np.stack([self._flying(situation.flight, self.both.eigenvalues.shape[1]), other])
 

@@ -13,17 +13,17 @@ from odeform.mechanics.pair import Pair
 from odeform.models.modal.loaded import LoadedBody
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.solved import Problem, SolvedTrajectory
+from odeform.motion.base import SolveStats
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.pair_motion import PairMotion
 from odeform.motion.recent import Recent, geometry_key
-from odeform.motion.trajectory import Adjusted, Shown
 from odeform.schema import Parameters
 from odeform.types import Floats, Geometry, Times
 
 __all__ = ["Shapes", "pair_motion", "pair_problem"]
 
 Readout = Callable[[Times, Floats], Floats]
-SHAPES = 4  # that are kept
+SHAPES, RECENT = 4, 4  # shapes and results that are kept
 
 
 def pair_problem(body: LoadedBody, pair: Pair, situation: Situation, read: Readout) -> Problem:
@@ -69,14 +69,31 @@ def pair_motion(
     inside: Inside,
 ) -> PairMotion:
     """The motion of two shapes, from the basis on one of them and a trajectory of both, (T, 2, 6 + K)."""
-    apart = Apart(inside, body.both, body.anchor, trajectory.states)
-    kept, ground = Shown(trajectory, lambda _, y: y), model.ground_of(parameters)
-    trajectories = tuple(Adjusted(kept, _of(index)) for index in range(2))
+    apart, kept = Apart(inside, body.both, body.anchor, trajectory.states), Recent[Floats](RECENT)
+    trajectories = tuple(_OneOf(trajectory, index, kept) for index in range(2))
     return PairMotion.of(
-        model.schema, parameters, both, evaluated, trajectories, model.validity, model.checked_body, ground, apart
+        model.schema, parameters, both, evaluated, trajectories, model.validity, model.checked_body, model.ground_of(parameters), apart
     )
 
 
-def _of(index: int) -> Callable[[Times, Floats], Float[np.ndarray, "times y"]]:
-    return lambda _, y: y[:, index]
+class _OneOf:
+    """The trajectory of one of two bodies that are solved for together."""
 
+    def __init__(self, both: SolvedTrajectory, index: int, kept: Recent[Floats]) -> None:
+        """`kept` are the last results of both."""
+        self._both, self._index, self._kept = both, index, kept
+
+    @property
+    def stats(self) -> SolveStats:
+        """How both were computed."""
+        return self._both.stats
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which both are valid."""
+        return self._both.last_good
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "times y"]:
+        """Maps (T,) s to (T, 6 + K)."""
+        asked = np.asarray(times, dtype=float)
+        return self._kept.get(asked.tobytes(), lambda: self._both.reduced(asked))[:, self._index]
