@@ -138,7 +138,7 @@ class Columns:
         """Give all models another shape; None for the body that each was trained on."""
         with self._lock:
             self._columns = tuple(
-                replace(c, geometry=fit.geometry if fit else c.predictor.rest, fit=fit) if c.predictor else c
+                replace(c, geometry=_shape(c.predictor, fit), fit=fit) if c.predictor else c
                 for c in self._columns
             )
 
@@ -165,6 +165,11 @@ def _followed(column: Column, parameters: Parameters) -> Column:
     return column if column.geometry is body else replace(column, geometry=body)
 
 
+def _shape(predictor: Predictor, fit: FittedShape | None) -> Geometry:
+    """What is drawn of a shape that was loaded, or of a model's own body."""
+    return predictor.shown(fit.geometry if fit else predictor.rest)
+
+
 def _unused(label: str, taken: set[str]) -> str:
     names = itertools.chain([label], (f"{label} #{n}" for n in itertools.count(2)))
     return next(name for name in names if name not in taken)
@@ -182,8 +187,7 @@ def columns_under(columns: Sequence[Column], load: str) -> list[Column]:
             continue
         found, base = predictor.under(load), column.origin.removesuffix(f":{_load_of(predictor)}")
         origin = base if load == PUSH or not base else f"{base}:{load}"
-        geometry = column.geometry if column.loaded else found.rest
-        out.append(replace(column, source=found, geometry=geometry, origin=origin))
+        out.append(replace(column, source=found, geometry=_shape(found, column.fit), origin=origin))
     if not out:
         raise InputError(f"load {load!r}: no model of the page computes its bodies under it")
     return out

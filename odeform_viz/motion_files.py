@@ -85,7 +85,7 @@ def _frames(motion: Motion, times: Times, fit: FittedShape | None) -> Iterator[F
         points = visible_deformation(motion, time)
         splats = points is not None and isinstance(motion.geometry, GaussianSplats)
         covariances = motion.deformed_covariances(time) if splats else None
-        shown = ColumnFrame(column, motion, points, covariances, motion.pose(time), 0.0, None, time)
+        shown = ColumnFrame(column, motion, points, covariances, motion.placement(time), 0.0, None, time)
         yield Frame(ViewRequest(motion.parameters, float(time), "", (column,)), (shown,))
 
 

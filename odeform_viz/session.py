@@ -11,6 +11,7 @@ import numpy as np
 from odeform.cancellation import Cancelled
 from odeform.errors import InputError
 from odeform.geometry.rigid import unwrapped_vectors
+from odeform.loads.registry import first_body
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
 from odeform.motion.base import Motion
@@ -250,7 +251,7 @@ class Session:
 
     def _column(self, column: Column, request: ViewRequest) -> ColumnFrame:
         motion, time = self.motion(column, request), request.time
-        pose = motion.pose(time)
+        pose = motion.placement(time)
         points = visible_deformation(motion, time)
         body = motion.geometry.points if points is None else points
         heights = body @ pose[2, :3].astype(np.float32) + np.float32(pose[2, 3])
@@ -277,7 +278,8 @@ class Session:
     def _make_curves(self, shown: ColumnFrame, truth: RecordedMotion | None, request: ViewRequest) -> Curves:
         motion, times, predictor = shown.motion, self.curve_times, shown.column.predictor
         poses = motion.pose(times)
-        centre = np.asarray(motion.geometry.points, dtype=float).mean(axis=0)
+        points = np.asarray(motion.geometry.points, dtype=float)
+        centre = points[first_body(motion.schema.scene, len(points))].mean(axis=0)
         height = poses[:, 2, :3] @ centre + poses[:, 2, 3]
         turned = poses[:, :3, :3] @ poses[0, :3, :3].T  # since it began: a dropped body may begin turned
         rotation = np.degrees(np.linalg.norm(unwrapped_vectors(turned), axis=1))

@@ -106,8 +106,9 @@ def _moved(column: Column, body: UserBody) -> Column:
     if isinstance(predictor, TaughtBodyPredictor) or taught(predictor, body):
         whole = predictor.whole if isinstance(predictor, TaughtBodyPredictor) else predictor
         source = TaughtBodyPredictor(whole, body)
-        return replace(column, source=source, geometry=body.fit.geometry, fit=body.fit)
-    return replace(column, source=UserBodyPredictor(predictor, body), geometry=body.fit.geometry, fit=body.fit)
+    else:
+        source = UserBodyPredictor(predictor, body)
+    return replace(column, source=source, geometry=source.shown(body.fit.geometry), fit=body.fit)
 
 
 def without_user_body(columns: Sequence[Column]) -> list[Column]:
@@ -119,4 +120,5 @@ def _trained(column: Column) -> Column:
     predictor = column.predictor
     if not isinstance(predictor, UserBodyPredictor):
         return replace(column, visible=column.visible and predictor is not None)
-    return replace(column, source=predictor.trained, geometry=predictor.trained.rest, fit=None)
+    trained = predictor.trained
+    return replace(column, source=trained, geometry=trained.shown(trained.rest), fit=None)

@@ -61,6 +61,9 @@ class Load:
     """Whether a patch of the body is held: it deforms as its own modulus and damping say, and not as what was fitted to
     impacts, which makes up for what modes leave out there."""
 
+    pairs: bool = False
+    """Whether the body meets a twin of itself: motions are those of both, one after the other. Shells cannot."""
+
     @property
     def flies(self) -> bool:
         """Whether the body begins in the air, and not where it rests on the floor."""

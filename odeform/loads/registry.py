@@ -10,10 +10,12 @@ __all__ = [
     "CLAMPED",
     "LOADS",
     "PUSH",
+    "first_body",
     "get_load",
     "known_as",
     "known_loads",
     "load_of_scene",
+    "meets_twin",
     "register_load",
     "split_load",
 ]
@@ -31,6 +33,7 @@ LOADS: dict[str, str] = {
     "step": "odeform.loads.step:LOAD",
     "slope": "odeform.loads.slope:LOAD",
     "hold": "odeform.loads.hold:LOAD",
+    "meet": "odeform.loads.meet:LOAD",
 }
 """Load name to "module:attribute", imported when the load is first asked for."""
 
@@ -69,6 +72,18 @@ def load_of_scene(scene: str) -> Load | None:
     """The load that acts in the scene of that name; None in other scenes."""
     name = scene.removeprefix(SCENES_OF_LOADS)
     return get_load(name) if name != scene and name in {*LOADS, *_registered} else None
+
+
+def meets_twin(scene: str) -> bool:
+    """Whether motions of the scene of that name are those of two like bodies."""
+    load = load_of_scene(scene)
+    return load is not None and load.pairs
+
+
+def first_body(scene: str, count: int) -> slice:
+    """Which of `count` points, of a motion of the scene of that name, are those of the body that something happens to:
+    all, or the first half."""
+    return slice(count // 2) if meets_twin(scene) else slice(count)
 
 
 def known_as(scene: str) -> str:

@@ -10,7 +10,16 @@ from odeform.loads.obstacle import Obstacle
 from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Mesh, Perpoint, Points, Rotations, Vector
 
-__all__ = ["Clamp", "Flight", "Pulse", "Situation", "beginning_outside", "patch_weights", "pulse_strength"]
+__all__ = [
+    "Clamp",
+    "Flight",
+    "Pulse",
+    "Situation",
+    "Twin",
+    "beginning_outside",
+    "patch_weights",
+    "pulse_strength",
+]
 
 TOUCH = 2e-3  # m that a body may begin inside an obstacle: how it gives way under its weight is not looked at
 
@@ -77,6 +86,21 @@ class Clamp:
 
 
 @dataclass(frozen=True, eq=False)
+class Twin:
+    """A second body like the first one, which stands on the floor at rest."""
+
+    place: Vector
+    """(3,) m along the floor: where its mass centre is, from where that of the first one begins."""
+    turn: Rotations = field(default_factory=lambda: np.eye(3))
+    """(3, 3), about the vertical, from how the first one rests on the floor."""
+
+    def placed(self, rest: Points, centre: Vector) -> Points:
+        """Where points (N, 3) m of a body are that rests on the floor with its mass centre at `centre` (3,) m."""
+        level = centre * [1.0, 1.0, 0.0]
+        return (rest - level) @ self.turn.T + self.place
+
+
+@dataclass(frozen=True, eq=False)
 class Situation:
     """How a motion begins, and what acts on the body besides its weight and the floor."""
 
@@ -86,6 +110,8 @@ class Situation:
     clamp: Clamp | None = None
     obstacles: tuple[Obstacle, ...] = ()
     """What the body meets besides the floor. All situations of a load have as many."""
+    twin: Twin | None = None
+    """What it is thrown at."""
 
 
 def beginning_outside(rest: Mesh, flight: Flight, obstacles: tuple[Obstacle, ...], name: str) -> Situation:

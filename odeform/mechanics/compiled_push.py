@@ -507,42 +507,36 @@ def _drag(c, b, j, i, floor, force, r1, r2):
 
 @compiled
 @no_type_check
-def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, springs, away, matrix, out):
-    """The state after one step of first order, which ends at a time; false where it cannot be solved for."""
-    width = 6 + size + (1 if pushed else 0)
-    v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
-    _local(z, size, v)
-    _free(c, b, z, size, pushed, end, v, momentum, rate)
-    for k in range(width):
-        momentum[k] += step * rate[k]
-    for _ in range(2):
-        _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
-        _copy(momentum, right)
-        for j in range(len(away)):
-            row, active = springs[j], step * c.hold_stiffness[b, j // 3]
-            _add(row, active * (step + c.hold_damping), width, matrix)
-            for k in range(width):
-                right[k] -= active * away[j] * row[k]
-        for j in range(count):
-            n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
-            r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
-            time = step + (c.floor_damping if j < floor else c.push_damping)
-            force = c.stiffness[b, i] * (-gaps[j] - time * r0)
-            if force <= 0.0 or (j < floor and gaps[j] + (step + c.onset) * r0 > 0.0):
-                continue
-            active = step * c.stiffness[b, i]
-            drag = step * _drag(c, b, j, i, floor, force, r1, r2)
-            normal, impulse = time * active, -active * gaps[j]
-            for i in range(width):
-                a0, a1, a2 = normal * n[i], drag * s[i], drag * t[i]
-                right[i] += impulse * n[i]
-                row = matrix[i]
-                for k in range(i + 1):
-                    row[k] += a0 * n[k] + a1 * s[k] + a2 * t[k]
-        if not _solve(matrix, right):
-            return False
-        for k in range(width):
-            v[k] = right[k]
+def _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, matrix, right):
+    """Add the chosen contacts to the lower half of a matrix and to the momentum, at about these velocities."""
+    for j in range(count):
+        n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
+        r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
+        time = step + (c.floor_damping if j < floor else c.push_damping)
+        force = c.stiffness[b, i] * (-gaps[j] - time * r0)
+        if force <= 0.0 or (j < floor and gaps[j] + (step + c.onset) * r0 > 0.0):
+            continue
+        active = step * c.stiffness[b, i]
+        drag = step * _drag(c, b, j, i, floor, force, r1, r2)
+        _press(n, s, t, time * active, drag, -active * gaps[j], matrix, right)
+
+
+@compiled
+@no_type_check
+def _press(n, s, t, normal, drag, impulse, matrix, right):
+    """Add a contact with its three rows of the Jacobian to the lower half of a matrix and to the momentum."""
+    for i in range(len(right)):
+        a0, a1, a2 = normal * n[i], drag * s[i], drag * t[i]
+        right[i] += impulse * n[i]
+        row = matrix[i]
+        for k in range(i + 1):
+            row[k] += a0 * n[k] + a1 * s[k] + a2 * t[k]
+
+
+@compiled
+@no_type_check
+def _moved(z, v, size, pushed, step, out):
+    """The state after a step with constant velocities, in axes of the body."""
     _copy(z, out)
     start, vector = 13 + size, np.empty(3)
     for axis in range(3):
@@ -559,35 +553,39 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
     if pushed:
         out[start + 6 + size] = v[6 + size]
         out[12 + size] += step * v[6 + size]
+
+
+@compiled
+@no_type_check
+def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, springs, away, matrix, out):
+    """The state after one step of first order, which ends at a time; false where it cannot be solved for."""
+    width = 6 + size + (1 if pushed else 0)
+    v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
+    _local(z, size, v)
+    _free(c, b, z, size, pushed, end, v, momentum, rate)
+    for k in range(width):
+        momentum[k] += step * rate[k]
+    for _ in range(2):
+        _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
+        _copy(momentum, right)
+        for j in range(len(away)):
+            row, active = springs[j], step * c.hold_stiffness[b, j // 3]
+            _add(row, active * (step + c.hold_damping), width, matrix)
+            for k in range(width):
+                right[k] -= active * away[j] * row[k]
+        _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, matrix, right)
+        if not _solve(matrix, right):
+            return False
+        for k in range(width):
+            v[k] = right[k]
+    _moved(z, v, size, pushed, step, out)
     return True
 
 
 @compiled
 @no_type_check
-def _step(c, b, z, pushed, time, step, out, work):
-    """The state after a step of second order from a time on; returns its error in m."""
-    size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, springs, away, whole, half, matrix = work
-    floor, count = _near(c, b, z, size, pushed, step, chosen, gaps, what)
-    good, begin = True, z
-    # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
-    for part in range(3):
-        if part != 1:
-            _contacts(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps)
-            _hold(c, b, begin, size, springs, away)
-        length, end = (0.5 * step, half) if part else (step, whole)
-        if part == 2:
-            end = out
-        last = time + (0.5 * step if part == 1 else step)
-        good &= _implicit(
-            c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, springs, away, matrix, end
-        )
-        if part == 1:
-            begin = half
-    if not good:
-        for k in range(len(out)):
-            out[k] = np.nan
-        return np.nan
+def _second_order(c, size, pushed, whole, out):
+    """Make a state after two half steps that of second order, from that after a whole one; returns the error in m."""
     # twice two half steps less a whole one
     turn, start = np.empty((3, 3)), 13 + size
     for row in range(3):
@@ -619,6 +617,35 @@ def _step(c, b, z, pushed, time, step, out, work):
     for k in range(start, start + 6 + size + (1 if pushed else 0)):
         out[k] += out[k] - whole[k]
     return np.sqrt(total)
+
+
+@compiled
+@no_type_check
+def _step(c, b, z, pushed, time, step, out, work):
+    """The state after a step of second order from a time on; returns its error in m."""
+    size = c.eigenvalues.shape[1]
+    chosen, gaps, what, jacobian, springs, away, whole, half, matrix = work
+    floor, count = _near(c, b, z, size, pushed, step, chosen, gaps, what)
+    good, begin = True, z
+    # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
+    for part in range(3):
+        if part != 1:
+            _contacts(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps)
+            _hold(c, b, begin, size, springs, away)
+        length, end = (0.5 * step, half) if part else (step, whole)
+        if part == 2:
+            end = out
+        last = time + (0.5 * step if part == 1 else step)
+        good &= _implicit(
+            c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, springs, away, matrix, end
+        )
+        if part == 1:
+            begin = half
+    if not good:
+        for k in range(len(out)):
+            out[k] = np.nan
+        return np.nan
+    return _second_order(c, size, pushed, whole, out)
 
 
 @compiled

@@ -101,7 +101,8 @@ class CompiledBodies:
         self._mechanics, self._push, self._pulse = mechanics, push, pulse
 
     @cached_property
-    def _constants(self) -> "Constants":
+    def constants(self) -> "Constants":
+        """What steps in machine code take."""
         from odeform.mechanics.compiled_push import Constants  # importing Numba takes half a second
 
         mechanics, push, parameters = self._mechanics, self._push, self._mechanics.parameters
@@ -165,7 +166,7 @@ class CompiledBodies:
         from odeform.mechanics.compiled_push import slope_of
 
         out = np.empty_like(states)
-        slope_of(self._constants, rows, times, states, out)
+        slope_of(self.constants, rows, times, states, out)
         return out
 
     def advance(self, rows: Rows, times: Each, states: States, steps: Each) -> tuple[States, States, Each]:
@@ -176,14 +177,14 @@ class CompiledBodies:
         from odeform.mechanics.compiled_push import advance_all
 
         out, slopes, errors = np.empty_like(states), np.empty_like(states), np.empty(len(rows))
-        advance_all(self._constants, rows, times, states, steps, out, slopes, errors)
+        advance_all(self.constants, rows, times, states, steps, out, slopes, errors)
         return _followed(self._push, times, steps, (out, slopes, errors))
 
     def follow(self, row: int, control: tuple[float, ...], *nodes: np.ndarray) -> int:
         """Many steps of the push `row`, see `odeform.mechanics.compiled_push.follow`."""
         from odeform.mechanics.compiled_push import follow
 
-        return follow(self._constants, row, control, *nodes)
+        return follow(self.constants, row, control, *nodes)
 
 
 def _followed(push: Push, times: Each, steps: Each, out: tuple[States, States, Each]) -> tuple[States, States, Each]:

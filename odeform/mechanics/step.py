@@ -13,6 +13,7 @@ from scipy.linalg import get_lapack_funcs
 from odeform.loads.situation import pulse_strength
 from odeform.mechanics.body import ReducedBody
 from odeform.mechanics.contact_parameters import ContactParameters
+from odeform.mechanics.contacts import Contacts
 from odeform.mechanics.flat import parts_of, start_of, unpacked
 from odeform.mechanics.floor import GRAVITY, Floor, stand
 from odeform.mechanics.push import Push
@@ -22,7 +23,7 @@ from odeform.mechanics.touching import Near, Touching
 from odeform.mechanics.warping import bent
 from odeform.types import Floats
 
-__all__ = ["Mechanics", "Projectile", "Rest", "Steps"]
+__all__ = ["SWEEPS", "Mechanics", "Projectile", "Rest", "Steps", "local_velocity", "scene_velocity", "solved"]
 
 AHEAD = 0.02  # s: errors of velocities count by how far they carry in that time
 (SOLVE,) = get_lapack_funcs(("posv",), dtype=np.float64)
@@ -132,12 +133,16 @@ class Steps:
         half steps less a whole one. Also returns its error (B,) in m: how far the two half steps are from the whole
         one."""
         # the whole step and the first half begin with the same contacts
-        near, middle = self._touching[state.pushed].near(state, step), time + 0.5 * np.asarray(step)
+        near, middle = self.near(state, step), time + 0.5 * np.asarray(step)
         begun = self._implicit(state, near, np.array([step, 0.5 * step]), np.array([time + np.asarray(step), middle]))
         end = np.array([time + np.asarray(step)])
         whole, fine = begun.after(0), self._implicit(begun.after(1), near, np.array([0.5 * step]), end).after(0)
         between = apart(fine, whole)
         return extrapolated(whole, fine, between), self._size(between, fine.velocity - whole.velocity)
+
+    def near(self, state: State, step: float | Floats) -> Near:
+        """What may touch something in a step of `step` seconds, one or (B,)."""
+        return self._touching[state.pushed].near(state, step)
 
     def _size(self, between: Floats, speed: Floats) -> Floats:
         """(B,) about the RMS distance in m, now and with the velocities of each `AHEAD` from now."""
@@ -146,33 +151,48 @@ class Steps:
 
     def slope(self, state: State, time: float | Floats = 0.0) -> Floats:
         """Computes (B, V) accelerations at `time` s, one or (B,)."""
-        local, inner = _turned(state.velocity, state.rotation), slice(6, state.body)
+        local = local_velocity(state)
+        return scene_velocity(self.accelerations(self.rates(state, local, time)), state)
+
+    def rates(self, state: State, local: Floats, time: float | Floats = 0.0) -> Floats:
+        """Computes (B, V) rates of the momentum, with velocities `local` (B, V), both in axes of the bodies."""
+        inner = slice(6, state.body)
         _, rate = self._free(state, local)
         rate[:, inner] -= self._relaxation * self._eigenvalues * local[:, inner]
         rate += self._touching[state.pushed].near(state, 0.0).contacts(state).forces(local)
         rate += self._patched(state, np.asarray(time)[None])[0]
         if self._hold is not None:
             rate += self._hold.at(state).forces(local)
-        matrix = np.zeros((*local.shape, local.shape[1]))
-        self._add_masses(matrix, self._masses[: local.shape[1]])
-        return _turned(_solved(matrix, rate), state.rotation.swapaxes(-1, -2))
+        return rate
+
+    def accelerations(self, rate: Floats) -> Floats:
+        """(B, V) of rates of the momentum, in axes of the bodies."""
+        matrix = np.zeros((*rate.shape, rate.shape[1]))
+        self._add_masses(matrix, self._masses[: rate.shape[1]])
+        return solved(matrix, rate)
 
     def _implicit(self, state: State, near: Near, steps: Floats, ends: Floats) -> State:
         """The states (H, B) after one step of first order of each of H lengths in s, which end at `ends`, both (H,) or
         (H, B)."""
-        velocity, step = _turned(state.velocity, state.rotation), steps.reshape(len(steps), -1, 1)
+        velocity, step = local_velocity(state), steps.reshape(len(steps), -1, 1)
         momentum, rate = self._free(state, velocity)
         momentum, size = momentum + step * (rate + self._patched(state, ends)), velocity.shape[1]
         masses = self._masses[:size] + step * (step + self._relaxation) * self._stiffness[:, :size]
-        contacts, velocity = near.contacts(state), velocity[None]
+        velocity = self.solve(state, near.contacts(state), velocity[None], step, masses, momentum)
+        return state.moved(scene_velocity(velocity, state), step)
+
+    def solve(
+        self, state: State, contacts: Contacts, velocity: Floats, step: Floats, masses: Floats, momentum: Floats
+    ) -> Floats:
+        """Velocities (H, B, V) after each of H steps, in axes of the bodies."""
         springs = None if self._hold is None else self._hold.at(state).resistance(step)
         for _ in range(SWEEPS):
             matrix, impulse = contacts.resistance(velocity, step)
             if springs is not None:
                 matrix, impulse = matrix + springs[0], impulse + springs[1]
             self._add_masses(matrix, masses)
-            velocity = _solved(matrix, momentum + impulse)
-        return state.moved(_turned(velocity, state.rotation.swapaxes(-1, -2)), step)
+            velocity = solved(matrix, momentum + impulse)
+        return velocity
 
     def _free(self, state: State, velocity: Floats) -> tuple[Floats, Floats]:
         """Momentum (B, V) and its rate without contacts and damping, in axes of the bodies."""
@@ -209,6 +229,16 @@ class Steps:
         matrix[..., 3:6, 3:6] += self._solid.inertia
 
 
+def local_velocity(state: State) -> Floats:
+    """(B, V) velocities of a state in axes of the bodies."""
+    return _turned(state.velocity, state.rotation)
+
+
+def scene_velocity(velocity: Floats, state: State) -> Floats:
+    """(..., B, V) in axes of the scene, from those in axes of the bodies."""
+    return _turned(velocity, state.rotation.swapaxes(-1, -2))
+
+
 def _turned(velocity: Floats, rotation: Floats) -> Floats:
     """Velocities (..., V) of which shift and spin are turned by the inverse of rotations (..., 3, 3)."""
     out = velocity.copy()
@@ -217,7 +247,7 @@ def _turned(velocity: Floats, rotation: Floats) -> Floats:
     return out
 
 
-def _solved(matrices: Floats, right: Floats) -> Floats:
+def solved(matrices: Floats, right: Floats) -> Floats:
     """(..., V) solutions for symmetric positive matrices (..., V, V), which are overwritten; NaN where one is not.
 
     These are too small for `numpy.linalg.solve`: its checks take longer than the factors.

@@ -16,7 +16,7 @@ from odeform.mechanics.state import State
 from odeform.mechanics.warping import bent
 from odeform.types import Floats, Ints, Rotations
 
-__all__ = ["Near", "Touching", "most_contacts"]
+__all__ = ["MARGIN", "Near", "Touching", "axes_of", "most_contacts"]
 
 MARGIN = 1e-3  # m; samples farther from contact than this and the way of two steps are left out
 PUSH = 64  # contacts with the projectile that are followed: thin parts wrap around it
@@ -60,13 +60,13 @@ class Near:
         for obstacle, count in self.obstacles:
             some = slice(first, first + count)
             gap[:, some], normals = obstacle.met(_in_scene(place[..., some], state))
-            axes[:, some] = _axes(normals @ state.rotation)
+            axes[:, some] = axes_of(normals @ state.rotation)
             first += count
         if state.pushed:
             away = place[..., fixed:] - _centre(self.push, state)
             distance = np.sqrt((away * away).sum(axis=1))
             gap[:, fixed:] = distance - self.radius
-            axes[:, fixed:] = _axes((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
+            axes[:, fixed:] = axes_of((away / np.maximum(distance, 1e-9)[:, None]).swapaxes(1, 2))
         out = np.empty((*axes.shape[:3], state.velocity.shape[1]))
         out[..., :3] = axes
         np.matmul(axes, skew(-place.swapaxes(1, 2)), out=out[..., 3:6])
@@ -182,7 +182,7 @@ def _nearest(
     return chosen, np.take_along_axis(below, chosen, axis=1)
 
 
-def _axes(normals: Float[np.ndarray, "*batch 3"]) -> Rotations:
+def axes_of(normals: Float[np.ndarray, "*batch 3"]) -> Rotations:
     """(..., 3, 3) orthonormal rows of which the first is the normal: a reflection that carries it to an axis."""
     sign = np.copysign(1.0, normals[..., 0])
     half = normals.copy()

@@ -311,6 +311,11 @@ class Predictor(ABC):
         move with its surface."""
         return self.rest_of(parameters)
 
+    def shown(self, geometry: Geometry) -> Any:
+        """The shape whose points its motions have, from the one that is given to `solve`: two like it, where a body
+        meets a twin of itself."""
+        return geometry
+
     def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
         within. None where the checkpoint holds errors of too few validation sequences for that, and for a body of

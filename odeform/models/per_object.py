@@ -117,6 +117,9 @@ class PerObject(Predictor):
     def frontier_of(self, parameters: Parameters) -> tuple[FrontierPoint, ...]:
         return self.parts[parameters[OBJECT]].frontier
 
+    def shown(self, geometry: Geometry) -> Any:
+        return next(iter(self.parts.values())).shown(geometry)
+
     def _qualities_of(self, parameters: Parameters) -> Mapping[str, SolverSettings]:
         return self.parts[parameters[OBJECT]].qualities
 

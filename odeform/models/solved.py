@@ -31,7 +31,8 @@ class Problem(NamedTuple):
     start: Floats
     """(S,) the state at `begin`; its dtype is the precision."""
     readout: Callable[[Times, Floats], Floats]
-    """(T,) seconds and states (T, S) there -> coordinates (T, 6 + K) in metres and radians."""
+    """(T,) seconds and states (T, S) there -> coordinates (T, 6 + K) in metres and radians; of n bodies,
+    (T, n, 6 + K)."""
     begin: float = 0.0
     """Seconds; at times before it, the readout is given the state at it."""
     at_rest: bool = True
@@ -99,13 +100,15 @@ class SolvedTrajectory:
         return self._sample(times)
 
     def reduced(self, times: Floats) -> Floats:
-        """Maps (T,) seconds to (T, 6 + K); zero at time 0 of a motion that begins there."""
+        """Maps (T,) seconds to (T, 6 + K), or (T, n, 6 + K) of n bodies; zero at time 0 of a motion that begins there."""
         times = np.asarray(times, dtype=float)
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))
         # y(0) = 0 bit-exactly: a product over many rows rounds differently from that over one
-        moves = (times > 0.0)[:, None] | (not self._problem.at_rest)
-        return self._problem.readout(times, self._sample(times)) * moves
+        out = self._problem.readout(times, self._sample(times))
+        if self._problem.at_rest:
+            out = out * (times > 0.0).reshape(-1, *[1] * (out.ndim - 1))
+        return out
 
     @cached_property
     def _error_mm(self) -> float | None:

@@ -125,13 +125,17 @@ class Motion(Remade, ABC):
     def pose(self, t: float | Times) -> Pose:
         """T(t), the rigid part: (4, 4) in scene axes, metres; (T, 4, 4) for (T,) seconds. The identity at rest."""
 
+    def placement(self, t: float | Times) -> Pose:
+        """Where `deformed(t)` is put: (4, 4) or (T, 4, 4). The pose, or the identity for what has no single one."""
+        return self.pose(t)
+
     @abstractmethod
     def local(self, t: float | Times) -> Points | Frames:
         """D(t)(P0) - P0, the local displacement in the frame of the body at rest: (N, 3) or (T, N, 3) metres."""
 
     @abstractmethod
     def deformed(self, t: float) -> Points:
-        """Returns D(t)(P0), the deformed body before the rigid motion `pose(t)`: (N, 3) float32 metres."""
+        """Returns D(t)(P0), the deformed body before `placement(t)`, its rigid motion: (N, 3) float32 metres."""
 
     @abstractmethod
     def covariances(self, t: float) -> Matrices:
@@ -140,7 +144,7 @@ class Motion(Remade, ABC):
 
     @abstractmethod
     def deformed_covariances(self, t: float) -> Matrices:
-        """Returns the covariances of splats before the rigid motion, those of `deformed(t)`: (N, 3, 3) m^2."""
+        """Returns the covariances of splats before `placement(t)`, those of `deformed(t)`: (N, 3, 3) m^2."""
 
     @abstractmethod
     def deformation_bound(self, time: float) -> float:

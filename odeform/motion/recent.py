@@ -29,6 +29,11 @@ class Recent(Generic[Value]):
         self._size = size
         self._entries: tuple[tuple[Hashable, Value], ...] = ()
 
+    @property
+    def values(self) -> tuple[Value, ...]:
+        """Those that are kept, the last one first."""
+        return tuple(value for _, value in self._entries)
+
     def get(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """The value of `key`, which is made if it is not kept."""
         entries = self._entries

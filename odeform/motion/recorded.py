@@ -9,9 +9,10 @@ from scipy.interpolate import CubicSpline
 
 from odeform.geometry.rigid import best_rigid, rotation_from_vector, unwrapped_vectors
 from odeform.geometry.shape import surface_weights
+from odeform.loads.registry import first_body, meets_twin
 from odeform.motion.base import SolveStats, checked_times
 from odeform.schema import OBJECT, Parameters, Schema
-from odeform.types import Floats, Frames, Mesh, MotionSequence, Points, Pose, Times
+from odeform.types import Floats, Frames, Mesh, MotionSequence, Perpoint, Points, Pose, Times
 
 __all__ = ["RecordedMotion"]
 
@@ -75,7 +76,8 @@ class RecordedMotion:
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
-        """The best rigid motion from the rest: (4, 4) in scene axes, metres; (T, 4, 4) for (T,) times."""
+        """The best rigid motion from the rest, of two bodies that of the first: (4, 4) in scene axes, metres; (T, 4, 4)
+        for (T,) times."""
         turn, shift = np.split(self._splines[1](np.clip(checked_times(t), 0.0, self.end)), 2, axis=1)
         out = np.zeros((len(turn), 4, 4))
         out[:, :3, :3] = rotation_from_vector(turn)
@@ -83,9 +85,14 @@ class RecordedMotion:
         out[:, 3, 3] = 1.0
         return out[0] if np.ndim(t) == 0 else out
 
-    def deformed(self, t: float) -> Points:
-        """The deformation without the pose: (N, 3) float32 metres; `pose(t)` moves it to `vertices(t)`."""
+    def placement(self, t: float | Times) -> Pose:
+        """Where `deformed(t)` is put: the pose, or of two bodies the identity."""
         pose = self.pose(t)
+        return np.broadcast_to(np.eye(4), pose.shape) if meets_twin(self.schema.scene) else pose
+
+    def deformed(self, t: float) -> Points:
+        """The deformation without the pose: (N, 3) float32 metres; `placement(t)` moves it to `vertices(t)`."""
+        pose = self.placement(t)
         return ((self.vertices(t) - pose[:3, 3]) @ pose[:3, :3]).astype(np.float32)
 
     def deformation_bound(self, time: float) -> float:
@@ -94,9 +101,15 @@ class RecordedMotion:
 
     def deformation_rms(self, times: Times) -> Times:
         """(T,) root-mean-square local displacement over the surface in metres."""
-        frames, poses = self.vertices(times), self.pose(times)
-        back = np.einsum("tni,tij->tnj", frames - poses[:, None, :3, 3], poses[:, :3, :3])
-        return np.sqrt(((back - self.sequence.vertices[0]) ** 2).sum(axis=2) @ surface_weights(self.geometry))
+        frames, rest, weights = self.vertices(times), self.sequence.vertices[0], surface_weights(self.geometry)
+        count = self._first.stop
+        bodies, squares = (slice(first, first + count) for first in range(0, len(rest), count)), 0.0
+        for body in bodies:
+            turns, shifts = best_rigid(rest[body], frames[:, body], weights[body] / weights[body].sum())
+            middle = weights[body] @ rest[body].astype(float) / weights[body].sum()
+            back = np.einsum("tni,tij->tnj", frames[:, body] - (middle + shifts)[:, None], turns)
+            squares = squares + ((back + middle - rest[body]) ** 2).sum(axis=2) @ weights[body]
+        return np.sqrt(np.asarray(squares))
 
     def of(self, parameters: Parameters) -> bool:
         """Whether this may be the motion under these parameters, to the resolution of a slider."""
@@ -112,7 +125,17 @@ class RecordedMotion:
 
     @cached_property
     def _centre(self) -> Floats:
-        return self.sequence.weights @ self.sequence.vertices[0].astype(float)
+        return self._weights @ self.sequence.vertices[0, self._first].astype(float)
+
+    @cached_property
+    def _first(self) -> slice:
+        """The vertices of the body whose pose is known."""
+        return first_body(self.schema.scene, len(self.sequence.weights))
+
+    @cached_property
+    def _weights(self) -> Perpoint:
+        weights = self.sequence.weights[self._first]
+        return weights / weights.sum()
 
     @cached_property
     def _splines(self) -> tuple[CubicSpline, CubicSpline]:
@@ -121,6 +144,6 @@ class RecordedMotion:
         Linear interpolation would cut 1 mm off an impact at 120 frames per second, more than the error of good models.
         """
         times, vertices = self.sequence.times, self.sequence.vertices
-        rotations, shifts = best_rigid(vertices[0], vertices, self.sequence.weights)
+        rotations, shifts = best_rigid(vertices[0, self._first], vertices[:, self._first], self._weights)
         poses = np.concatenate([unwrapped_vectors(rotations), shifts], axis=1)
         return CubicSpline(times, vertices.astype(float)), CubicSpline(times, poses)

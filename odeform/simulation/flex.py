@@ -1,4 +1,4 @@
-"""One MuJoCo flex whose vertices are the degrees of freedom. Shells and solids differ in their model's XML alone."""
+"""A MuJoCo flex, or several like ones, whose vertices are the degrees of freedom. Shells and solids differ in their model's XML alone."""
 
 # MuJoCo is a compiled module without type stubs
 # pyright: reportAttributeAccessIssue=false
@@ -43,8 +43,10 @@ def flex_xml(
     floor: bool = True,
     others: str = "",
     solver: str = 'solver="CG"',
+    bodies: int = 1,
 ) -> str:
-    """The MuJoCo model of one flex, whose `elements` are (M, 3) triangles of a shell or (M, 4) tetrahedra.
+    """The MuJoCo model of a flex, whose `elements` are (M, 3) triangles of a shell or (M, 4) tetrahedra, or of so many
+    like `bodies`.
 
     `elasticity` holds the attributes of the element of that name, `others` the XML of further bodies, and `solver` the
     attributes of the constraint solver. `mass` is in kg, `step` in s, `gravity` in m/s^2 along -z.
@@ -52,21 +54,26 @@ def flex_xml(
     plane = f'<geom type="plane" size="0 0 1" pos="0 0 {-CONTACT_RADIUS}" {contact.xml}/>' if floor else ""
     coordinates = " ".join(f"{x:.17g}" for x in np.asarray(points, dtype=float).ravel())
     corners = " ".join(map(str, np.asarray(elements).ravel()))
-    return f"""<mujoco>
-  <option timestep="{step}" integrator="discrete" gravity="0 0 {-gravity}"
-    iterations="{ITERATIONS}" {solver}/>
-  <worldbody>{plane}{others}
-    <body name="body"><flexcomp name="flex" type="direct" dim="{np.shape(elements)[1] - 1}" mass="{mass}"
+    flexes = "".join(
+        f"""
+    <body name="body{index}"><flexcomp name="flex{index}" type="direct" dim="{np.shape(elements)[1] - 1}" mass="{mass}"
       radius="{CONTACT_RADIUS}" point="{coordinates}" element="{corners}">
       <contact selfcollide="none" {contact.xml}/>
       <elasticity {elasticity}/>
-    </flexcomp></body>
+    </flexcomp></body>"""
+        for index in range(bodies)
+    )
+    return f"""<mujoco>
+  <option timestep="{step}" integrator="discrete" gravity="0 0 {-gravity}"
+    iterations="{ITERATIONS}" {solver}/>
+  <worldbody>{plane}{others}{flexes}
   </worldbody>
 </mujoco>"""
 
 
 class FlexBody:
-    """A flexible body of N vertices, stepped in time. It is a `odeform.simulation.stepping.Body`.
+    """A flexible body of N vertices, or several like ones of N in all, stepped in time. It is a
+    `odeform.simulation.stepping.Body`.
 
     Its coordinates are the last of the model; other bodies come before it.
 
@@ -76,10 +83,13 @@ class FlexBody:
     `step` restores the angular momentum, which only the contact and the applied forces may change.
     """
 
-    def __init__(self, xml: str, reference: Points, mass_fractions: Perpoint | None = None) -> None:
+    def __init__(
+        self, xml: str, reference: Points, mass_fractions: Perpoint | None = None, bodies: int = 1
+    ) -> None:
         """`xml` is the MuJoCo model; `reference` (N, 3) m are the positions at which all its coordinates are 0.
 
-        `mass_fractions` (N,) are the vertices' mass fractions; by default all are equal.
+        `mass_fractions` (N,) are the vertices' mass fractions; by default all are equal. The vertices are those of so
+        many `bodies`, one after the other.
         """
         self.model = mujoco.MjModel.from_xml_string(xml)
         self.data = mujoco.MjData(self.model)
@@ -93,6 +103,8 @@ class FlexBody:
         self._applied = self.data.qfrc_applied[-self._reference.size :].reshape(-1, 3)
         self.masses = self.model.body_mass[-len(self._reference) :].copy()
         self.weights = self.masses / self.masses.sum()
+        size = len(self._reference) // bodies
+        self._bodies = [slice(size * index, size * (index + 1)) for index in range(bodies)]
         self._converged = True
 
     @property
@@ -122,25 +134,26 @@ class FlexBody:
     def step(self, force: Floats | None = None) -> None:
         """Advance by one time step under `force` (N, 3) in newton at the vertices."""
         self._applied[:] = 0.0 if force is None else force
-        before = self._centred()
-        momentum = self._angular_momentum(before)
+        before = [self._centred(body) for body in self._bodies]
+        momenta = [self._angular_momentum(arms, body) for arms, body in zip(before, self._bodies, strict=True)]
         mujoco.mj_step(self.model, self.data)
         if self.data.warning.number.any():
             self.check()
         self._converged &= bool(self.data.solver_niter.max() < ITERATIONS)
         external = self.contact_forces + self._applied
-        momentum = momentum + self.model.opt.timestep * np.cross(before, external).sum(axis=0)
-        after = self._centred()
-        inertia = (self.masses * (after**2).sum(axis=1)).sum() * np.eye(3) - (self.masses[:, None] * after).T @ after
-        spin = np.linalg.solve(inertia, momentum - self._angular_momentum(after))
-        self.velocities[:] += np.cross(spin, after)
+        for body, arms, begun in zip(self._bodies, before, momenta, strict=True):
+            momentum = begun + self.model.opt.timestep * np.cross(arms, external[body]).sum(axis=0)
+            after, masses = self._centred(body), self.masses[body]
+            inertia = (masses * (after**2).sum(axis=1)).sum() * np.eye(3) - (masses[:, None] * after).T @ after
+            spin = np.linalg.solve(inertia, momentum - self._angular_momentum(after, body))
+            self.velocities[body] += np.cross(spin, after)
 
-    def _centred(self) -> Floats:
-        positions = self.positions
-        return positions - self.weights @ positions
+    def _centred(self, body: slice) -> Floats:
+        positions, masses = self.positions[body], self.masses[body]
+        return positions - masses / masses.sum() @ positions
 
-    def _angular_momentum(self, centred: Floats) -> Floats:
-        return np.cross(centred, self.masses[:, None] * self.velocities).sum(axis=0)
+    def _angular_momentum(self, centred: Floats, body: slice) -> Floats:
+        return np.cross(centred, self.masses[body, None] * self.velocities[body]).sum(axis=0)
 
     def check(self) -> None:
         """Raise `SimulationError` unless the run so far is finite, converged and free of solver warnings."""

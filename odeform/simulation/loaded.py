@@ -12,7 +12,7 @@ from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.stepping import Body, Rest, run
 from odeform.types import Floats, Frames, Points, Times
 
-__all__ = ["STEP", "released", "simulate_situation"]
+__all__ = ["STEP", "begun", "released", "simulate_situation"]
 
 STEP = 5e-4  # s
 REST = Rest(speed=1e-3, time=0.05)
@@ -27,8 +27,8 @@ def simulate_situation(
     rests: bool = False,
     report: Callable[[float], None] = lambda _: None,
 ) -> tuple[Times, Frames]:
-    """Times (T,) s at `rate` Hz to `until` s, and the surface (T, S, 3) m there. With `rests`, it ends where the body
-    rests.
+    """Times (T,) s at `rate` Hz to `until` s, and the surface (T, S, 3) m there, of two bodies the one's and then the
+    other's. With `rests`, it ends where the body rests.
 
     A pulse's place is one of the body's settled surface. `report` gets the fraction done. Raises `SimulationError`.
     """
@@ -37,21 +37,34 @@ def simulate_situation(
     from odeform.simulation.obstacles import obstacle_xml
 
     others = obstacle_xml(situation.obstacles, contact_of(item.material))
-    body = SoftBody(item.points, item.elements, item.material, step, others=others)
-    positions, velocities = released(item, situation.flight)
-    body.positions, body.velocities[:] = positions, velocities
+    bodies = 1 if situation.twin is None else 2
+    body = SoftBody(item.points, item.elements, item.material, step, others=others, bodies=bodies)
+    body.positions, body.velocities[:] = begun(item, situation)
+    points, elements = np.tile(item.points, (bodies, 1)), item.elements
+    if situation.twin is not None:
+        elements = np.concatenate([elements, elements + len(item.points)])
     solid = item.elements.shape[1] == 4
     times, nodes = run(
-        GuardedBody(body, item.points, item.elements) if solid else body,
+        GuardedBody(body, points, elements) if solid else body,
         until,
         rate,
         _force(item, situation, body),
         rest=REST if rests else None,
         report=lambda now: report(now / until),
     )
-    if solid and (inverted := int(inside_out(nodes[-1], item.elements).sum())):
-        raise SimulationError(f"{inverted} of {len(item.elements)} tetrahedra are inside out at the end")
-    return times, nodes[:, : item.surface_count].astype(np.float32)
+    if solid and (inverted := int(inside_out(nodes[-1], elements).sum())):
+        raise SimulationError(f"{inverted} of {len(elements)} tetrahedra are inside out at the end")
+    surface = nodes.reshape(len(times), bodies, -1, 3)[:, :, : item.surface_count]
+    return times, surface.reshape(len(times), -1, 3).astype(np.float32)
+
+
+def begun(item: SoftObject, situation: Situation) -> tuple[Points, Points]:
+    """Where the nodes of all bodies (N, 3) m begin, and how fast, in m/s."""
+    positions, velocities = released(item, situation.flight)
+    if situation.twin is None:
+        return positions, velocities
+    other = situation.twin.placed(item.settled, item.masses @ item.settled / item.mass)
+    return np.concatenate([positions, other]), np.concatenate([velocities, np.zeros_like(other)])
 
 
 def released(item: SoftObject, flight: Flight | None) -> tuple[Points, Points]:

@@ -8,12 +8,12 @@ import numpy as np
 
 from odeform.loads.arrow import Arrow
 from odeform.loads.obstacle import Obstacle
-from odeform.schema import OBJECT, Parameters, Schema
+from odeform.schema import OBJECT, Parameter, Parameters, Schema
 from odeform.simulation.physics import GRAVITY, STANDARD_CHECKS, PhysicalCheck
 from odeform.surroundings import Contacts, Surroundings
 from odeform.types import Mesh, MotionSequence, Points
 
-__all__ = ["Scene"]
+__all__ = ["Scene", "evenly"]
 
 
 def _no_glyphs(parameters: Parameters, rest_points: Points) -> tuple[Arrow, ...]:
@@ -85,12 +85,16 @@ class Scene:
         return [self.schema.complete(row) for row in rows]
 
     def _fill_box(self, _: str, count: int, seed: int) -> list[dict[str, Any]]:
-        from scipy.stats import qmc  # takes half a second to import, and looking at a scene does not need it
+        return evenly(self.schema.parameters, count, seed)
 
-        parameters = self.schema.parameters
-        sobol = qmc.Sobol(len(parameters), scramble=True, rng=np.random.default_rng(seed))
-        points = sobol.random(1 << max(count - 1, 0).bit_length())[:count]
-        return [
-            {p.name: p.denormalise(2.0 * float(u) - 1.0) for p, u in zip(parameters, row, strict=True)}
-            for row in points
-        ]
+
+def evenly(parameters: Sequence[Parameter], count: int, seed: int) -> list[dict[str, Any]]:
+    """`count` values of parameters that fill their ranges evenly (scrambled Sobol points). A longer list with the same
+    seed starts with the shorter one."""
+    from scipy.stats import qmc  # takes half a second to import, and looking at a scene does not need it
+
+    sobol = qmc.Sobol(len(parameters), scramble=True, rng=np.random.default_rng(seed))
+    points = sobol.random(1 << max(count - 1, 0).bit_length())[:count]
+    return [
+        {p.name: p.denormalise(2.0 * float(u) - 1.0) for p, u in zip(parameters, row, strict=True)} for row in points
+    ]

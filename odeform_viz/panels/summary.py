@@ -20,7 +20,7 @@ __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
 INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
 PHYSICS, UNTESTED, REFUSED = "physics only", "not tested", "not modelled"
-UNRELIABLE, LIMITED, UNLEARNED = "not reliable", "too much deformation", "mechanics only"
+UNRELIABLE, LIMITED, UNLEARNED = "not reliable", "too much deformation", "nothing learned"
 LARGE = 0.2  # of the body's size: an error from which on nothing is told of where the body is
 WHY = {
     INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
@@ -29,7 +29,7 @@ WHY = {
     PHYSICS: "Elasticity and contacts move the body. Nothing was learned of this kind of motion but its contacts.",
     UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
     UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
-    LIMITED: "The body deforms more than the model can follow: how it moves as a whole is computed, its shape is a guess.",
+    LIMITED: "The body deforms more than the model can follow: its way and its turns are computed, its shape is a guess.",
     UNLEARNED: "The elasticity of the body moves it. Nothing of it was learned from motions.",
     REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
 }

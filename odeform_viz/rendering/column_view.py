@@ -4,6 +4,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
+from odeform.loads.registry import first_body
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import Floats, GaussianSplats, Mesh, Points, Pose
@@ -47,7 +48,8 @@ class ColumnView:
         self._server, self._geometry, self._color = server, column.geometry, color
         self.root = f"/world/column_{column.key}"
         points = np.asarray(column.geometry.points, dtype=float)
-        self._rest, self._centre = points.astype(np.float32), points.mean(axis=0)
+        first = points[first_body(column.source.schema.scene, len(points))]
+        self._rest, self._centre = points.astype(np.float32), first.mean(axis=0)
         self._extent = float(np.ptp(points, axis=0).max())
         self._place = server.scene.add_frame(self.root, show_axes=False)
         # what lies on the floor moves with it, past a body that is followed
@@ -61,7 +63,7 @@ class ColumnView:
         self._shadow = None
         if not on_floor and isinstance(column.geometry, GaussianSplats):
             self._shadow = FloorShadow(server, f"{self.root}/ground/shadow", self._rest)
-        self._glyphs = GlyphView(server, f"{self.root}/ground", self._rest)
+        self._glyphs = GlyphView(server, f"{self.root}/ground", first.astype(np.float32))
         self._obstacles = ObstacleView(server, f"{self.root}/ground")
         self._push_view = PushView(server, f"{self.root}/ground", f"{self.root}/body", pull)
         self._push: ShownPush | None = None

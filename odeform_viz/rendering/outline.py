@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import first_body, load_of_scene, meets_twin
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
 from odeform.types import Floats, Points, Pose, Vector
@@ -40,7 +40,7 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
     where the centre is more than `most` m above its lowest.
     """
     poses = _poses(shown)
-    points = np.asarray(shown.column.geometry.points, dtype=float)
+    points = _points(shown)
     points = points[:: max(len(points) // POINTS, 1)]
     centre = points.mean(axis=0)
     turned = np.einsum("tij,nj->tni", poses[:, :3, :3], points - centre)
@@ -55,6 +55,8 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
         acting = acting + centres[0] - true[0]  # the arrow of a velocity goes with the body
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
     parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
+    if meets_twin(shown.motion.schema.scene):
+        parts.append(_twin(shown))
     return _seen(np.concatenate(parts), axes)
 
 
@@ -70,6 +72,19 @@ def _seen(corners: Points, axes: Axes) -> Box:
     return Box(left, right, low, high)
 
 
+def _points(shown: ColumnFrame) -> Floats:
+    """(N, 3) m: the body at rest that the pose moves."""
+    points = np.asarray(shown.column.geometry.points, dtype=float)
+    return points[first_body(shown.motion.schema.scene, len(points))]
+
+
+def _twin(shown: ColumnFrame) -> Floats:
+    """(M, 3) m: where the other body is, at its start and at the end of the trained window."""
+    window = shown.motion.schema.window
+    frames = shown.motion.vertices(np.array([window.start, window.stop]))
+    return frames[:, first_body(shown.motion.schema.scene, frames.shape[1]).stop :].reshape(-1, 3).astype(float)
+
+
 def _poses(shown: ColumnFrame) -> Pose:
     """(T, 4, 4) over the trained window."""
     window = shown.motion.schema.window
@@ -78,7 +93,7 @@ def _poses(shown: ColumnFrame) -> Pose:
 
 def ceiling_of(shown: ColumnFrame, most: float) -> float:
     """Metres above the floor up to which the centre of the body rises in the view: at most `most` above its lowest."""
-    centre, poses = np.asarray(shown.column.geometry.points, dtype=float).mean(axis=0), _poses(shown)
+    centre, poses = _points(shown).mean(axis=0), _poses(shown)
     heights = poses[:, 2, :3] @ centre + poses[:, 2, 3]
     return float(min(heights.max(), heights.min() + most))
 

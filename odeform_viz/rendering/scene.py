@@ -11,7 +11,7 @@ from odeform.types import Floats, Mesh, Points, Pose, Vector
 from odeform_viz.coloring.scale import colors_of
 from odeform_viz.colors import TRUTH, color_of
 from odeform_viz.columns import Column
-from odeform_viz.obstacles import obstacles_of
+from odeform_viz.obstacles import meets_something
 from odeform_viz.pushing import picked
 from odeform_viz.rendering.cameras import Cameras
 from odeform_viz.rendering.column_view import ColumnView
@@ -139,7 +139,7 @@ class SceneView:
         if frame.columns and self._framed != reasons:
             axes = Axes.beside(direction_of(frame.columns[0]))
             extent, level = max(map(self._size, frame.columns)), frame.still is not None
-            travels = together and bool(obstacles_of(frame.columns[0].motion))
+            travels = together and meets_something(frame.columns[0].motion)
             most = RISE * extent if together and options.follow and not (travels or level) else math.inf
             box = _around([outline_of(c, axes, travels, most) for c in frame.columns])
             self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level, noted)
@@ -175,7 +175,7 @@ class SceneView:
     def _offset(self, frame: Frame, options: DisplayOptions, discs: bool) -> Floats:
         """The shift (3,) of the world, in m, that keeps the first body in front of the camera; downwards where it rises
         higher than what was framed, as after a harder kick. Where there is an obstacle, the body goes there instead."""
-        if discs or not options.follow or not frame.columns or obstacles_of(frame.columns[0].motion):
+        if discs or not options.follow or not frame.columns or meets_something(frame.columns[0].motion):
             return np.zeros(3)
         first = frame.columns[0]
         view = self._views[first.column.key][1]

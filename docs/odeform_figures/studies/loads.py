@@ -19,6 +19,7 @@ from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import best_rigid, vector_from_rotation
+from odeform.geometry.solids.overlap import overlap
 from odeform.loads.registry import load_of_scene
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
@@ -27,12 +28,12 @@ from odeform.models.per_object import PerObject
 from odeform.models.registry import load, load_model
 from odeform.schema import OBJECT
 from odeform.simulation.scenes.registry import get_scene
-from odeform.types import Floats, Frames
+from odeform.types import Floats, Frames, Mesh
 from odeform_figures.output import write_or_print
 
 __all__ = ["fit", "measured", "timed"]
 
-TIMED = ("throw", "wall", "step", "slope")
+TIMED = ("throw", "wall", "step", "slope", "meet")
 RIGID = 1e6  # times its stiffness: a body that does not deform
 
 
@@ -164,6 +165,8 @@ def _relative(impact: Impact, points: Frames) -> dict[str, float]:
 def _depths(model: ModalModel, impact: Impact, points: Frames) -> dict[str, float]:
     """How deep vertices and faces are inside what they meet, at most, in mm; and those of the truth."""
     truth = impact.vertices[impact.first :]
+    if model.load is not None and model.load.pairs:
+        return {"inside_mm": 1e3 * _inside(model, impact, points), "inside_truth_mm": 1e3 * _inside(model, impact, truth)}
     return {
         "inside_mm": 1e3 * _inside(model, impact, points),
         "cut_mm": 1e3 * _inside(model, impact, _on_faces(model, points)),
@@ -180,8 +183,17 @@ def _on_faces(model: ModalModel, points: Frames) -> Frames:
 def _inside(model: ModalModel, impact: Impact, points: Frames) -> float:
     """m by which points (T, N, 3) m are below the floor or inside an obstacle, at most."""
     assert model.load is not None
+    if model.load.pairs:
+        return max(-float(points[..., 2].min()), _overlap(model, points))
     gaps = [points[..., 2], *(one.met(points)[0] for one in model.load.obstacles(impact.parameters))]
     return max(-float(np.min(gaps)), 0.0)
+
+
+def _overlap(model: ModalModel, points: Frames) -> float:
+    """m by which the vertices of one body are inside the other one, at most, of points (T, 2 S, 3) m of both."""
+    one, other = np.split(points, 2, axis=1)
+    faces = model.rest.faces
+    return max(overlap(Mesh(a, faces), Mesh(b, faces)) for a, b in zip(one, other, strict=True))
 
 
 def _vector(turn: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
+from odeform.errors import InputError
 from odeform.loads.kick import STRONGER
 from odeform.loads.load import Load
 from odeform.loads.situation import Flight, Situation
@@ -18,7 +19,9 @@ from odeform.mechanics.obstacles import Obstacles
 from odeform.mechanics.push import PARTS, Push, held, kicked, no_push
 from odeform.mechanics.step import Mechanics
 from odeform.mechanics.warping import Turning
+from odeform.models.modal.settled import rested
 from odeform.schema import Schema
+from odeform.simulation.objects.catalog import SHELLS
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Points, Rotations, Vector
 
@@ -69,6 +72,29 @@ class LoadedBody:
             push = replace(push, hold=push.hold.begun(unpacked(starts, False)))
         return Beginning(push, starts, 0.0, all(situation.flight is None for situation in situations))
 
+    @cached_property
+    def both(self) -> Push:
+        """Two like bodies."""
+        push = no_push(self.mechanics.body, self.soft)
+        return _together([push, push])
+
+    def begin_pair(self, situation: Situation) -> Float[np.ndarray, "2 state"]:
+        """Where two like bodies begin: the one in the air, and the other one where it stands."""
+        assert situation.flight is not None
+        assert situation.twin is not None
+        twin, other = situation.twin, self._standing.copy()
+        shift, turn, *_ = parts_of(other[None])
+        other[shift] += twin.place - self.anchor * [1.0, 1.0, 0.0]
+        other[turn] = (twin.turn @ other[turn].reshape(3, 3)).ravel()
+        return np.stack([self._flying(situation.flight, self.both.eigenvalues.shape[1]), other])
+
+    @cached_property
+    def _standing(self) -> Float[np.ndarray, " state"]:
+        """The flat state of a body that stands, as one that has landed does."""
+        state = rested(self.mechanics, self.soft)[0]
+        state[parts_of(state[None])[-1]] = 0.0
+        return state
+
     def _acted(self, situation: Situation) -> Push:
         pulse = situation.pulse
         if situation.clamp is not None:
@@ -114,11 +140,12 @@ def under_load(checkpoint: Checkpoint, load: Load) -> Checkpoint:
 
     What was measured or regressed on pushes is not in it.
     """
-    config = _config(checkpoint.config)
+    config, objects = _config(checkpoint.config), _objects(checkpoint.schema, load)
     if "objects" in config:
         config["objects"] = {
             name: {**_config(part), "schema": _schema(Schema.from_json(part["schema"]), load).to_json()}
             for name, part in config["objects"].items()
+            if name in objects
         }
     arrays = {key: array for key, array in checkpoint.arrays.items() if not key.split("/")[-1].startswith(MEASURED)}
     arrays["training.theta"] = np.zeros((0, len(load.parameters)), np.float32)
@@ -127,6 +154,14 @@ def under_load(checkpoint: Checkpoint, load: Load) -> Checkpoint:
 
 def _config(config: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in config.items() if key not in OF_PUSHES}
+
+
+def _objects(schema: Schema, load: Load) -> tuple[str, ...]:
+    """The objects that can be in the scene of a load; `InputError` if there were some, and none is left."""
+    left = tuple(name for name in schema.objects if not (load.pairs and name in SHELLS))
+    if schema.objects and not left:
+        raise InputError(f"load {load.name!r}: expected a solid, got {', '.join(schema.objects)}, which is a shell")
+    return left
 
 
 def _schema(schema: Schema, load: Load) -> Schema:
@@ -140,6 +175,7 @@ def _schema(schema: Schema, load: Load) -> Schema:
     return replace(
         schema,
         scene=load.scene,
+        objects=_objects(schema, load),
         parameters=load.parameters + tuple(p for p in schema.parameters if p.role == "body"),
         window=replace(load.window, reach=load.until / load.window.stop - 1.0),
         notes=load.notes,

@@ -17,6 +17,8 @@ from odeform.loads.registry import load_of_scene
 from odeform.loads.situation import Situation
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion
+from odeform.mechanics.inside import Inside, inside_of
+from odeform.mechanics.pair import Pair
 from odeform.mechanics.push import make_push
 from odeform.mechanics.pushed import PushedBody
 from odeform.mechanics.pushed_batch import pushed_bodies
@@ -28,6 +30,7 @@ from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_
 from odeform.models.modal.elastic_body import ElasticBody
 from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
 from odeform.models.modal.loaded import SUPPORT as SIDES
+from odeform.models.modal.paired import Shapes, pair_motion, pair_problem
 from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.modal.user_part import forces_in, item_in
@@ -39,6 +42,7 @@ from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.ground import Ground
 from odeform.motion.motion_batch import MotionBatch
+from odeform.motion.pair_motion import PairMotion
 from odeform.motion.recent import Recent, geometry_key
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import POSE, ReducedSpace
@@ -127,6 +131,7 @@ class ModalModel(Model):
         self.body = ElasticBody.from_parts(checkpoint.arrays, config["body"])
         self.load = load_of_scene(checkpoint.schema.scene)
         self._flies = self.load is not None and self.load.flies
+        self._pairs, self._shapes = self.load is not None and self.load.pairs, Shapes()
         # a kicked body stands on its floor as one that is pushed, or lands on it as one that falls: training chose
         falls = self._flies or (self.load is not None and config.get("kicked_as") == "impact")
         law = config.get("impact", config["law"]) if falls else config["law"]
@@ -216,7 +221,8 @@ class ModalModel(Model):
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
-        vars(out).pop("_loaded", None)
+        for name in ("_loaded", "_pair"):
+            vars(out).pop(name, None)
         # a softer body deforms more before it is lost
         largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
         out.space = replace(self.space, largest=largest)
@@ -242,7 +248,7 @@ class ModalModel(Model):
         out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
         if (settled := self.settled_body) is not None:
             out.settled_body = replace(settled, mechanics=replace(settled.mechanics, parameters=contact_parameters))
-        for name in ("_loaded", "_mechanics"):
+        for name in ("_loaded", "_mechanics", "_pair"):
             vars(out).pop(name, None)
         return out
 
@@ -264,7 +270,11 @@ class ModalModel(Model):
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         found = self.changed(parameters).settled_body
-        return self.rest if found is None else found.rest
+        rest = self.rest if found is None else found.rest
+        return self.shown(rest)
+
+    def shown(self, geometry: Geometry) -> Any:
+        return self._shapes.twins(geometry) if self._pairs else geometry
 
     def _solve(
         self,
@@ -273,14 +283,20 @@ class ModalModel(Model):
         settings: SolverSettings | None,
         until: float,
         observed: MotionSequence | None,
-    ) -> ReducedMotion:
-        return super(ModalModel, self.changed(parameters))._solve(geometry, parameters, settings, until, observed)
+    ) -> ReducedMotion | PairMotion:
+        changed = self.changed(parameters)
+        if not self._pairs:
+            return super(ModalModel, changed)._solve(geometry, parameters, settings, until, observed)
+        both, evaluated = self.shown(geometry), changed.evaluate_basis(self._shapes.one(geometry), 0.0)
+        assert settings is not None
+        solved = changed.integrate(changed.inputs(parameters), evaluated, settings, until)
+        return pair_motion(changed, both, evaluated, parameters, solved, changed._loaded, changed._inside)
 
     def _solve_batch(
         self, geometry: Geometry, sets: list[dict[str, Any]], settings: SolverSettings | None, until: float
     ) -> MotionBatch:
         first = self.changed(sets[0])
-        if any(self.changed(each) is not first for each in sets):
+        if self._pairs or any(self.changed(each) is not first for each in sets):
             return Predictor._solve_batch(self, geometry, sets, settings, until)
         return super(ModalModel, first)._solve_batch(geometry, sets, settings, until)
 
@@ -334,6 +350,17 @@ class ModalModel(Model):
         turn = np.eye(3) if settled is None else settled.turn
         return LoadedBody(mechanics, self.body.dynamic, self.body.anchor, turn)
 
+    @cached_property
+    def _inside(self) -> Inside:
+        """What another body meets of it."""
+        body = self._loaded.mechanics.body
+        return inside_of(Mesh(self.body.points - self.body.anchor, self.body.faces), body.support.points)
+
+    @cached_property
+    def _pair(self) -> Pair:
+        """The right-hand side of two like bodies."""
+        return Pair(self._loaded.mechanics, self._loaded.both, self._inside)
+
     def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
         """Reads out states in the directions of deformation of one push."""
         return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
@@ -347,6 +374,9 @@ class ModalModel(Model):
 
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
+        if self._pairs:
+            read = self._readout(self._loaded.both.modes[0])
+            return pair_problem(self._loaded, self._pair, self._situation(theta), read)
         begun = self._begin(theta[None])
         pushed = PushedBody(self._moving, begun.push, begun.pulse)
         return Problem(pushed, begun.start[0], self._readout(begun.push.modes[0]), at_rest=begun.at_rest)

@@ -17,7 +17,7 @@ from odeform.motion.evaluated_basis import STILL, EvaluatedBasis
 from odeform.motion.reduced_space import POSE
 from odeform.types import Basis, Floats, Geometry, Mesh, Rotations, Vectors
 
-__all__ = ["SettledBody", "settled_body"]
+__all__ = ["SettledBody", "rested", "settled_body"]
 
 STEP, LONGEST = 4e-3, 500  # s, and how many of them at most
 STILL_SPEED = 1e-4  # m/s, RMS over the body, below which it counts as settled
@@ -71,12 +71,24 @@ def settled_body(
 ) -> SettledBody:
     """The body with so many times its mass and its stiffness, `ratios`, once it has come to rest.
 
-    Its own stress, which balanced its weight, grows with the stiffness, and the weight with the mass. It loses its
-    velocity whenever its kinetic energy passes a maximum (kinetic damping).
+    Its own stress, which balanced its weight, grows with the stiffness, and the weight with the mass.
     """
     mass, stiffness = ratios
     mechanics = Mechanics(body.reduced().changed(mass, stiffness), contact_parameters, projectile, stiffness / mass)
-    push = no_push(mechanics.body, body.dynamic)
+    state = rested(mechanics, body.dynamic)
+    shift, rotation, modes = body_motion(state)
+    mechanics = replace(mechanics, rest=Rest(shift[0], rotation[0], modes[0]))
+    lighter = modes / np.sqrt(mass)  # amplitudes of the modes of the body that was measured
+    y = coordinates.along(np.eye(len(body.eigenvalues))[:, : body.dynamic]).reduced(shift, rotation, lighter)[0]
+    return SettledBody(mechanics, Mesh(_points(body, basis, y), body.faces), y)
+
+
+def rested(mechanics: Mechanics, soft: int) -> Float[np.ndarray, "1 state"]:
+    """The flat state of a body in its `soft` softest modes once it has come to rest, from where it would start.
+
+    It loses its velocity whenever its kinetic energy passes a maximum (kinetic damping).
+    """
+    push = no_push(mechanics.body, soft)
     bodies = pushed_bodies(mechanics, push, 0.0)
     state, row, step = bodies.start, np.zeros(1, dtype=np.int64), np.full(1, STEP)
     speed, calm = 0.0, 0
@@ -89,11 +101,7 @@ def settled_body(
             state[0, velocity], speed = 0.0, 0.0
         if calm > CALM:
             break
-    shift, rotation, modes = body_motion(state)
-    mechanics = replace(mechanics, rest=Rest(shift[0], rotation[0], modes[0]))
-    lighter = modes / np.sqrt(mass)  # amplitudes of the modes of the body that was measured
-    y = coordinates.along(np.eye(len(body.eigenvalues))[:, : body.dynamic]).reduced(shift, rotation, lighter)[0]
-    return SettledBody(mechanics, Mesh(_points(body, basis, y), body.faces), y)
+    return state
 
 
 def _speed(velocity: Floats, mass: float) -> float:

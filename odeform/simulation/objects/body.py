@@ -3,6 +3,8 @@
 # MuJoCo is a compiled module without type stubs
 # pyright: reportAttributeAccessIssue=false
 
+import numpy as np
+
 from odeform.simulation.flex import Contact, FlexBody, flex_xml
 from odeform.simulation.objects.soft_object import SoftMaterial, nodal_masses
 from odeform.simulation.physics import GRAVITY
@@ -33,14 +35,15 @@ class SoftBody(FlexBody):
         gravity: float = GRAVITY,
         floor: bool = True,
         others: str = "",
+        bodies: int = 1,
     ) -> None:
         """Stress-free nodes (N, 3) m, elements (M, 4) or (M, 3), `step` in s, `gravity` in m/s^2 along -z.
 
-        `others` is the XML of further bodies.
+        `others` is the XML of further bodies, besides so many like `bodies`, whose nodes follow each other.
         """
         # MuJoCo would give every node the same mass
         masses = nodal_masses(points, elements, material)
-        total, mass_fractions = float(masses.sum()), masses / masses.sum()
+        total, mass_fractions = float(masses.sum()), np.tile(masses / masses.sum(), bodies) / bodies
         elasticity = f'young="{material.young}" poisson="{material.poisson}" damping="{_damping(material, step)}"'
         solver = f'solver="CG" tolerance="{TOLERANCE}"'
         if elements.shape[1] == 3:
@@ -48,8 +51,8 @@ class SoftBody(FlexBody):
             # conjugate gradients do not converge on the many contacts of a light shell with a heavy projectile
             solver = 'solver="Newton"'
         contact = contact_of(material)
-        xml = flex_xml(points, elements, total, elasticity, contact, step, gravity, floor, others, solver)
-        super().__init__(xml, points, mass_fractions)
+        xml = flex_xml(points, elements, total, elasticity, contact, step, gravity, floor, others, solver, bodies)
+        super().__init__(xml, np.tile(points, (bodies, 1)), mass_fractions, bodies)
         self._material = material
 
     def set_timestep(self, step: float) -> None:

@@ -7,9 +7,11 @@ from odeform.io import bundled
 from odeform.simulation.objects.files import read_object
 from odeform.simulation.objects.soft_object import SoftObject
 
-__all__ = ["OBJECTS", "get_object"]
+__all__ = ["OBJECTS", "SHELLS", "get_object"]
 
 OBJECTS = ("bottle", "cat", "dog", "donut", "chip", "flip-flop", "pillow")
+SHELLS = ("chip",)
+"""Those of triangles, which enclose nothing."""
 
 
 @cache

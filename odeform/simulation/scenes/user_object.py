@@ -15,7 +15,7 @@ from odeform.simulation.objects.materials import forces_at
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.scene import Scene
 from odeform.simulation.scenes.contact_force import drawn_on, simulate_object
-from odeform.simulation.scenes.loaded import forces_of, simulate_load
+from odeform.simulation.scenes.loaded import drawn_apart, forces_of, simulate_load
 from odeform.simulation.scenes.registry import get_scene
 from odeform.surroundings import Contacts
 from odeform.types import MotionSequence
@@ -50,7 +50,13 @@ def scene_with(name: str, item: SoftObject) -> Scene:
     def draw(_: str, count: int, seed: int) -> list[dict[str, Any]]:
         return drawn_on(item, there, count, seed)
 
-    sampler: Callable[..., Any] | None = draw if known.sampler is not None else None
+    def apart(_: str, count: int, seed: int) -> list[dict[str, Any]]:
+        assert load is not None
+        return drawn_apart(load, item.rest_mesh(), count, seed)
+
+    sampler: Callable[..., Any] | None = draw if pushed else None
+    if load is not None and load.pairs:
+        sampler = apart
     contacts = None
     if known.contacts is not None:
         contacts = Contacts({item.name: forces}, known.contacts.pulse, known.contacts.radius)

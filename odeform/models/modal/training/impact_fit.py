@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from odeform.loads.load import Load
+from odeform.loads.registry import first_body
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.model import QUALITIES, ModalModel
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -56,15 +57,27 @@ def impacts_of(sequences: Iterable[MotionSequence], rate: float, load: Load) -> 
     for sequence in sequences:
         known = sequence.frames(float(sequence.times[-1]), rate)
         vertices = known.vertices.astype(float)
-        gaps = [vertices[:, :, 2], *(one.met(vertices)[0] for one in load.obstacles(sequence.parameters))]
-        first = 0 if load.held else int((np.min(gaps, axis=(0, 2)) < TOUCHES).argmax())
+        first = 0 if load.held else _first_contact(vertices, load, sequence.parameters)
         found.append(Impact(sequence.parameters, known.times, vertices, sequence.weights, first))
     return found
+
+
+def _first_contact(vertices: Frames, load: Load, parameters: Parameters) -> int:
+    """The frame in which a body that flies touches something; of two, the one that stands has then begun to move."""
+    first = first_body(load.scene, vertices.shape[1])
+    thrown, other = vertices[:, first], vertices[:, first.stop :]
+    gaps = [thrown[:, :, 2], *(one.met(thrown)[0] for one in load.obstacles(parameters))]
+    touches = np.min(gaps, axis=(0, 2)) < TOUCHES
+    if other.shape[1]:
+        touches |= np.abs(other - other[0]).max(axis=(1, 2)) > TOUCHES
+    return int(touches.argmax())
 
 
 def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, frames: int) -> Frames:
     """(T, S, 3) m: what a model under a load says of an impact, that many frames after the first contact, and one."""
     times = impact.times[impact.first : impact.first + frames + 1]
+    if model.load is not None and model.load.pairs:
+        return model.solve(parameters=impact.parameters).vertices(times).astype(float)
     body = model.changed(impact.parameters)
     solved = body.integrate(body.inputs(impact.parameters), evaluated, QUALITIES["balanced"], float(times[-1]))
     y = solved.reduced(times)
