@@ -29,7 +29,7 @@ WHY = {
     PHYSICS: "Elasticity and contacts move the body. Nothing was learned of this kind of motion but its contacts.",
     UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
     UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
-    LIMITED: "The body deforms more than the model can follow: its way and its turns are computed, its shape is a guess.",
+    LIMITED: "The body deforms more than the model can follow: its way is computed, its shape is a guess.",
     UNLEARNED: "The elasticity of the body moves it. Nothing of it was learned from motions.",
     REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
 }
