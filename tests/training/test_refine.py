@@ -176,7 +176,7 @@ def begun(dataset: Dataset, out: Path, *limit: str) -> subprocess.Popen[str]:
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.mark.parametrize("step", ["first guess", "model 1"])
+@pytest.mark.parametrize("step", ["first guess", "model 1", "model 2"])
 def test_a_refinement_that_is_killed_goes_on_where_it_was(dataset: Dataset, tmp_path: Path, step: str) -> None:
     out = tmp_path / "model.safetensors"
     process = begun(dataset, out)

@@ -112,14 +112,14 @@ def fit_shape_band(shapes: Sequence[ShapeErrors], times: Times) -> ShapeBand:
 def calibrated_shape_band(shapes: Sequence[ShapeErrors], times: Times) -> ShapeBand:
     """The band of `fit_shape_band`, widened or narrowed so that `NOMINAL` of the frames of a further shape stay within.
 
-    How far each shape's errors are from the band of all others is its score. The factor is the quantile of the scores
-    of S shapes, which all count alike, at `NOMINAL` (S + 1) / S, since the next shape is one more of them (conformal
-    prediction of groups, Dunn et al. 2023; scores of models that have not seen the group, Barber et al. 2021).
+    How far each shape's errors are from the band of all others is its score, and the factor is the quantile `NOMINAL`
+    of the scores, all shapes counting alike (conformal prediction of groups by pooled distributions, Dunn et al. 2023;
+    scores of models that have not seen the group, Barber et al. 2021). That is exact for many shapes. `covered`, which
+    `coverages_left_out` measures, says how good it is for few.
     """
     scores = [_scores(fit_shape_band(others, times), one) for one, others in _each_and_others(shapes)]
     weights = np.concatenate([np.full(len(values), 1.0 / len(values)) for values in scores])
-    fraction = min(NOMINAL * (len(shapes) + 1) / len(shapes), 1.0)
-    factor = _quantile(np.concatenate(scores), weights, fraction)
+    factor = _quantile(np.concatenate(scores), weights, NOMINAL)
     band = fit_shape_band(shapes, times)
     # nine in ten are not fewer than half
     profile = tuple((median, max(nominal + factor, median)) for median, nominal in band.profile)
