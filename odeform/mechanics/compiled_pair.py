@@ -235,7 +235,7 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
 @no_type_check
 def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
     """The states of both after one step of first order; false where it cannot be solved for."""
-    chosen, gaps, what, jacobian, met, distances, rows, _, _, matrix, _ = work
+    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _ = work
     width = 6 + size
     v, momentum, rate, right = np.empty(2 * width), np.empty(2 * width), np.empty(2 * width), np.empty(2 * width)
     for b in range(2):
@@ -317,7 +317,7 @@ def _work(c):
 def advance_pair(c, s, time, states, step, out, slopes):
     """States (2, 20 + 2 K) of both after a step of `step` s, slopes there; returns the error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, met, distances, rows, whole, half, matrix, floors = work = _work(c)
+    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors = work = _work(c)
     for b in range(2):
         floors[b], _ = _near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
     first, count = _met(c, s, states, size, step, met, distances)

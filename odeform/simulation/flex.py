@@ -1,4 +1,7 @@
-"""A MuJoCo flex, or several like ones, whose vertices are the degrees of freedom. Shells and solids differ in their model's XML alone."""
+"""A MuJoCo flex, or several like ones, whose vertices are the degrees of freedom.
+
+Shells and solids differ in their model's XML alone.
+"""
 
 # MuJoCo is a compiled module without type stubs
 # pyright: reportAttributeAccessIssue=false
