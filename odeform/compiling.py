@@ -24,7 +24,9 @@ def compiled_with(*sources: str) -> Callable[[Callable[..., Any]], Any]:
     Numba's cache of a function looks at the function's own file only. So this has a folder for each content of all.
     """
     import numba  # importing it takes half a second
-    from numba.core import config
+    from numba.core import config as settings
+
+    config: Any = settings
 
     digest = hashlib.sha256(b"".join(Path(source).read_bytes() for source in sources)).hexdigest()[:16]
     folder = Path(config.CACHE_DIR or Path(sources[0]).parent / "__pycache__") / f"odeform_{digest}"
