@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import first_body, load_of_scene
 from odeform.models import registry
 from odeform.models.per_object import PerObject
 from odeform.motion.rest import rests_from
@@ -97,7 +97,8 @@ def _start_off(model: PerObject, parameters: Parameters, frame: Points) -> float
     if load is None or not load.flies:
         return float(np.abs(frame - model.settled(parameters).points).max())
     flight = load.situation(model.rest_of(parameters), parameters).flight
-    return 0.0 if flight is None else abs(float(frame[:, 2].min()) - flight.height)
+    thrown = frame[first_body(model.schema.scene, len(frame))]
+    return 0.0 if flight is None else abs(float(thrown[:, 2].min()) - flight.height)
 
 
 def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]:
