@@ -24,18 +24,21 @@ def compiled_with(*sources: str) -> Callable[[Callable[..., Any]], Any]:
     Numba's cache of a function looks at the function's own file only. So this has a folder for each content of all.
     """
     import numba  # importing it takes half a second
+    from numba.core import config as settings
+
+    config: Any = settings
 
     digest = hashlib.sha256(b"".join(Path(source).read_bytes() for source in sources)).hexdigest()[:16]
-    folder = Path(numba.config.CACHE_DIR or Path(sources[0]).parent / "__pycache__") / f"odeform_{digest}"  # pyright: ignore[reportAttributeAccessIssue]
+    folder = Path(config.CACHE_DIR or Path(sources[0]).parent / "__pycache__") / f"odeform_{digest}"
     # sums may be reordered, so that they use all lanes of a vector; what is not finite stays so
     make = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
 
     def compile_one(function: Callable[..., Any]) -> Any:
-        known = numba.config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
-        numba.config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]
+        known = config.CACHE_DIR
+        config.CACHE_DIR = str(folder)
         try:
             return make(function)
         finally:
-            numba.config.CACHE_DIR = known  # pyright: ignore[reportAttributeAccessIssue]
+            config.CACHE_DIR = known
 
     return compile_one

@@ -138,8 +138,7 @@ class Columns:
         """Give all models another shape; None for the body that each was trained on."""
         with self._lock:
             self._columns = tuple(
-                replace(c, geometry=_shape(c.predictor, fit), fit=fit) if c.predictor else c
-                for c in self._columns
+                replace(c, geometry=_shape(c.predictor, fit), fit=fit) if c.predictor else c for c in self._columns
             )
 
     def follow(self, parameters: Parameters) -> None:

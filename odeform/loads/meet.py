@@ -67,8 +67,8 @@ LOAD = Load(
         "one beside the other": {"other_turn": 90.0, "height": 0.1, "velocity_x": 2.0, "velocity_z": 0.5},
     },
     notes=(
-        "The body begins in the air, without stress, and is thrown at another one that stands on the floor and is as it "
-        "is. Where they touch, each gives way as it does on the floor.",
+        "The body begins in the air, without stress, and is thrown at another one like it, which stands on the floor. "
+        "Where they touch, each gives way as it does on the floor.",
     ),
     arrows=arrows,
     pairs=True,

@@ -25,7 +25,6 @@ from odeform.mechanics.compiled_push import (
     _moved,
     _moves,
     _near,
-    _press,
     _resist,
     _second_order,
     _slope,
@@ -52,10 +51,30 @@ class Between(NamedTuple):
 
 @compiled
 @no_type_check
-def _inside(c, s, b, z, size, at, back, motion, place, turned, normal):
-    """The signed distance of a place from a body, in its axes, and the sample that carries it; sets the normal there,
-    and where that sample is and how it has turned. `back` and `motion` are room."""
-    points, rows, owner = c.points[b], c.rows[b], 0
+def _carry(c, b, z, size, i, motion, memo):
+    """Sees to it that `memo` knows where sample i is and how it has turned; `motion` is room."""
+    known, where, turns = memo
+    if not known[b, i]:
+        known[b, i] = True
+        _turn(c.rows[b], i, z, size, motion)
+        square, once, twice = _bent(c.points[b], i, motion, where[b, i])
+        _turned(motion, square, once, twice, turns[b, i])
+
+
+@compiled
+@no_type_check
+def _memo(c):
+    """What is known of the samples of both bodies: nothing yet."""
+    samples = c.points.shape[2]
+    return np.zeros((2, samples), np.bool_), np.empty((2, samples, 3)), np.empty((2, samples, 3, 3))
+
+
+@compiled
+@no_type_check
+def _inside(c, s, b, z, size, at, back, motion, memo, normal):
+    """The signed distance of a place from a body, in its axes, and the sample that carries it; sets the normal there.
+    `back` and `motion` are room."""
+    points, owner, (_, where, turns) = c.points[b], 0, memo
     for axis in range(3):
         back[axis] = at[axis]
     for _ in range(2):
@@ -63,9 +82,8 @@ def _inside(c, s, b, z, size, at, back, motion, place, turned, normal):
         i1 = int(np.floor(_cells(s, back[1], 1) + 0.5))
         i2 = int(np.floor(_cells(s, back[2], 2) + 0.5))
         owner = s.owners[i0, i1, i2]
-        _turn(rows, owner, z, size, motion)
-        square, once, twice = _bent(points, owner, motion, place)
-        _turned(motion, square, once, twice, turned)
+        _carry(c, b, z, size, owner, motion, memo)
+        place, turned = where[b, owner], turns[b, owner]
         d0, d1, d2 = at[0] - place[0], at[1] - place[1], at[2] - place[2]
         for axis in range(3):
             back[axis] = points[axis, owner] + turned[0, axis] * d0 + turned[1, axis] * d1 + turned[2, axis] * d2
@@ -91,6 +109,7 @@ def _inside(c, s, b, z, size, at, back, motion, place, turned, normal):
                 s0 += weight * value[1]
                 s1 += weight * value[2]
                 s2 += weight * value[3]
+    turned = turns[b, owner]
     scale = 1.0 / max(np.sqrt(s0 * s0 + s1 * s1 + s2 * s2), 1e-9)
     for axis in range(3):
         normal[axis] = scale * (turned[axis, 0] * s0 + turned[axis, 1] * s1 + turned[axis, 2] * s2)
@@ -139,7 +158,7 @@ def _met(c, s, states, size, step, chosen, gaps):
     for b in range(2):
         z = states[b]
         spin += np.sqrt(z[start + 3] * z[start + 3] + z[start + 4] * z[start + 4] + z[start + 5] * z[start + 5])
-    margin = MARGIN + (2.0 * step + c.floor_damping) * (np.sqrt(speed) + c.reach * spin)
+    margin = MARGIN + 2.0 * step * (np.sqrt(speed) + c.reach * spin)
     extents = (_extent(c, 0, states[0], size), _extent(c, 1, states[1], size))
     apart = 0.0
     for axis in range(3):
@@ -147,17 +166,23 @@ def _met(c, s, states, size, step, chosen, gaps):
     if np.sqrt(apart) >= extents[0] + extents[1] + margin:
         return 0, 0
     motion, place, at, back = np.empty(6), np.empty(3), np.empty(3), np.empty(3)
-    where, turned, normal = np.empty(3), np.empty((3, 3)), np.empty(3)
+    memo, normal = _memo(c), np.empty(3)
+    where = memo[1]
     for b in range(2):
         z, other, begin = states[b], states[1 - b], count
-        limit = (extents[1 - b] + margin) ** 2
+        limit, loose = (extents[1 - b] + margin) ** 2, extents[1 - b] + margin + extents[b] - c.reach
         for i in range(c.points.shape[2]):
-            _turn(c.rows[b], i, z, size, motion)
-            _bent(c.points[b], i, motion, place)
+            # most samples are so far away that their displacement need not be known
+            for axis in range(3):
+                place[axis] = c.points[b, axis, i]
             _seen(place, z, other, at)
+            if at[0] * at[0] + at[1] * at[1] + at[2] * at[2] >= loose * loose:
+                continue
+            _carry(c, b, z, size, i, motion, memo)
+            _seen(where[b, i], z, other, at)
             if at[0] * at[0] + at[1] * at[1] + at[2] * at[2] >= limit:
                 continue
-            gap, _ = _inside(c, s, 1 - b, other, size, at, back, motion, where, turned, normal)
+            gap, _ = _inside(c, s, 1 - b, other, size, at, back, motion, memo, normal)
             gaps[i] = gap
             if gap < margin:
                 count = _keep(chosen, begin, count, c.most, gaps, i)
@@ -170,17 +195,17 @@ def _met(c, s, states, size, step, chosen, gaps):
 @no_type_check
 def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
     """Linearise the chosen contacts of the bodies with each other about a state."""
-    motion, place, at, back = np.empty(6), np.empty(3), np.empty(3), np.empty(3)
-    own, where, turned, normal, axes = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
-    width = 6 + size
+    motion, at, back, normal, axes = np.empty(6), np.empty(3), np.empty(3), np.empty(3), np.empty((3, 3))
+    memo, width = _memo(c), 6 + size
+    _, where, turns = memo
     for j in range(count):
         b, i = (0 if j < first else 1), chosen[j]
         z, other = states[b], states[1 - b]
-        _turn(c.rows[b], i, z, size, motion)
-        square, once, twice = _bent(c.points[b], i, motion, place)
-        _turned(motion, square, once, twice, own)
+        _carry(c, b, z, size, i, motion, memo)
+        place, own = where[b, i], turns[b, i]
         _seen(place, z, other, at)
-        gaps[j], owner = _inside(c, s, 1 - b, other, size, at, back, motion, where, turned, normal)
+        gaps[j], owner = _inside(c, s, 1 - b, other, size, at, back, motion, memo, normal)
+        turned = turns[1 - b, owner]
         n0 = other[3] * normal[0] + other[4] * normal[1] + other[5] * normal[2]
         n1 = other[6] * normal[0] + other[7] * normal[1] + other[8] * normal[2]
         n2 = other[9] * normal[0] + other[10] * normal[1] + other[11] * normal[2]
@@ -210,7 +235,7 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
 @no_type_check
 def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
     """The states of both after one step of first order; false where it cannot be solved for."""
-    chosen, gaps, what, jacobian, met, distances, rows, _, _, matrix, _ = work
+    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _ = work
     width = 6 + size
     v, momentum, rate, right = np.empty(2 * width), np.empty(2 * width), np.empty(2 * width), np.empty(2 * width)
     for b in range(2):
@@ -219,7 +244,7 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
         _free(c, b, states[b], size, False, end, v[some], momentum[some], rate[some])
     for k in range(2 * width):
         momentum[k] += step * rate[k]
-    time = step + c.floor_damping
+    time, weighted = step + c.floor_damping, np.empty((3 * count, 2 * width))
     for _ in range(2):
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
@@ -234,6 +259,7 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
                 c, b, step, v[some], chosen[b], floors[b], floors[b], jacobian[b], gaps[b], matrix[some, some],
                 right[some],
             )  # fmt: skip
+        pressed = 0
         for j in range(count):
             n, t0, t1, i = rows[j, 0], rows[j, 1], rows[j, 2], met[j]
             r0, r1, r2 = _along(n, v), _along(t0, v), _along(t1, v)
@@ -242,8 +268,22 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
                 continue
             active, limit = step * s.stiffness[i], c.floor_friction * force
             drag = step * limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / s.grip[i]) ** 2 + SLIP * SLIP)
-            _press(n, t0, t1, time * active, drag, -active * distances[j], matrix, right)
-        if not _solve(matrix, right):
+            normal, across, impulse = np.sqrt(time * active), np.sqrt(drag), -active * distances[j]
+            for k in range(2 * width):
+                right[k] += impulse * n[k]
+                weighted[pressed, k] = normal * n[k]
+                weighted[pressed + 1, k], weighted[pressed + 2, k] = across * t0[k], across * t1[k]
+            pressed += 3
+        if pressed:
+            # one product: contact by contact it takes several times as long
+            square = np.dot(weighted[:pressed].T, weighted[:pressed])
+            for i in range(2 * width):
+                for k in range(i + 1):
+                    matrix[i, k] += square[i, k]
+            good = _solve(matrix, right)
+        else:  # each by itself, which takes a quarter of the time
+            good = _solve(matrix[:width, :width], right[:width]) and _solve(matrix[width:, width:], right[width:])
+        if not good:
             return False
         _copy(right, v)
     for b in range(2):
@@ -277,7 +317,7 @@ def _work(c):
 def advance_pair(c, s, time, states, step, out, slopes):
     """States (2, 20 + 2 K) of both after a step of `step` s, slopes there; returns the error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, met, distances, rows, whole, half, matrix, floors = work = _work(c)
+    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors = work = _work(c)
     for b in range(2):
         floors[b], _ = _near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
     first, count = _met(c, s, states, size, step, met, distances)

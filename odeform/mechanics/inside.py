@@ -45,7 +45,7 @@ class Inside:
 
         `samples` are where they are at rest; where they are now is `moved`, and how they have turned `turns`.
         """
-        back = places
+        back, owner = places, np.zeros(len(places), dtype=np.int64)
         for _ in range(SWEEPS):
             owner = self.owners[tuple(self._nearest(back).T)]
             back = samples[owner] + np.einsum("pji,pj->pi", turns[owner], places - moved[owner])
@@ -84,5 +84,5 @@ def inside_of(mesh: Mesh, samples: Points) -> Inside:
     distances = signed_distances(corners, mesh).reshape(shape)
     slopes = np.stack(np.gradient(distances, cell), axis=-1)
     values = np.ascontiguousarray(np.concatenate([distances[..., None], slopes], axis=-1))
-    return Inside(values, KDTree(samples).query(corners)[1].reshape(shape), low, cell)
-
+    owners = np.asarray(KDTree(samples).query(corners)[1]).reshape(shape)
+    return Inside(values, owners, low, cell)

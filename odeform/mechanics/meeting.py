@@ -54,7 +54,7 @@ class Meeting:
         velocity = state.velocity
         spin = np.sqrt((velocity[:, 3:6] ** 2).sum(axis=1)).sum()
         speed = float(np.linalg.norm(velocity[0, :3] - velocity[1, :3]) + self._reach * spin)
-        margin = MARGIN + (2.0 * step + self._parameters.floor_damping) * speed
+        margin = MARGIN + 2.0 * step * speed  # dampers do not act before contact
         extents = self._reach + self._extents * np.sqrt((state.modes * state.modes).sum(axis=1))
         if np.linalg.norm(state.shift[0] - state.shift[1]) >= extents.sum() + margin:
             return Met(self, (NOTHING, NOTHING))

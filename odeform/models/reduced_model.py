@@ -18,6 +18,7 @@ from odeform.models.continuation import (
     without_continuation,
 )
 from odeform.models.solve import solved
+from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory
 from odeform.motion.body import CheckedBody, checked_body
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
@@ -108,7 +109,7 @@ class ReducedModel(Predictor):
         settings: SolverSettings | None,
         until: float,
         observed: MotionSequence | None,
-    ) -> ReducedMotion:
+    ) -> Motion:
         evaluated = self.evaluate_basis(geometry, self.schema.azimuth(parameters))
         trajectory = self._continued(self.inputs(parameters), evaluated, settings, until)
         shown = Shown(trajectory, self.to_body)

@@ -100,7 +100,8 @@ class SolvedTrajectory:
         return self._sample(times)
 
     def reduced(self, times: Floats) -> Floats:
-        """Maps (T,) seconds to (T, 6 + K), or (T, n, 6 + K) of n bodies; zero at time 0 of a motion that begins there."""
+        """Maps (T,) seconds to (T, 6 + K), or (T, n, 6 + K) of n bodies; zero at time 0 of a motion that begins
+        there."""
         times = np.asarray(times, dtype=float)
         with np.errstate(all="ignore"):
             self._extend(float(times.max()))

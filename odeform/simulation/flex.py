@@ -1,4 +1,7 @@
-"""A MuJoCo flex, or several like ones, whose vertices are the degrees of freedom. Shells and solids differ in their model's XML alone."""
+"""A MuJoCo flex, or several like ones, whose vertices are the degrees of freedom.
+
+Shells and solids differ in their model's XML alone.
+"""
 
 # MuJoCo is a compiled module without type stubs
 # pyright: reportAttributeAccessIssue=false
@@ -83,9 +86,7 @@ class FlexBody:
     `step` restores the angular momentum, which only the contact and the applied forces may change.
     """
 
-    def __init__(
-        self, xml: str, reference: Points, mass_fractions: Perpoint | None = None, bodies: int = 1
-    ) -> None:
+    def __init__(self, xml: str, reference: Points, mass_fractions: Perpoint | None = None, bodies: int = 1) -> None:
         """`xml` is the MuJoCo model; `reference` (N, 3) m are the positions at which all its coordinates are 0.
 
         `mass_fractions` (N,) are the vertices' mass fractions; by default all are equal. The vertices are those of so

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import first_body, load_of_scene
 from odeform.loads.situation import Flight
 from odeform.models import registry
 from odeform.models.base import Predictor
@@ -116,7 +116,8 @@ def _start_off(model: PerObject, parameters: Parameters, frame: Points) -> float
     """m between the first frame (N, 3) and where the motion should begin: at rest, or with its lowest point so high."""
     if (flight := _flight(model, parameters)) is None:
         return float(np.abs(frame - model.settled(parameters).points).max())
-    return abs(float(frame[:, 2].min()) - flight.height)
+    thrown = frame[first_body(model.schema.scene, len(frame))]
+    return abs(float(thrown[:, 2].min()) - flight.height)
 
 
 def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]:

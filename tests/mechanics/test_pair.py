@@ -1,5 +1,6 @@
 """Two blocks that meet, in the air and on the floor."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -113,9 +114,7 @@ def test_a_sample_of_a_bent_body_is_on_its_surface(block: Block, inside: Inside,
     assert np.abs(gap).max() < 0.15 * moved.max()
 
 
-def test_what_the_one_loses_the_other_one_gains(
-    block: Block, mechanics: Mechanics, both: Push, inside: Inside
-) -> None:
+def test_what_the_one_loses_the_other_one_gains(block: Block, mechanics: Mechanics, both: Push, inside: Inside) -> None:
     states = followed(Pair(mechanics, both, inside), thrown(), STEP, 600)
     linear, angular, energy = momenta(block, states)
     times = STEP * np.arange(len(states))
@@ -135,7 +134,7 @@ def test_what_the_one_loses_the_other_one_gains(
 def test_half_the_step_has_less_than_two_thirds_of_the_error(mechanics: Mechanics, both: Push, inside: Inside) -> None:
     pair, start = Pair(mechanics, both, inside), thrown()
     ends = [followed(pair, start, 0.03 / count, count)[-1, :, :3] for count in (300, 600, 1200)]
-    coarse, fine = (np.abs(one - other).max() for one, other in zip(ends, ends[1:], strict=False))
+    coarse, fine = (np.abs(one - other).max() for one, other in itertools.pairwise(ends))
     assert fine < 0.66 * coarse, "of second order, but for the steps in which contacts begin and end"
     assert fine < 1e-5
 

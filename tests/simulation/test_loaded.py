@@ -9,7 +9,7 @@ from odeform.geometry.solids.tetrahedra import inside_out, outward
 from odeform.loads.load import Load
 from odeform.loads.obstacle import Obstacle
 from odeform.loads.registry import get_load, known_loads, load_of_scene, register_load, split_load
-from odeform.loads.situation import Flight, Situation
+from odeform.loads.situation import Flight, Situation, Twin
 from odeform.loads.slope import slope
 from odeform.loads.step import step
 from odeform.loads.wall import wall
@@ -199,3 +199,17 @@ def test_a_simulated_body_hangs_from_what_holds_it() -> None:
     assert last[:, 2].min() < -3.0 * np.abs(first).max(), "the other end is not"
     weight = clamp.stiffness(item.settled[: item.surface_count], item.weights, item.mass).sum() * clamp.sink
     assert weight == pytest.approx(item.mass * GRAVITY)
+
+
+def test_what_a_thrown_block_loses_one_like_it_gains() -> None:
+    """High above the floor, which friction would act on: both begin in the air, the one at rest."""
+    item, high = soft_block(), np.array([0.0, 0.0, 1.0])
+    flight = Flight(1.0, velocity=np.array([2.0, 0.0, 0.0]))
+    twin = Twin(np.array([0.14, 0.01, 0.0]) + high)
+    times, frames = simulate_situation(item, Situation(flight, twin=twin), 200.0, 0.06)
+    assert frames.shape[1] == 2 * item.surface_count
+    speeds = np.diff(frames.reshape(len(times), 2, -1, 3), axis=0) * 200.0
+    along = np.einsum("tbnk,n->tbk", speeds, item.weights)[..., 0]
+    assert along[-1, 0] < 1.5, "it is held up"
+    assert along[-1, 1] > 0.5, "and the other one is pushed away"
+    np.testing.assert_allclose(along.sum(axis=1), 2.0, atol=0.05)

@@ -47,6 +47,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("step", "rise (m)"),
         ("slope", "angle (°)"),
         ("hold", "held up (°)"),
+        ("meet", "other turn (°)"),
         ("push", "force (N)"),
     ):
         app.show_load(load)

@@ -166,7 +166,11 @@ def _depths(model: ModalModel, impact: Impact, points: Frames) -> dict[str, floa
     """How deep vertices and faces are inside what they meet, at most, in mm; and those of the truth."""
     truth = impact.vertices[impact.first :]
     if model.load is not None and model.load.pairs:
-        return {"inside_mm": 1e3 * _inside(model, impact, points), "inside_truth_mm": 1e3 * _inside(model, impact, truth)}
+        return {
+            "inside_mm": 1e3 * _inside(model, impact, points),
+            "overlap_mm": 1e3 * _overlap(model, points),
+            "overlap_truth_mm": 1e3 * _overlap(model, truth),
+        }
     return {
         "inside_mm": 1e3 * _inside(model, impact, points),
         "cut_mm": 1e3 * _inside(model, impact, _on_faces(model, points)),
@@ -183,8 +187,6 @@ def _on_faces(model: ModalModel, points: Frames) -> Frames:
 def _inside(model: ModalModel, impact: Impact, points: Frames) -> float:
     """m by which points (T, N, 3) m are below the floor or inside an obstacle, at most."""
     assert model.load is not None
-    if model.load.pairs:
-        return max(-float(points[..., 2].min()), _overlap(model, points))
     gaps = [points[..., 2], *(one.met(points)[0] for one in model.load.obstacles(impact.parameters))]
     return max(-float(np.min(gaps)), 0.0)
 

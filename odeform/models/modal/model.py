@@ -37,14 +37,13 @@ from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
 from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
+from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.ground import Ground
 from odeform.motion.motion_batch import MotionBatch
-from odeform.motion.pair_motion import PairMotion
 from odeform.motion.recent import Recent, geometry_key
-from odeform.motion.reduced_motion import ReducedMotion
 from odeform.motion.reduced_space import POSE, ReducedSpace
 from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
 from odeform.motion.validity import Validity
@@ -283,7 +282,7 @@ class ModalModel(Model):
         settings: SolverSettings | None,
         until: float,
         observed: MotionSequence | None,
-    ) -> ReducedMotion | PairMotion:
+    ) -> Motion:
         changed = self.changed(parameters)
         if not self._pairs:
             return super(ModalModel, changed)._solve(geometry, parameters, settings, until, observed)

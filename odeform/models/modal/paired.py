@@ -72,7 +72,15 @@ def pair_motion(
     apart, kept = Apart(inside, body.both, body.anchor, trajectory.states), Recent[Floats](RECENT)
     trajectories = tuple(_OneOf(trajectory, index, kept) for index in range(2))
     return PairMotion.of(
-        model.schema, parameters, both, evaluated, trajectories, model.validity, model.checked_body, model.ground_of(parameters), apart
+        model.schema,
+        parameters,
+        both,
+        evaluated,
+        trajectories,
+        model.validity,
+        model.checked_body,
+        model.ground_of(parameters),
+        apart,
     )
 
 

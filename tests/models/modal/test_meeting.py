@@ -46,9 +46,7 @@ def test_the_thrown_one_meets_the_one_that_stands(meeting: Predictor, motion: Pa
     assert one[-1, :, 0].mean() < other[-1, :, 0].mean()
     assert vertices[..., 2].min() > -2e-3
     assert motion.status == "ok"
-    deepest = max(
-        overlap(Mesh(a, rest.faces), Mesh(b, rest.faces)) for a, b in zip(one, other, strict=True)
-    )
+    deepest = max(overlap(Mesh(a, rest.faces), Mesh(b, rest.faces)) for a, b in zip(one, other, strict=True))
     assert deepest < 2e-3
     raw = [np.stack([each.vertices(float(t)) for each in motion.both]) for t in TIMES]
     assert max(overlap(Mesh(a, rest.faces), Mesh(b, rest.faces)) for a, b in raw) > 2e-3, "springs gave way by more"
