@@ -122,7 +122,7 @@ def _errors_now(frame: Frame) -> list[str]:
         return []
     named = len(known) > 1
     values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
-    lines = [f"error now: {values} (RMS distance from the truth)"]
+    lines = [f"error now: {values} (RMS distance)"]
     above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
     if above:
         of = f" of {escape(', '.join(above))}" if named else ""
