@@ -86,7 +86,9 @@ def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:
     names = [titles.get(name, name) for c in models for name in c.motion.outside] + outside_of_push(frame)
     if models[0].motion.extrapolates(frame.request.time):
         names.insert(0, "time")
-    return f"{' and '.join(dict.fromkeys(names))} beyond the {known_range(schema)}" if names else ""
+    *first, last = dict.fromkeys(names) or ("",)
+    listed = f"{', '.join(first)} and {last}" if first else last
+    return f"{listed} beyond the {known_range(schema)}" if names else ""
 
 
 def _below(shown: ColumnFrame) -> float | None:
