@@ -221,7 +221,7 @@ def _stability(view: View) -> None:
     view.client.click("Map stability")
     controls = view.client.controls
     view.wait(lambda: not controls["Map stability"].visible and not controls["Cancel the map"].visible)
-    view.wait(lambda: "Click a place to go there" in view.client.text())
+    view.wait(lambda: "A click moves them there" in view.client.text())
 
 
 def _simulate(view: View) -> None:

@@ -90,7 +90,9 @@ def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:
     names = [titles.get(name, name) for c in models for name in c.motion.outside] + outside_of_push(frame)
     if models[0].motion.extrapolates(frame.request.time):
         names.insert(0, "time")
-    return f"{' and '.join(dict.fromkeys(names))} beyond the {known_range(schema)}" if names else ""
+    *first, last = dict.fromkeys(names) or ("",)
+    listed = f"{', '.join(first)} and {last}" if first else last
+    return f"{listed} beyond the {known_range(schema)}" if names else ""
 
 
 def _below(shown: ColumnFrame) -> float | None:
@@ -126,7 +128,7 @@ def _errors_now(frame: Frame) -> list[str]:
         return []
     named = len(known) > 1
     values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
-    lines = [f"error now: {values} (RMS distance from the truth)"]
+    lines = [f"error now: {values} (RMS distance)"]
     above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
     if above:
         of = f" of {escape(', '.join(above))}" if named else ""

@@ -46,8 +46,8 @@ def test_mass_bending_force_and_time_change_the_image(kicked: Tab) -> None:
         before = kicked.settled()
     assert kicked.app.panel(ParameterPanel).parameters()["mass"] > 1.0
     assert kicked.app.clock.time() == pytest.approx(2.0, abs=0.01)
-    assert kicked.says("extrapolated")
-    assert kicked.says("outside the trained range")
+    assert kicked.says("not reliable")  # the error that is expected there is larger than the ball
+    assert kicked.says("time, mass.* beyond the trained range")
     assert kicked.errors == []
 
 
