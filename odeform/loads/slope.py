@@ -65,7 +65,7 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 
 LOAD = Load(
     name="slope",
-    title="Let it slide down a slope",
+    title="Let it down on a slope",
     happened="let down on a slope",
     parameters=(
         Parameter("angle", "deg", 10.0, 40.0, 30.0, description="of the slope, which falls along x"),
