@@ -77,7 +77,7 @@ class Meeting:
         return scene @ state.rotation[other]
 
     def contacts(self, state: State, chosen: tuple[Ints, Ints]) -> Contacts:
-        """See `Met.contacts`."""
+        """As `Met.contacts`, (1, C, 3, 2 V) for samples `chosen` of both."""
         turning, place = bent(self._push.points, self._push.rows, state)
         turns, size, parts, gaps = turning.rotations, state.velocity.shape[1], [], []
         for (one, other), some in zip(BOTH, chosen, strict=True):

@@ -48,7 +48,7 @@ class PairSteps(Steps):
         self.meeting = Meeting(push, inside, stiffness, mechanics.parameters, reach, most)
 
     def near(self, state: State, step: float | Floats) -> Near:
-        """What may touch the floor, or the other body."""
+        """What of both may touch the floor, or the other body, in a step of `step` seconds, one or (2,)."""
         return NearBoth(**vars(super().near(state, step)), met=self.meeting.near(state, float(np.max(step))))
 
     def slope(self, state: State, time: float | Floats = 0.0) -> Floats:
@@ -122,7 +122,7 @@ class Pair:
         return flat_slopes(now, self._steps.slope(now, time)).ravel()
 
     def advance(self, time: float, state: Floats, step: float) -> tuple[Floats, Floats, float]:
-        """Returns the state after `step` seconds, to second order, the slope there, and the error in m."""
+        """Returns the state (2 S,) after `step` seconds, to second order, the slope there, and the error in m."""
         before = state.reshape(2, -1)
         if compiles():
             return self._compiled.advance(time, before, step)

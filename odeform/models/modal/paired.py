@@ -27,7 +27,10 @@ SHAPES, RECENT = 4, 4  # shapes and results that are kept
 
 
 def pair_problem(body: LoadedBody, pair: Pair, situation: Situation, read: Readout) -> Problem:
-    """The problem of two bodies, of which the first one is thrown at the other one. `read` is the readout of one."""
+    """The problem of two bodies, of which the first one is thrown at the other one.
+
+    `read` is the readout of one; that of both is (T, 2, 6 + K).
+    """
 
     def both(times: Times, states: Floats) -> Floats:
         each = states.reshape(len(states), 2, -1)

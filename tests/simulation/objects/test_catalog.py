@@ -91,6 +91,6 @@ def test_an_unknown_name_is_refused():
         get_object("teapot")
 
 
-@pytest.mark.parametrize("name", [*CHOICE, "60:120", "0.5:30"])
+@pytest.mark.parametrize("name", [*CHOICE, "70:120", "0.5:30"])
 def test_a_material_is_named_as_it_is_read(name: str) -> None:
     assert material_name(material_of(name)) == name
