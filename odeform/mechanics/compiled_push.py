@@ -383,6 +383,16 @@ def _solve(matrix, right):
 
 @compiled
 @no_type_check
+def _solve_apart(matrix, right):
+    """What `_solve` does, for a matrix of masses, in which only the inertia is more than a diagonal."""
+    for k in range(len(right)):
+        if k < 3 or k > 5:
+            right[k] /= matrix[k, k]
+    return _solve(matrix[3:6, 3:6], right[3:6])
+
+
+@compiled
+@no_type_check
 def _rotate(z, vector, at):
     """Turn the rotation of a state further by the vector that begins `at`, in axes of the scene."""
     w0, w1, w2 = vector[at], vector[at + 1], vector[at + 2]
@@ -565,7 +575,9 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
     _free(c, b, z, size, pushed, end, v, momentum, rate)
     for k in range(width):
         momentum[k] += step * rate[k]
-    for _ in range(2):
+    touches = count > 0 or len(away) > 0
+    # where nothing touches it, the second sweep would find the same
+    for _ in range(2 if touches else 1):
         _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
         _copy(momentum, right)
         for j in range(len(away)):
@@ -574,7 +586,7 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
             for k in range(width):
                 right[k] -= active * away[j] * row[k]
         _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, matrix, right)
-        if not _solve(matrix, right):
+        if not (_solve(matrix, right) if touches else _solve_apart(matrix, right)):
             return False
         for k in range(width):
             v[k] = right[k]
