@@ -69,13 +69,13 @@ style.textContent = `
   }
   @media (max-width: 60em) {
     #odeform-view > [data-odeform-view=timeline] { gap: 4px; padding: 4px 6px; }
-    .odeform-fine, .odeform-aside, .odeform-track span.until { display: none !important; }
+    .odeform-aside, .odeform-track span.until { display: none !important; }
     .odeform-buttons, .odeform-buttons > a { gap: 0; padding: 0 2px; margin: 0; }
   }
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }
     #odeform-view > [data-odeform-view=timeline] { left: 8px; right: 8px; bottom: 62px; gap: 6px; padding: 4px 8px; }
-    .odeform-wide { display: none !important; }
+    .odeform-wide, .odeform-fine { display: none !important; }
   }`;
 document.head.append(style);
 

@@ -129,7 +129,7 @@ def same(item: SoftObject) -> Rival:
     return Rival("same mesh", len(item.points), make, np.eye(item.surface_count, len(item.points)))
 
 
-def _inside(places: Points, points: Points, elements: Ints) -> Float[np.ndarray, "places nodes"]:
+def _inside(places: Float[np.ndarray, "places 3"], points: Points, elements: Ints) -> Float[np.ndarray, "places nodes"]:
     """(P, n) barycentric weights of places in the nearest of tetrahedra; outside of all they go on linearly."""
     origin = points[elements[:, 0]]
     inverse = np.linalg.inv((points[elements[:, 1:]] - origin[:, None]).swapaxes(1, 2))

@@ -1,17 +1,19 @@
 """Columns: other models, pinned copies, a sweep, colours, hidden and removed."""
 
+from odeform.models.titles import family_title
 from odeform_figures.viewer_benchmark.visitors import Visitors
 
 __all__ = ["compare"]
 
-FAST = ("odeform", "pod-rbf", "gp", "nearest")  # others move each point separately, and take seconds
+FAST = [family_title(name) for name in ("odeform", "pod-rbf", "gp", "nearest")]
+"""Others move each point separately, and take seconds."""
 
 
 def compare(visitors: Visitors) -> None:
     """Add a model, a copy and a sweep, look at them in other colours, and remove them again."""
     app, client, rng = visitors.app, visitors.first, visitors.rng
     before = len(app.columns.all)
-    models = [m for m in client.controls["model"].props["options"] if m.rpartition("/")[2] in FAST]
+    models = [m for m in client.controls["model"].props["options"] if m in FAST]
     client.set("model", str(rng.choice(models)))
     client.click("Add model")
     visitors.expect("a column of the added model", lambda: len(app.columns.all) == before + 1)
