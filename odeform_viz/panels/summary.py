@@ -117,7 +117,7 @@ def _expected(models: Sequence[ColumnFrame]) -> str:
     # outside of what was measured the band is carried on
     rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
     of = "" if len(known) == 1 else f", the largest of {len(known)}"
-    text = f"expected error {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
+    text = f"expected error now {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
     return "; ".join([text, *(f"{label}: error not known" for label in unknown)])
 
 
