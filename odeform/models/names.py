@@ -24,6 +24,5 @@ ALIASES = {"odeform": "latent", "odeform-rolling": "rolling", "odeform-mechanica
 """Names that older checkpoints and commands have for the three families of ODeform."""
 
 TRAINABLE = tuple(name for name in (*MODELS, *ALIASES) if name not in ("released", "clamped", "odeform-mechanical"))
-"""The models that `odeform train` trains. The authors' network and the clamped body, of which nothing is learned,
-are only read; `odeform` is the family that suits the
-data: modal in scenes with objects, latent in all others."""
+"""The models that `odeform train` trains. The authors' network and the clamped body, of which nothing is learned, are
+only read; `odeform` is the family that suits the data: modal in scenes with objects, latent in all others."""

@@ -26,7 +26,7 @@ WHY = {
     INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
     EXTRAPOLATED: "The model has not learned from simulations like this one; its motion is carried on from them.",
     UNTRAINED: "The model has learned from simulations of other shapes.",
-    PHYSICS: "Elasticity and contacts move the body. Of this kind of motion only contacts were fitted: no error is known.",
+    PHYSICS: "Elasticity and contacts move the body. Only its contacts were fitted to such motions: no error is known.",
     UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
     UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
     LIMITED: "The body deforms more than the model can follow: its way is computed, its shape is a guess.",
