@@ -75,6 +75,10 @@ def test_a_sequence_is_opened_left_and_found_again(compared: Tab) -> None:
 
 def test_a_state_a_file_and_a_recording_are_taken_away(compared: Tab, tmp_path: Path) -> None:
     page, app = compared.page, compared.app
+    compared.key("P").click()
+    assert until(lambda: app.clock.time() > 0.1 and not app.clock.playing)
+    # new sliders may aim the cameras anew: with a frame, and only then
+    assert until(lambda: app.presenter.settled)
     compared.turn_to("Record")
     with page.expect_download() as saved:
         compared.button("Save state").click()
