@@ -9,12 +9,11 @@ from odeform.geometry.contact import nearest_on
 from odeform.geometry.shape_similarity import compare_shapes
 from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import PushRegression
-from odeform.models.modal.coordinates import coordinates_of
 from odeform.models.modal.elastic_body import ElasticBody
 from odeform.models.modal.model import ModalModel
 from odeform.models.residual import Residual, weight_of
 from odeform.motion.reduced_space import POSE
-from odeform.types import Floats, Mesh, Vector
+from odeform.types import Basis, Floats, Mesh, Vector
 
 __all__ = ["shape_distance", "standing_offset", "transfer_weight", "transferred_residual"]
 
@@ -65,8 +64,8 @@ class _Transferred:
         return np.concatenate([found[..., :POSE], found[..., POSE:] @ self.coefficients], axis=-1)
 
 
-def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> Residual:
-    """A part `weight` of the residual of `part`, which has one, for another body."""
+def transferred_residual(part: ModalModel, body: ElasticBody, basis: Basis, weight: float) -> Residual:
+    """A part `weight` of the residual of `part`, which has one, for another body with its `basis` (S, 3, K)."""
     known, shape = part.residual, Mesh(body.points.astype(np.float32), body.faces)
     assert known is not None
     regression = known.regression
@@ -78,6 +77,5 @@ def transferred_residual(part: ModalModel, body: ElasticBody, weight: float) -> 
     standing = standing_offset(shape, part.rest)
     there = Mesh(shape.points + standing.astype(np.float32), shape.faces)
     values = part.evaluate_basis(there, 0.0).values.reshape(-1, len(body.points), 3)
-    _, basis = coordinates_of(body)
     coefficients = np.einsum("kni,nij,n->kj", values, basis, body.weights)
     return Residual(known.times, kept, _Transferred(part, known, weight, standing + body.anchor, coefficients))

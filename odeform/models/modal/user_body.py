@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
+from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
 from odeform.geometry.rigid import best_rigid
@@ -30,6 +31,8 @@ from odeform.types import Floats, Geometry, Mesh, Points, Times
 __all__ = ["UserBody", "UserBodyPredictor", "resting_body", "takes_user_bodies", "user_body"]
 
 SIZES = 8  # motions whose size is kept
+ALONE = threadpool_limits.wrap(limits=1, user_api="blas")
+"""Products here are small: two threads that wait for each other took four times as long on a machine that others used."""
 NEIGHBOURS = 4  # nodes that carry a point of the shape
 
 
@@ -47,6 +50,7 @@ class UserBody:
     """How it was made, in one line: the material, and what a solid has that the shape does not have."""
 
 
+@ALONE
 def user_body(
     geometry: Geometry, name: str = "shape", up: str | None = None, material: SoftMaterial | None = None
 ) -> UserBody:
@@ -126,6 +130,7 @@ class UserBodyPredictor(ModalModel):
             `odeform.models.modal.transferred_residual.shape_distance`.
     """
 
+    @ALONE
     def __init__(self, trained: Predictor, user_body: UserBody) -> None:
         """`InputError` for a model that `takes_user_bodies` is false for."""
         trained = trained.trained if isinstance(trained, UserBodyPredictor) else trained
@@ -153,7 +158,7 @@ class UserBodyPredictor(ModalModel):
             )
         )
         if part.residual is not None:
-            self.residual = transferred_residual(part, body, transfer_weight(self.distance))
+            self.residual = transferred_residual(part, body, self._coordinates[1], transfer_weight(self.distance))
         band = trained.checkpoint.config.get(SHAPE_BAND)
         self._band = None if band is None else ShapeBand.from_json(band)
         self.knows_untrained_errors = self._band is not None

@@ -124,11 +124,11 @@ def test_gains_are_carried_over_by_stiffness(checkpoint: Checkpoint, donut: User
     gains, times = np.linspace(1.0, 2.0, 12), np.arange(3) / 100.0
     part = PerObject(_corrected(checkpoint, gains, times), ModalModel).parts["donut"]
     assert isinstance(part, ModalModel)
-    body = donut.user_body.body
-    same = transferred_residual(part, body, 0.5)
+    body, basis = donut.user_body.body, donut._coordinates[1]
+    same = transferred_residual(part, body, basis, 0.5)
     np.testing.assert_allclose(same.weight[:18], np.concatenate([np.ones(6), 1.0 + 0.5 * (gains - 1.0)]), atol=1e-6)
     np.testing.assert_allclose(same.weight[18:], 1.5)  # its other modes are stiffer than all of the trained body
-    stiffer = transferred_residual(part, replace(body, eigenvalues=1e9 * body.eigenvalues), 0.5)
+    stiffer = transferred_residual(part, replace(body, eigenvalues=1e9 * body.eigenvalues), basis, 0.5)
     np.testing.assert_allclose(stiffer.weight[6:], 1.5)
 
 
