@@ -32,7 +32,7 @@ __all__ = ["UserBody", "UserBodyPredictor", "resting_body", "takes_user_bodies",
 
 SIZES = 8  # motions whose size is kept
 ALONE = threadpool_limits.wrap(limits=1, user_api="blas")
-"""Products here are small: two threads that wait for each other took four times as long on a machine that others used."""
+"""Products here are small: two threads that wait for each other took three times as long on a busy machine."""
 NEIGHBOURS = 4  # nodes that carry a point of the shape
 
 
