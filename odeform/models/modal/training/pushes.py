@@ -1,6 +1,7 @@
 """Pushed bodies as training data: contacts and forces in, reduced motions out."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +13,7 @@ from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.motion import push_body
 from odeform.mechanics.push import make_push
 from odeform.mechanics.step import Mechanics, Projectile
-from odeform.models.modal.coordinates import coordinates_of
+from odeform.models.modal.coordinates import Coordinates, coordinates_of
 from odeform.models.modal.elastic_body import ElasticBody
 from odeform.motion.reduced_space import POSE, decompose
 from odeform.types import Basis, Floats, Mesh, Perpoint, Vectors
@@ -63,6 +64,10 @@ class Pushes:
         names = ("contacts", "normals", "centres", "forces", "reduced", "left_out")
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
+    @cached_property
+    def _coordinates(self) -> Coordinates:
+        return coordinates_of(self.body)[0]
+
     def predicted(
         self, contact_parameters: ContactParameters, pulse: float, step: float
     ) -> Float[np.ndarray, "pushes times y"]:
@@ -71,10 +76,9 @@ class Pushes:
         push = make_push(mechanics.body, self.body.dynamic, self.contacts, self.centres, self.forces)
         nodes = push_body(mechanics, push, pulse, float(self.times[-1]), step)
         every = round(float(self.times[1] - self.times[0]) / step)
-        coordinates, _ = coordinates_of(self.body)
         kept = slice(0, every * (len(self.times) - 1) + 1, every)
         parts = zip(push.modes, nodes.shifts[:, kept], nodes.rotations[:, kept], nodes.amplitudes[:, kept], strict=True)
-        return np.stack([coordinates.along(modes).reduced(*motion) for modes, *motion in parts])
+        return np.stack([self._coordinates.along(modes).reduced(*motion) for modes, *motion in parts])
 
 
 def read_pushes(dataset: Dataset, split: str, body: ElasticBody) -> Pushes:
