@@ -85,9 +85,12 @@ def _report(result: dict[str, Any]) -> str:
         rows = {name: row for name, row in result["shapes"].items() if row["kind"] == kind}
         if not rows:
             continue
-        lines.append(f"{kind:<44} {'like':<10}" + "".join(f"{column:>15}" for column in COLUMNS))
+        columns = (*COLUMNS, "in_known_band") if any(row["within_known_band"] for row in rows.values()) else COLUMNS
+        lines.append(f"{kind:<44} {'like':<10}" + "".join(f"{column:>15}" for column in columns))
         for name, row in rows.items():
             cells = "".join(f"{row[column]:>15.3g}" for column in COLUMNS)
+            if row["within_known_band"] is not None:
+                cells += f"{row['within_known_band']:>15.0%}"
             failed = f"  failed: {len(row['failed'])}" if row["failed"] else ""
             lines.append(f"  {name:<42} {row['like']:<10}{cells}{failed}")
         lines.append(

@@ -28,6 +28,8 @@ class Measured:
     """mm, RMSE of the model."""
     predicted: Float[np.ndarray, "pushes times"]
     """mm, RMS displacement of the model."""
+    within: float | None
+    """The fraction of frames within the 90 % band that the model has already; None where it has none."""
     pooled: dict[str, float]
     """mm: see `to_json`."""
 
@@ -48,6 +50,7 @@ class Measured:
             "seen_relative": seen["relative"],
             "ratio": self.pooled["model_mm"] / seen["rmse_pooled_mm"],
             "relative_ratio": relative / seen["relative"],
+            "within_known_band": self.within,
         }
 
 
@@ -62,11 +65,13 @@ def measure(predictor: UserBodyPredictor, nearest: Predictor, shape: UnseenShape
     parts = [_parts(one, rest, weights) for one in found]
     local = [(one.model - one.rigid, one.truth - one.rigid) for one in found]
     fitting = sum(float((mine * true).sum()) for mine, true in local)
+    errors = np.stack([_rmse(one.model - one.truth) for one in found])
     return Measured(
         shape,
         predictor.distance,
-        np.stack([_rmse(one.model - one.truth) for one in found]),
+        errors,
         np.stack([_rmse(one.model) for one in found]),
+        _within(predictor, shape, errors),
         {
             "moved_mm": pooled([one.truth for one in found]),
             "model_mm": pooled([one.model - one.truth for one in found]),
@@ -78,6 +83,17 @@ def measure(predictor: UserBodyPredictor, nearest: Predictor, shape: UnseenShape
             "best_share_of_deformation": fitting / sum(float((mine**2).sum()) for mine, _ in local),
         },
     )
+
+
+def _within(predictor: UserBodyPredictor, shape: UnseenShape, errors: Floats) -> float | None:
+    inside: list[np.ndarray] = []
+    for motion, error in zip(shape.motions, errors, strict=True):
+        given = {**motion.parameters, **predictor.parameters_like()}
+        band = predictor.error_band(given, motion.times[1:])
+        if band is None:
+            return None
+        inside.append(error <= band[:, 1])
+    return float(np.mean(inside))
 
 
 def _rmse(error: Frames) -> Floats:

@@ -34,6 +34,8 @@ from odeform_figures.unseen.unseen import Plan, unseen
 NAMES = ("donut", "bottle")
 QUALITIES = {name: {"method": "limex", "step": 5e-3, "dtype": "float64"} for name in ("draft", "balanced", "reference")}
 
+BAND = {"level": 0.0, "by_size": 1.0, "by_distance": 1.0, "times": [0.1, 0.19], "profile": [[0.0, 1.0]] * 2}
+
 
 def part(name: str) -> Checkpoint:
     """A body with the contact parameters as it is before training, and no correction."""
@@ -89,6 +91,17 @@ def test_a_model_that_is_the_truth_has_no_error_and_deforms_as_much_as_it_should
     assert row["best_share_of_deformation"] == pytest.approx(1.0, abs=1e-3)
     assert row["ratio"] == row["model_mm"] / 0.5
     assert found.errors.shape == found.predicted.shape == (2, 4)
+    assert found.within is None, "it has no band"
+    config = {**donut.trained.checkpoint.config, "own_band": BAND}
+    told = UserBodyPredictor(PerObject(replace(donut.trained.checkpoint, config=config), ModalModel), donut.user_body)
+    assert measure(told, donut.trained, shape).within == 1.0
+    off = replace(
+        shape,
+        motions=tuple(
+            replace(one, vertices=one.vertices + one.times.astype(np.float32)[:, None, None]) for one in shape.motions
+        ),
+    )
+    assert measure(told, donut.trained, off).within == 0.0
 
 
 def test_the_nearest_object_moves_a_shape_that_stands_elsewhere_as_if_it_stood_there(trained: PerObject) -> None:
@@ -145,8 +158,7 @@ def _corrected(checkpoint: Checkpoint, gains: Floats, times: Floats) -> Checkpoi
 
 def test_a_band_in_the_checkpoint_is_that_of_own_bodies(checkpoint: Checkpoint, donut: UserBodyPredictor) -> None:
     assert not donut.knows_untrained_errors
-    band = {"level": 0.0, "by_size": 1.0, "by_distance": 1.0, "times": [0.1, 0.19], "profile": [[0.0, 1.0]] * 2}
-    told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": band}), ModalModel)
+    told = PerObject(replace(checkpoint, config={**checkpoint.config, "own_band": BAND}), ModalModel)
     near, far = (UserBodyPredictor(told, replace(donut.user_body, like=like)) for like in NAMES)
     given = pushes_of(donut.user_body.item, 1, 0)[0]
     found = near.error_band(given, np.array([0.0, 0.1, 0.19]))
