@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from odeform.figure.table import quantised
 from odeform.motion.evaluated_basis import EvaluatedBasis
-from odeform.motion.local_frames import Axes, evaluate_local_frames
+from odeform.motion.local_frames import evaluate_local_frames
 from odeform.types import Arrays, Floats, Ints, Perpoint, Points
 
 __all__ = ["Binding", "bound"]
@@ -42,7 +42,7 @@ class Binding:
     slopes: Int16[np.ndarray, "nodes followed around"]
     """Of their displacements in how an axis changes, per metre, in `slope_step`."""
     slope_step: float
-    axes: Axes
+    axes: Float[np.ndarray, "3 3 nodes"]
     """(3, 3, n): those at rest, canonical; of those that `slopes` leaves out, the last stays their normal."""
 
     def of(self, kept: Ints) -> "Binding":
@@ -120,7 +120,7 @@ def _blocks(points: Points) -> Iterator[slice]:
 
 
 def _weights(
-    nodes: Points,
+    nodes: Float[np.ndarray, "nodes 3"],
     of_nodes: Float[np.ndarray, "nodes modes 3"],
     near: Ints,
     points: Points,
@@ -134,11 +134,11 @@ def _weights(
 
 
 def _slopes(
-    nodes: Points,
+    nodes: Float[np.ndarray, "nodes 3"],
     of_nodes: Float[np.ndarray, "nodes modes 3"],
     around: Ints,
     steep: Float[np.ndarray, "nodes modes 3"],
-    axis: Points,
+    axis: Float[np.ndarray, "nodes 3"],
     scale: float,
 ) -> Floats:
     """(n, J) per metre, that reproduce derivatives along the unit vectors `axis` (n, 3)."""

@@ -107,6 +107,4 @@ def figure_body(
     else:
         raise InputError(f"a figure shows splats, or a mesh with faces, got {type(geometry).__name__}")
     basis, steps = quantised(values)
-    return FigureBody(
-        space.anchor, evaluated.azimuth, rest, faces, basis, steps, space.gyration_radius, colors, splats
-    )
+    return FigureBody(space.anchor, evaluated.azimuth, rest, faces, basis, steps, space.gyration_radius, colors, splats)

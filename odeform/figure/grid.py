@@ -33,7 +33,7 @@ IN_TIME = 0.5  # of the tolerance, by interpolation between frames
 SUBDIVIDED = (1, 2, 4)  # parts of the time between two frames
 GAIN = 0.95  # three refinements that leave more of the error than this have come to its end: the solver's own error
 MARGIN = 0.95  # of the tolerance, by the grid; the rest is for 16 bits and patterns
-SPLATS = 0.6  # of a column that splats may take
+SPLATS = 0.65  # of a column that splats may take
 EXPANDED = 4.0 / 3.0  # bytes of base64 of each byte
 
 Report = Callable[[int, int, float], None]

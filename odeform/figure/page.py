@@ -162,6 +162,8 @@ def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
         for name, value in first.predictor.schema.expanded(first.fixed).items()
         if name in units and name not in swept
     ]
+    if any(column.body.splats and column.body.splats.still for column in columns):
+        return ", ".join(given)  # they have a floor of their own
     cell = _cell(columns)
     grid = f"grid {100 * cell:g} cm" if cell < 1.0 else f"grid {cell:g} m"
     return ", ".join([*given, grid])
@@ -207,10 +209,13 @@ def _splat_note(splats: FigureSplats) -> str:
     (shown, every), (moving, still) = splats.shown, splats.degrees
     rms, worst = splats.apart_mm
     count = f"{shown:,} splats" if shown == every else f"{shown:,} of {every:,} splats, those that are seen most,"
-    said = f"{count}; centres that move are carried by {len(splats.binding.nodes)} of them, within {rms:.2g} mm (RMS) and "
-    said += f"{worst:.2g} mm at most of where the model has them."
+    said = (
+        f"{count}; centres that move are carried by {len(splats.binding.nodes)} of them, within {rms:.2g} mm (RMS) "
+        f"and {worst:.2g} mm at most of where the model has them."
+    )
     given = splats.given_degree
     if given == 0:
         return f"{said} Their colours do not depend on the view."
     other = f", of what stands still {still}" if splats.still is not None and still != moving else ""
-    return f"{said} Their colours depend on the view, by harmonics up to degree {moving}{other} (of {given} in the file)."
+    kept = f"harmonics up to degree {moving}{other} (of {given} in the file)"
+    return f"{said} Their colours depend on the view, by {kept}."

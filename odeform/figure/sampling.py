@@ -13,8 +13,8 @@ from odeform.cancellation import check_cancelled
 from odeform.errors import InputError
 from odeform.figure.body import FigureBody, figure_body
 from odeform.figure.sweep import Sweep
-from odeform.models.base import Predictor
 from odeform.geometry.parts import subset
+from odeform.models.base import Predictor
 from odeform.motion.reduced_batch import ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.solver.integrate import SolverSettings

@@ -1,4 +1,4 @@
-"""The Gaussian splats of a figure: those of the body, bound to nodes that the page moves, and those that stand still."""
+"""Gaussian splats of a figure: those of the body, bound to nodes that the page moves, and those that stand still."""
 
 from dataclasses import dataclass, replace
 from math import isqrt
@@ -62,25 +62,22 @@ class FigureSplats:
     def within(self, most_bytes: float) -> "FigureSplats":
         """Keeps what fits into so many bytes: first harmonics of a high degree go, of what stands still before what
         moves, then the splats that are seen least."""
-        binding = self.binding
-        counts = (len(self.body.points), _count(self.scene))
-
-        def size(degrees: tuple[int, int]) -> float:
-            each = (min(degree, self.given_degree) for degree in degrees)
-            a, b = (splat_bytes(degree) for degree in each)
-            return counts[0] * (a + BOUND_BYTES) + counts[1] * b
-
-        degrees = next((degrees for degrees in STRIPPED if size(degrees) <= most_bytes), STRIPPED[-1])
-        fraction = min(most_bytes / size(degrees), 1.0)
+        degrees = next((degrees for degrees in STRIPPED if self._bytes(degrees) <= most_bytes), STRIPPED[-1])
+        fraction = min(most_bytes / self._bytes(degrees), 1.0)
         kept, kept_still = _largest(self.body, fraction), _largest(self.scene, fraction)
         return replace(
             self,
             kept=kept,
             kept_still=kept_still,
-            binding=binding.of(kept),
+            binding=self.binding.of(kept),
             moving=packed(self.body, degrees[0], kept),
             still=None if self.scene is None else packed(self.scene, degrees[1], kept_still),
         )
+
+    def _bytes(self, degrees: tuple[int, int]) -> int:
+        """Of all splats with harmonics up to these degrees."""
+        moving, still = (splat_bytes(min(degree, self.given_degree)) for degree in degrees)
+        return len(self.body.points) * (moving + BOUND_BYTES) + _count(self.scene) * still
 
     def sampled(self) -> "FigureSplats":
         """Some of those that move, of which errors are measured."""

@@ -114,7 +114,7 @@ class Drawing {
     if (mesh.splats) {
       const pixels = [0.5 * box[2], 0.5 * box[3]], eye = camera.eye, turn = column.turn;
       const values = { view, turn, eye, pixels, center, floorAt: floored ? floorAt : -1e9, reach, size };
-      mesh.splats.draw(this, box, camera.toward, values);
+      mesh.splats.draw(this, box, values);
       return;
     }
     this.body({ ...colors, view, eye: camera.eye, light, floorAt, size, ...mesh.checks, painted: Number(Boolean(mesh.colors)) });

@@ -56,7 +56,7 @@ function main() {
   gl.enable(gl.SCISSOR_TEST);
   const columns = figure.columns.map((column) => new Column(column)), camera = new Camera();
   const places = figure.sweeps.map((sweep) => sweep.place), stop = figure.start + (figure.frames - 1) * figure.step;
-  const state = { time: figure.start, playing: false, chosen: true, shown: true, last: 0, frames: 0, detail: 1, pace: 0, columns };
+  const state = { time: figure.start, playing: false, chosen: true, shown: true, last: 0, frames: 0, detail: 1, pace: 0, columns, camera };
   window.figure = state; // for whoever measures it
   const scene = { columns, camera, drawing: new Drawing(columns), places, colors: themed(state) };
   const { tell, toggle } = timeControls(state, stop);

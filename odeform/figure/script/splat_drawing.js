@@ -102,14 +102,15 @@ class SplatDrawing {
   }
 
   // each is projected once, and drawn from back to front; `values` are what `SPLAT_PROJECTED` needs of the view
-  draw(drawing, box, toward, values) {
+  draw(drawing, box, values) {
     const { splats, textures, seen, order } = this;
     if (this.moves !== splats.column.moves) {
       this.moves = splats.column.moves;
       textures.nodes.fill(splats.nodes);
       textures.places.fill(splats.places);
     }
-    order.fill(splats.sort(toward));
+    const count = splats.sort(values.view);
+    order.fill(splats.order);
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, ROW, textures.colors.rows);
@@ -124,7 +125,7 @@ class SplatDrawing {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     drawing.paint(this.bound({ order, ...seen }));
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.corners);
-    gl.drawElements(gl.TRIANGLES, 6 * splats.count, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 0);
     gl.disable(gl.BLEND);
     gl.enable(gl.DEPTH_TEST);
   }

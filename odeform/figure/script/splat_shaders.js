@@ -24,7 +24,6 @@ void main() {
   if (i >= count) return;
   vec3 splat = texelFetch(places, at(i), 0).xyz;
   vec4 clip = view * vec4(splat, 1.0);
-  if (clip.w <= 0.0 || any(greaterThan(abs(clip.xy), vec2(1.3 * clip.w)))) return;
   vec4 p = texelFetch(shapes, at(2 * i), 0), q = texelFetch(shapes, at(2 * i + 1), 0), rgba = texelFetch(colors, at(i), 0);
   mat3 s = mat3(p.x, p.y, p.z, p.y, p.w, q.x, p.z, q.x, q.y);
   vec3 toward = normalize(splat - eye);
@@ -68,7 +67,7 @@ void main() {
     if (all(lessThan(abs(there - 0.5), vec2(0.5)))) rgb *= 1.0 - 0.62 * textureLod(shadow, there, 0.0).r;
   }
   uvec4 whole = uvec4(255.0 * clamp(vec4(rgb, rgba.a), 0.0, 1.0) + 0.5);
-  float wide = sqrt(2.0 * log(max(255.0 * rgba.a, 1.0)));
+  float wide = min(sqrt(2.0 * log(max(255.0 * rgba.a, 1.0))), 3.0);
   uint shade = whole.r | whole.g << 8 | whole.b << 16 | whole.a << 24;
   across = uvec4(floatBitsToUint(vec3(sqrt(small) * vec2(along.y, -along.x) / pixels, wide)), shade);
 }`;

@@ -1,4 +1,5 @@
 const BUCKETS = 1 << 16; // of depth
+const BEYOND = 1.3; // half pictures from the middle, within which centres may be seen
 const CARRIERS = 4;
 
 // centres (3), six numbers of a covariance and two of the colours, colours and harmonics of packed splats
@@ -60,6 +61,7 @@ class MovedSplats {
     this.order = new Uint32Array(this.count);
     this.buckets = new Uint32Array(BUCKETS);
     this.bucket = new Uint16Array(this.count);
+    this.depth = new Float32Array(this.count);
   }
 
   move(nodes) {
@@ -100,28 +102,35 @@ class MovedSplats {
     }
   }
 
-  // numbers from back to front, by a counting sort
-  sort(toward) {
-    const { places, count, buckets, bucket, order } = this, [x, y, z] = toward;
+  // numbers of those that may be seen, from back to front, by a counting sort; returns how many
+  sort(view) {
+    const { places, count, buckets, bucket, order, depth } = this;
     let low = Infinity, high = -Infinity;
-    for (let i = 0; i < 3 * count; i += 3) {
-      const depth = x * places[i] + y * places[i + 1] + z * places[i + 2];
-      if (depth < low) low = depth;
-      if (depth > high) high = depth;
+    for (let i = 0, at = 0; i < count; i++, at += 3) {
+      const x = places[at], y = places[at + 1], z = places[at + 2];
+      const w = view[3] * x + view[7] * y + view[11] * z + view[15], edge = BEYOND * w;
+      const inside = w > 0 && Math.abs(view[0] * x + view[4] * y + view[8] * z + view[12]) < edge
+        && Math.abs(view[1] * x + view[5] * y + view[9] * z + view[13]) < edge;
+      depth[i] = inside ? w : -1;
+      if (!inside) continue;
+      if (w < low) low = w;
+      if (w > high) high = w;
     }
     const scale = (BUCKETS - 1) / Math.max(high - low, 1e-9);
     buckets.fill(0);
     for (let i = 0; i < count; i++) {
-      bucket[i] = (x * places[3 * i] + y * places[3 * i + 1] + z * places[3 * i + 2] - low) * scale;
+      if (depth[i] < 0) continue;
+      bucket[i] = (high - depth[i]) * scale;
       buckets[bucket[i]]++;
     }
-    for (let b = 0, sum = 0; b < BUCKETS; b++) {
+    let seen = 0;
+    for (let b = 0; b < BUCKETS; b++) {
       const here = buckets[b];
-      buckets[b] = sum;
-      sum += here;
+      buckets[b] = seen;
+      seen += here;
     }
-    for (let i = 0; i < count; i++) order[buckets[bucket[i]]++] = i;
-    return order;
+    for (let i = 0; i < count; i++) if (depth[i] >= 0) order[buckets[bucket[i]]++] = i;
+    return seen;
   }
 }
 
