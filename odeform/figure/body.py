@@ -58,7 +58,7 @@ class FigureBody:
         moved = np.einsum("tij,tnj->tni", rotation.astype(np.float32), local)
         return moved + (shift + self.anchor).astype(np.float32)[:, None]
 
-    def within(self, most_bytes: float) -> "FigureBody":
+    def within(self, most_bytes: int) -> "FigureBody":
         """Keeps so much of the splats that they take at most so many bytes; a mesh stays as it is."""
         return self if self.splats is None else replace(self, splats=self.splats.within(most_bytes))
 

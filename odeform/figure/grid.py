@@ -84,7 +84,7 @@ def interpolated(
     """
     if len(times) < 4 or not np.allclose(np.diff(times), times[1] - times[0]):
         raise InputError(f"times: expected at least four, evenly spaced, got {len(times)}")
-    body = source.body.within(SPLATS * most_bytes / EXPANDED)
+    body = source.body.within(int(SPLATS * most_bytes / EXPANDED))
     probes = draw_probes(source, body, times)
     band = _band(source, probes.places, times)
     size = float(np.ptp(body.rest, axis=0).max())

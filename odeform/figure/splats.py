@@ -59,7 +59,7 @@ class FigureSplats:
         """How many splats are shown, and how many there are."""
         return len(self.kept) + len(self.kept_still), len(self.body.points) + _count(self.scene)
 
-    def within(self, most_bytes: float) -> "FigureSplats":
+    def within(self, most_bytes: int) -> "FigureSplats":
         """Keeps what fits into so many bytes: first harmonics of a high degree go, of what stands still before what
         moves, then the splats that are seen least."""
         degrees = next((degrees for degrees in STRIPPED if self._bytes(degrees) <= most_bytes), STRIPPED[-1])
