@@ -7,7 +7,8 @@ const KINDS = {
   int8: Int8Array, uint8: Uint8Array, int16: Int16Array, uint16: Uint16Array, uint32: Uint32Array, float32: Float32Array,
 };
 const $ = (id) => document.getElementById(id);
-const SLOW = 0.045, COARSEST = 0.45; // s between two frames; pixels each way, of those there are
+const SLOW = 0.045, COARSEST = 0.45, COARSEST_SPLATS = 0.33; // s between two frames; pixels each way, of those there are
+const STILL = 300; // ms without a change, after which all pixels are drawn
 const UNSEEN = 1e-6; // m, deformations below which are not drawn
 
 function decode(array) {

@@ -25,8 +25,8 @@ function themed(state) {
 }
 
 // the picture of the present moment
-function drawAll(state, { columns, camera, drawing, places, colors }) {
-  const ratio = Math.min(window.devicePixelRatio || 1, 2) * state.detail;
+function drawAll(state, { columns, camera, drawing, places, colors }, detail) {
+  const ratio = Math.min(window.devicePixelRatio || 1, 2) * detail;
   const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   const all = boxes(columns.length, width, height);
@@ -56,9 +56,10 @@ function main() {
   gl.enable(gl.SCISSOR_TEST);
   const columns = figure.columns.map((column) => new Column(column)), camera = new Camera();
   const places = figure.sweeps.map((sweep) => sweep.place), stop = figure.start + (figure.frames - 1) * figure.step;
-  const state = { time: figure.start, playing: false, chosen: true, shown: true, last: 0, frames: 0, detail: 1, pace: 0, columns, camera };
+  const state = { time: figure.start, playing: false, chosen: true, shown: true, last: 0, frames: 0, detail: 1, pace: 0, sharp: true, columns, camera };
   window.figure = state; // for whoever measures it
   const scene = { columns, camera, drawing: new Drawing(columns), places, colors: themed(state) };
+  const coarsest = columns.some(({ splats }) => splats) ? COARSEST_SPLATS : COARSEST;
   const { tell, toggle } = timeControls(state, stop);
   sliderControls(state, places);
   const tellTruth = truthControls(state, places, columns);
@@ -67,9 +68,6 @@ function main() {
   const draw = (now) => {
     const passed = Math.min((now - state.last) / 1e3, 0.1);
     state.last = now;
-    // where pixels are slow, as without a graphics card, there are fewer of them
-    state.pace = state.playing ? 0.8 * state.pace + 0.2 * passed : 0;
-    if (state.pace > SLOW && state.detail > COARSEST) Object.assign(state, { detail: 0.8 * state.detail, pace: 0 });
     if (state.playing) {
       state.time += passed * Number($("speed").value);
       if (state.time > stop) state.time = figure.start;
@@ -77,8 +75,18 @@ function main() {
       tell();
     }
     if (state.shown) {
-      drawAll(state, scene);
+      // where pixels are slow, as without a graphics card, there are fewer of them while something moves
+      state.pace = state.moving ? 0.8 * state.pace + 0.2 * passed : 0;
+      if (state.pace > SLOW && state.detail > coarsest) Object.assign(state, { detail: 0.8 * state.detail, pace: 0 });
+      drawAll(state, scene, state.detail);
       tellTruth();
+      Object.assign(state, { moving: true, sharp: state.detail === 1, drawn: now });
+    } else {
+      state.moving = false;
+      if (!state.sharp && now - state.drawn > STILL) {
+        drawAll(state, scene, 1);
+        state.sharp = true;
+      }
     }
     requestAnimationFrame(draw);
   };

@@ -16,11 +16,13 @@ class DataTexture {
     gl.texImage2D(gl.TEXTURE_2D, 0, internal, ROW, this.rows, 0, format, kind, this.whole);
   }
 
+  // the first numbers anew
   fill(data) {
+    const rows = Math.ceil(data.length / this.channels / ROW);
     this.whole.set(data);
     this.bind(1); // a shadow is at place 0
     gl.activeTexture(gl.TEXTURE1);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, this.rows, this.format, this.kind, this.whole);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, rows, this.format, this.kind, this.whole);
     gl.activeTexture(gl.TEXTURE0);
   }
 
@@ -107,10 +109,10 @@ class SplatDrawing {
     if (this.moves !== splats.column.moves) {
       this.moves = splats.column.moves;
       textures.nodes.fill(splats.nodes);
-      textures.places.fill(splats.places);
+      textures.places.fill(splats.places.subarray(0, 3 * splats.moving.count));
     }
     const count = splats.sort(values.view);
-    order.fill(splats.order);
+    order.fill(splats.order.subarray(0, count));
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, ROW, textures.colors.rows);

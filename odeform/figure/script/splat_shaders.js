@@ -67,7 +67,7 @@ void main() {
     if (all(lessThan(abs(there - 0.5), vec2(0.5)))) rgb *= 1.0 - 0.62 * textureLod(shadow, there, 0.0).r;
   }
   uvec4 whole = uvec4(255.0 * clamp(vec4(rgb, rgba.a), 0.0, 1.0) + 0.5);
-  float wide = min(sqrt(2.0 * log(max(255.0 * rgba.a, 1.0))), 3.0);
+  float wide = min(sqrt(2.0 * log(max(255.0 * rgba.a, 1.0))), 2.83);
   uint shade = whole.r | whole.g << 8 | whole.b << 16 | whole.a << 24;
   across = uvec4(floatBitsToUint(vec3(sqrt(small) * vec2(along.y, -along.x) / pixels, wide)), shade);
 }`;
