@@ -21,20 +21,22 @@ def paint(splats: GaussianSplats) -> rr.GaussianSplats3D:
 
 def ellipsoids(covariances: Float[np.ndarray, "points 3 3"]) -> rr.GaussianSplats3D:
     """Sizes and rotations of (N, 3, 3) m^2."""
-    return rr.GaussianSplats3D.from_fields(**_axes(covariances))
+    scales, quaternions = _axes(covariances)
+    return rr.GaussianSplats3D.from_fields(scales=scales, quaternions=quaternions)
 
 
 def splats_at_rest(splats: GaussianSplats) -> rr.GaussianSplats3D:
     """All of splats that do not move."""
     centers = np.asarray(splats.points, dtype=np.float32)
-    axes = _axes(splats.covariances)
-    return rr.GaussianSplats3D(centers, colors=_colors(splats), sh_coefficients=_further(splats), **axes)
+    scales, quaternions = _axes(splats.covariances)
+    colors, further = _colors(splats), _further(splats)
+    return rr.GaussianSplats3D(centers, scales=scales, quaternions=quaternions, colors=colors, sh_coefficients=further)
 
 
-def _axes(covariances: Floats) -> dict[str, Points]:
+def _axes(covariances: Floats) -> tuple[Points, Float[np.ndarray, "points 4"]]:
+    """Standard deviations in m, and quaternions with w last."""
     sizes, quaternions = axes_from_covariances(covariances)
-    turned = np.roll(quaternions, -1, axis=1)  # Rerun has w last
-    return {"scales": sizes.astype(np.float32), "quaternions": turned.astype(np.float32)}
+    return sizes.astype(np.float32), np.roll(quaternions, -1, axis=1).astype(np.float32)
 
 
 def _colors(splats: GaussianSplats) -> UInt8[np.ndarray, "points 4"]:

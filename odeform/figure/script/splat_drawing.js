@@ -95,7 +95,6 @@ class SplatDrawing {
     Object.values(this.seen).forEach(({ texture }, i) => gl.framebufferTexture2D(gl.FRAMEBUFFER, outputs[i], gl.TEXTURE_2D, texture, 0));
     gl.drawBuffers(outputs);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    this.corners = buffer(Uint32Array.from({ length: 6 * count }, (_, i) => 4 * Math.floor(i / 6) + [0, 1, 2, 2, 1, 3][i % 6]), gl.ELEMENT_ARRAY_BUFFER);
   }
 
   // uniforms of textures that are bound from place 1 on: a shadow is at place 0
@@ -126,8 +125,7 @@ class SplatDrawing {
     gl.blendEquation(gl.FUNC_ADD);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     drawing.paint(this.bound({ order, ...seen }));
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.corners);
-    gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 0);
+    gl.drawArrays(gl.TRIANGLES, 0, 3 * count);
     gl.disable(gl.BLEND);
     gl.enable(gl.DEPTH_TEST);
   }

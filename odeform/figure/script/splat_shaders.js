@@ -1,3 +1,4 @@
+const BEYOND = 1.3; // half pictures from the middle, within which centres may be seen
 const ROW = 2048; // texels of a row of data
 // Gaussian splats: projected as by Zwicker et al. 2001, "EWA volume splatting"; colours by harmonics as of Kerbl et al. 2023.
 // Each pixel of the first pass is a splat: that is less work than each corner of it, and faster than instances in software.
@@ -24,6 +25,7 @@ void main() {
   if (i >= count) return;
   vec3 splat = texelFetch(places, at(i), 0).xyz;
   vec4 clip = view * vec4(splat, 1.0);
+  if (clip.w <= 0.0 || any(greaterThan(abs(clip.xy), vec2(${BEYOND} * clip.w)))) return;
   vec4 p = texelFetch(shapes, at(2 * i), 0), q = texelFetch(shapes, at(2 * i + 1), 0), rgba = texelFetch(colors, at(i), 0);
   mat3 s = mat3(p.x, p.y, p.z, p.y, p.w, q.x, p.z, q.x, q.y);
   vec3 toward = normalize(splat - eye);
@@ -75,13 +77,14 @@ const SPLAT_CORNER = HEAD + `
 precision highp int; precision highp usampler2D;
 uniform usampler2D order, place, across; out vec2 off; flat out vec4 rgba;
 void main() {
-  int i = gl_VertexID / 4, corner = gl_VertexID % 4;
+  // a triangle around the ellipse: less work than two, where splats are as small as pixels
+  int i = gl_VertexID / 3, corner = gl_VertexID % 3;
   int splat = int(texelFetch(order, ivec2(i % ${ROW}, i / ${ROW}), 0).r);
   ivec2 at = ivec2(splat % ${ROW}, splat / ${ROW});
   uvec4 a = texelFetch(place, at, 0), b = texelFetch(across, at, 0);
   vec4 first = uintBitsToFloat(a);
   vec3 second = uintBitsToFloat(b.xyz);
-  off = second.z * vec2(corner % 2 == 0 ? -1.0 : 1.0, corner < 2 ? -1.0 : 1.0);
+  off = second.z * (corner == 2 ? vec2(0.0, 2.0) : vec2(corner == 0 ? -1.7320508 : 1.7320508, -1.0));
   rgba = vec4(b.w & 255u, b.w >> 8 & 255u, b.w >> 16 & 255u, b.w >> 24) / 255.0;
   gl_Position = vec4(first.xy + off.x * first.zw + off.y * second.xy, 0.0, 1.0);
 }`;

@@ -1,5 +1,4 @@
 const BUCKETS = 1 << 16; // of depth
-const BEYOND = 1.3; // half pictures from the middle, within which centres may be seen
 const CARRIERS = 4;
 
 // centres (3), six numbers of a covariance and two of the colours, colours and harmonics of packed splats
