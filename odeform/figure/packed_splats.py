@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int8, UInt8, UInt16
 
 from odeform.geometry.ellipsoids import axes_from_covariances, covariances_from_axes
-from odeform.types import SH0, Arrays, Floats, GaussianSplats, Ints, Perpoint
+from odeform.types import SH0, Arrays, Floats, GaussianSplats, Ints
 
-__all__ = ["PackedSplats", "packed", "splat_bytes", "weight_in_view"]
+__all__ = ["PackedSplats", "packed", "splat_bytes"]
 
 THINNEST = 1e-6  # m, one standard deviation
 PLAIN = 17  # bytes of a splat without further harmonics
@@ -53,12 +53,6 @@ class PackedSplats:
 def splat_bytes(degree: int) -> int:
     """How many bytes a splat with harmonics up to `degree` takes."""
     return PLAIN + 3 * ((degree + 1) ** 2 - 1)
-
-
-def weight_in_view(splats: GaussianSplats) -> Perpoint:
-    """Computes how much is seen of each splat (N,): its opacity times its area, m^2."""
-    variances = np.linalg.eigvalsh(splats.covariances)
-    return splats.opacities * np.sqrt(np.maximum(variances[:, 1] * variances[:, 2], 0.0))
 
 
 def packed(splats: GaussianSplats, degree: int, kept: Ints) -> PackedSplats:

@@ -208,7 +208,7 @@ def _splat_note(splats: FigureSplats) -> str:
     """How many splats are shown, with how much of their colours, and how far from the model's."""
     (shown, every), (moving, still) = splats.shown, splats.degrees
     rms, worst = splats.apart_mm
-    count = f"{shown:,} splats" if shown == every else f"{shown:,} of {every:,} splats, those that are seen most,"
+    count = f"{shown:,} splats" if shown == every else f"{shown:,} of {every:,} splats, larger than they are,"
     said = (
         f"{count}; centres that move are carried by {len(splats.binding.nodes)} of them, within {rms:.2g} mm (RMS) "
         f"and {worst:.2g} mm at most of where the model has them."

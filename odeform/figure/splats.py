@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.figure.binding import Binding, bound
-from odeform.figure.packed_splats import PackedSplats, packed, splat_bytes, weight_in_view
+from odeform.figure.packed_splats import PackedSplats, packed, splat_bytes
 from odeform.geometry.harmonics import rotated_harmonics
 from odeform.geometry.rigid import rotation_z
 from odeform.motion.evaluated_basis import EvaluatedBasis
@@ -61,17 +61,17 @@ class FigureSplats:
 
     def within(self, most_bytes: int) -> "FigureSplats":
         """Keeps what fits into so many bytes: first harmonics of a high degree go, of what stands still before what
-        moves, then the splats that are seen least."""
+        moves, then splats, evenly in their order; those that stay are larger for it and cover as much."""
         degrees = next((degrees for degrees in STRIPPED if self._bytes(degrees) <= most_bytes), STRIPPED[-1])
         fraction = min(most_bytes / self._bytes(degrees), 1.0)
-        kept, kept_still = _largest(self.body, fraction), _largest(self.scene, fraction)
+        kept, kept_still = _even(self.body, fraction), _even(self.scene, fraction)
         return replace(
             self,
             kept=kept,
             kept_still=kept_still,
             binding=self.binding.of(kept),
-            moving=packed(self.body, degrees[0], kept),
-            still=None if self.scene is None else packed(self.scene, degrees[1], kept_still),
+            moving=packed(_larger(self.body, kept), degrees[0], kept),
+            still=None if self.scene is None else packed(_larger(self.scene, kept_still), degrees[1], kept_still),
         )
 
     def _bytes(self, degrees: tuple[int, int]) -> int:
@@ -129,12 +129,15 @@ def _of_degree(splats: GaussianSplats) -> Float[np.ndarray, "points harmonics 3"
     return splats.harmonics[:, : (HIGHEST + 1) ** 2]
 
 
-def _largest(splats: GaussianSplats | None, fraction: float) -> Ints:
-    """The fraction of splats that is seen most, in their order."""
-    if splats is None or fraction >= 1.0:
-        return np.arange(_count(splats))
-    count = max(int(fraction * len(splats.points)), 1)
-    return np.sort(np.argsort(-weight_in_view(splats), kind="stable")[:count])
+def _even(splats: GaussianSplats | None, fraction: float) -> Ints:
+    """So many of the splats, evenly in their order."""
+    total = _count(splats)
+    return np.linspace(0, total - 1, max(int(fraction * total), 1)).astype(int) if total else np.arange(0)
+
+
+def _larger(splats: GaussianSplats, kept: Ints) -> GaussianSplats:
+    """All of them as large as those that are kept have to be to cover the same area."""
+    return replace(splats, covariances=splats.covariances * (len(splats.points) / len(kept)))
 
 
 def _apart(
