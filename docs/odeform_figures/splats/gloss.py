@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from odeform.geometry.harmonics import harmonic_basis
-from odeform.types import GaussianSplats, Vector, Vectors
+from odeform.types import GaussianSplats, Points, Vector, Vectors
 
 __all__ = ["glossy"]
 
@@ -26,7 +26,7 @@ def glossy(splats: GaussianSplats, normals: Vectors, toward_light: Vector, stren
     return replace(splats, harmonics=harmonics.astype(np.float32))
 
 
-def _lobe(directions: Vectors, normals: Vectors, toward_light: Vector) -> np.ndarray:
+def _lobe(directions: Vectors, normals: Points, toward_light: Vector) -> np.ndarray:
     """(N, D) brightness of a surface that is looked at along each of the directions."""
     facing = normals @ directions.T
     mirrored = (directions @ toward_light) - 2.0 * facing * (normals @ toward_light)[:, None]

@@ -305,7 +305,7 @@ def test_the_still_part_of_a_scene_is_logged_once(kick: Predictor, path: Path, r
     fit = shape_from("volleyball", kick.rest)
     record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
     rows = _rows(path)
-    (points,) = rows["/world/still/points:Points3D:positions"]
+    (points,) = rows["/world/still/splats:GaussianSplats3D:centers"]
     assert fit.static is not None
     assert len(points) == len(fit.static.points)
     (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
