@@ -47,7 +47,8 @@ def figure_sources(request: ViewRequest, names: tuple[str, ...]) -> list[tuple[s
         sweeps = tuple(_sweep(predictor, parameter, known) for parameter in swept)
         fixed = {name: value for name, value in known.items() if name not in {sweep.name for sweep in sweeps}}
         geometry = column.geometry if column.loaded else None
-        source = Source(predictor, sweeps, fixed, geometry, settings_of(predictor, request.quality))
+        still = None if column.fit is None else column.fit.static
+        source = Source(predictor, sweeps, fixed, geometry, settings_of(predictor, request.quality), still)
         out.append((column.label, source))
     return out
 

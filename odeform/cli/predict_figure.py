@@ -40,7 +40,7 @@ def write_figure(
     sweeps = parse_sweeps(predictor.schema, ranges, tuple(fixed))
     predictor, fit, fixed = shape_of(args, predictor, fixed)
     fixed = {name: value for name, value in fixed.items() if name not in ranges}
-    source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality)
+    source = Source(predictor, sweeps, fixed, fit and fit.geometry, args.quality, fit and fit.static)
     column = interpolated(family_title(predictor.model), source, times, column_bytes(1), _report)
     if truth is not None and truth_error(column, truth) is None:
         raise InputError(f"--truth {args.truth}: expected a sequence of this scene with parameters under the sliders")

@@ -1,8 +1,9 @@
 """A figure that moves: one page for papers, with sliders of parameters and time, which opens without a server.
 
 Motions on a grid of parameters are computed when it is made (`sampling`, `grid`), compressed (`table`) and written with
-the body (`body`) into a page (`page`) that interpolates and draws them by itself (`figure.html`, `figure.js`). How far
-what it shows is from the model is measured on the arrays that the page holds.
+the body (`body`) into a page (`page`) that interpolates and draws them by itself (`figure.html`, `script`). Gaussian
+splats (`splats`) are packed (`packed_splats`) and follow nodes among them (`binding`). How far what it shows is from
+the model is measured on the arrays that the page holds.
 """
 
 from odeform.figure.error import FigureError

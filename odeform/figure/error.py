@@ -47,24 +47,30 @@ class Probes:
     """Seconds, in order."""
     points: list[Float[np.ndarray, "moments points 3"]]
     """Of each place, in metres."""
+    body: FigureBody
+    """With these points."""
 
-    def error(self, body: FigureBody, motions: Iterable[Floats], times: Times) -> FigureError:
+    def error(self, motions: Iterable[Floats], times: Times) -> FigureError:
         """The error of coordinates y (T, D) at `times` (T,) s, of each place."""
         squares = []
         for y, points in zip(motions, self.points, strict=True):
-            shown = body.points(between(y, times, self.moments))
+            shown = self.body.points(between(y, times, self.moments))
             squares.append(np.square(shown - points, dtype=float).sum(axis=-1).mean())
         each = 1e3 * np.sqrt(squares)
         half, most = np.quantile(each, [0.5, 0.9])
         return FigureError(1e3 * math.sqrt(np.mean(squares)), float(half), float(most), float(each.max()))
 
 
-def draw_probes(source: Source, times: Times) -> Probes:
-    """Draws places on the sliders and moments within `times` (T,) s, always the same, and solves the motions."""
+def draw_probes(source: Source, body: FigureBody, times: Times) -> Probes:
+    """Draws places on the sliders and moments within `times` (T,) s, always the same, and solves the motions.
+
+    `body` is that of the source, with the splats that are shown: errors are those of some of them.
+    """
     rng = np.random.default_rng(0)
     places = rng.random((DRAWS if source.sweeps else 1, len(source.sweeps)))
     moments = np.sort(rng.uniform(times[0], times[-1], MOMENTS))
-    return Probes(places, moments, source.vertices(places, moments))
+    measured, kept = body.sampled()
+    return Probes(places, moments, source.vertices(places, moments, kept), measured)
 
 
 def between(

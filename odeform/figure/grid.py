@@ -33,6 +33,7 @@ IN_TIME = 0.5  # of the tolerance, by interpolation between frames
 SUBDIVIDED = (1, 2, 4)  # parts of the time between two frames
 GAIN = 0.95  # three refinements that leave more of the error than this have come to its end: the solver's own error
 MARGIN = 0.95  # of the tolerance, by the grid; the rest is for 16 bits and patterns
+SPLATS = 0.65  # of a column that splats may take
 EXPANDED = 4.0 / 3.0  # bytes of base64 of each byte
 
 Report = Callable[[int, int, float], None]
@@ -83,7 +84,8 @@ def interpolated(
     """
     if len(times) < 4 or not np.allclose(np.diff(times), times[1] - times[0]):
         raise InputError(f"times: expected at least four, evenly spaced, got {len(times)}")
-    body, probes = source.body, draw_probes(source, times)
+    body = source.body.within(int(SPLATS * most_bytes / EXPANDED))
+    probes = draw_probes(source, body, times)
     band = _band(source, probes.places, times)
     size = float(np.ptp(body.rest, axis=0).max())
     own = [1e3 * size * DISTANCE * part / BAND_FRACTION for part in UNKNOWN] if band is None else band
@@ -99,7 +101,7 @@ def interpolated(
     grid = _refined(source, fine, probes, tolerance, most, report)
     ranks = int(min(MOST_PATTERNS, (room - 4 * row) / (2 * (row + len(grid.motions)) + 4)))
     table = compressed(grid.motions, grid.counts, body.scale, 1e-3 * LEFT_OUT * tolerance[0] / DISTANCE, ranks)
-    error = probes.error(body, map(table.at, probes.places), fine)
+    error = probes.error(map(table.at, probes.places), fine)
     return FigureColumn(label, source, body, table, fine, error, band, tolerance)
 
 
@@ -111,7 +113,7 @@ def _fine_times(
     fine = times
     for parts in SUBDIVIDED:
         fine = times[0] + np.arange(parts * (len(times) - 1) + 1) * (times[1] - times[0]) / parts
-        error = probes.error(source.body, source.coordinates(probes.places, fine), fine)
+        error = probes.error(source.coordinates(probes.places, fine), fine)
         if error.relative(tolerance) <= IN_TIME or 2 * len(fine) > longest:
             break
     return fine
@@ -123,7 +125,7 @@ def _refined(
     """The grid of at most `most` motions with an error within `tolerance`, or else with the smallest error."""
     grid, known = _Grid(source, times), []
     while True:
-        error = probes.error(source.body, map(grid.at, probes.places), times)
+        error = probes.error(map(grid.at, probes.places), times)
         known.append((error.relative(tolerance), grid.counts))
         report(len(grid.motions), most, error.rms)
         helped = len(known) < 4 or min(known[-3:])[0] < GAIN * min(known[:-3])[0]

@@ -13,6 +13,7 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.figure.grid import FigureColumn
+from odeform.figure.splats import FigureSplats
 from odeform.figure.sweep import Sweep
 from odeform.figure.truth import truth_error
 from odeform.loads.registry import known_as
@@ -26,7 +27,21 @@ __all__ = ["MOST_BYTES", "MOST_COLUMNS", "column_bytes", "figure_page"]
 
 MOST_BYTES = 5_000_000
 MOST_COLUMNS = 4
-BESIDE = 60_000  # bytes of the page without its arrays
+SCRIPTS = (
+    "data.js",
+    "column.js",
+    "shaders.js",
+    "splat_shaders.js",
+    "webgl.js",
+    "splats.js",
+    "splat_drawing.js",
+    "drawing.js",
+    "camera.js",
+    "controls.js",
+    "pointer.js",
+    "page.js",
+)
+BESIDE = 80_000  # bytes of the page without its arrays
 
 
 def column_bytes(columns: int) -> int:
@@ -49,7 +64,7 @@ def figure_page(columns: Sequence[FigureColumn], truth: RecordedMotion | None = 
     subject = subject_of(schema.scene, str(body))
     title = f"{subject} · {columns[0].label}" if len(columns) == 1 else subject
     page = (files("odeform.figure") / "figure.html").read_text(encoding="utf-8")
-    script = (files("odeform.figure") / "figure.js").read_text(encoding="utf-8")
+    script = "".join((files("odeform.figure") / "script" / name).read_text(encoding="utf-8") for name in SCRIPTS)
     data = json.dumps(_data(columns, sweeps, truth), ensure_ascii=True).replace("<", "\\u003c")
     subtitle, notes = (
         escape(_subtitle(columns, sweeps)),
@@ -147,6 +162,8 @@ def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
         for name, value in first.predictor.schema.expanded(first.fixed).items()
         if name in units and name not in swept
     ]
+    if any(column.body.splats and column.body.splats.still for column in columns):
+        return ", ".join(given)  # they have a floor of their own
     cell = _cell(columns)
     grid = f"grid {100 * cell:g} cm" if cell < 1.0 else f"grid {cell:g} m"
     return ", ".join([*given, grid])
@@ -154,6 +171,7 @@ def _subtitle(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> str:
 
 def _notes(columns: Sequence[FigureColumn], sweeps: Sequence[Sweep]) -> list[str]:
     notes = [_column_note(column, len(columns) > 1) for column in columns]
+    notes += dict.fromkeys(_splat_note(column.body.splats) for column in columns if column.body.splats)
     outside = [s.name for s in sweeps if not (s.parameter.inside(s.low) and s.parameter.inside(s.high))]
     if outside:
         known = known_as(columns[0].source.predictor.schema.scene)
@@ -184,3 +202,20 @@ def _column_note(column: FigureColumn, several: bool) -> str:
         )
     aim = f" This is more than the {tolerance[0]:.2g} and {tolerance[1]:.2g} mm aimed at, as fine as it gets."
     return f"{shown}{'' if column.fine else aim} {band}"
+
+
+def _splat_note(splats: FigureSplats) -> str:
+    """How many splats are shown, with how much of their colours, and how far from the model's."""
+    (shown, every), (moving, still) = splats.shown, splats.degrees
+    rms, worst = splats.apart_mm
+    count = f"{shown:,} splats" if shown == every else f"{shown:,} of {every:,} splats, larger than they are,"
+    said = (
+        f"{count}; centres that move are carried by {len(splats.binding.nodes)} of them, within {rms:.2g} mm (RMS) "
+        f"and {worst:.2g} mm at most of where the model has them."
+    )
+    given = splats.given_degree
+    if given == 0:
+        return f"{said} Their colours do not depend on the view."
+    other = f", of what stands still {still}" if splats.still is not None and still != moving else ""
+    kept = f"harmonics up to degree {moving}{other} (of {given} in the file)"
+    return f"{said} Their colours depend on the view, by {kept}."

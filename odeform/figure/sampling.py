@@ -13,11 +13,12 @@ from odeform.cancellation import check_cancelled
 from odeform.errors import InputError
 from odeform.figure.body import FigureBody, figure_body
 from odeform.figure.sweep import Sweep
+from odeform.geometry.parts import subset
 from odeform.models.base import Predictor
 from odeform.motion.reduced_batch import ReducedBatch
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Floats, Frames, Geometry, Times
+from odeform.types import Floats, Frames, GaussianSplats, Geometry, Ints, Mesh, Times
 
 __all__ = ["Source"]
 
@@ -35,6 +36,8 @@ class Source:
     geometry: Geometry | None = None
     """The shape that moves; None for the trained body, where it rests under each set of parameters."""
     quality: str | SolverSettings = "balanced"
+    still: Geometry | None = None
+    """What of a scene of splats stands still, in the scene."""
 
     def values(self, places: Float[np.ndarray, "sets sweeps"]) -> dict[str, Floats]:
         """Maps places on the sliders (S, A), from 0 to 1, to values (S,) by name."""
@@ -54,7 +57,7 @@ class Source:
     @cached_property
     def middle(self) -> ReducedMotion:
         """The motion in the middle of the sliders; `InputError` for one without reduced coordinates."""
-        motion = self._solved(np.full(len(self.sweeps), 0.5), None)
+        motion = self._solved(np.full(len(self.sweeps), 0.5), None, self.geometry)
         if not isinstance(motion, ReducedMotion):
             raise InputError(
                 f"a figure needs a pose and a basis of deformations; {self.predictor.model} predicts points"
@@ -90,7 +93,8 @@ class Source:
     @cached_property
     def body(self) -> FigureBody:
         """The body at rest in the middle of the sliders; further modes take it to where it rests elsewhere."""
-        return figure_body(self.middle, self._sagging)
+        still = self.still if isinstance(self.still, GaussianSplats) else None
+        return figure_body(self.middle, self._sagging, still)
 
     def coordinates(self, places: Float[np.ndarray, "sets sweeps"], times: Times) -> Float[np.ndarray, "sets times y"]:
         """Computes y (S, T, 6 + K) float32 of `body` at places (S, A) and times (T,) s."""
@@ -106,7 +110,7 @@ class Source:
         """Fills `out` (S, T, 6 + K)."""
         until = float(times[-1])
         if self.sags or not self.sweeps:
-            motions = (self._solved(place, until) for place in places)
+            motions = (self._solved(place, until, self.geometry) for place in places)
         else:
             motions = self.predictor.solve_batch(
                 {**self.fixed, **self.values(places)}, self.quality, until, self.geometry
@@ -117,10 +121,15 @@ class Source:
         for row, motion in zip(out, motions, strict=True):
             self._fill(row, motion, times)
 
-    def vertices(self, places: Float[np.ndarray, "sets sweeps"], times: Times) -> list[Frames]:
-        """Computes S arrays (T, N, 3) of points in metres, as the model has them."""
+    def vertices(
+        self, places: Float[np.ndarray, "sets sweeps"], times: Times, kept: Ints | None = None
+    ) -> list[Frames]:
+        """Computes S arrays (T, N, 3) of points in metres, as the model has them; of those that are `kept` alone."""
+        shape = self.geometry
+        if kept is not None and shape is not None and not isinstance(shape, Mesh):
+            shape = subset(shape, kept)
         with threadpool_limits(1, "blas"):
-            return [self._solved(place, float(times[-1])).vertices(times) for place in places]
+            return [self._solved(place, float(times[-1]), shape).vertices(times) for place in places]
 
     def _fill(self, row: Floats, motion: Any, times: Times) -> None:
         assert isinstance(motion, ReducedMotion)
@@ -129,5 +138,5 @@ class Source:
         apart = motion.evaluated.points - self.middle.evaluated.points
         row[:, 6 + modes :] = np.einsum("eni,ni->e", extra, apart) / len(apart)
 
-    def _solved(self, place: Float[np.ndarray, " sweeps"], until: float | None) -> Any:
-        return self.predictor.solve(self.geometry, self.complete(place), self.quality, until)
+    def _solved(self, place: Float[np.ndarray, " sweeps"], until: float | None, shape: Geometry | None) -> Any:
+        return self.predictor.solve(shape, self.complete(place), self.quality, until)

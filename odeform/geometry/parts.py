@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from odeform.errors import InputError
 from odeform.geometry.region import Mask, Region
-from odeform.types import GaussianSplats, Geometry, Mesh, PointCloud
+from odeform.types import GaussianSplats, Geometry, Ints, Mesh, PointCloud
 
 __all__ = ["concatenated", "most_visible", "split", "subset"]
 
@@ -32,8 +32,8 @@ def split(geometry: Geometry, region: Region) -> tuple[Geometry, Geometry | None
     return subset(geometry, inside), None if inside.all() else subset(geometry, ~inside)
 
 
-def subset(geometry: Unstructured, kept: Mask | slice) -> Unstructured:
-    """The points where `kept` (N,) is true, with their attributes; of a slice, views."""
+def subset(geometry: Unstructured, kept: Mask | Ints | slice) -> Unstructured:
+    """The points where `kept` (N,) is true, or with these indices, with their attributes; of a slice, views."""
     if not isinstance(geometry, GaussianSplats):
         colors = None if geometry.colors is None else geometry.colors[kept]
         return replace(geometry, points=geometry.points[kept], colors=colors)

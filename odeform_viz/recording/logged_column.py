@@ -10,7 +10,7 @@ from odeform.loads.arrow import Arrow
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import GaussianSplats, Mesh, Points
+from odeform.types import Floats, GaussianSplats, Mesh, Points
 from odeform_viz.colors import Color, color_of, paler
 from odeform_viz.columns import Column
 from odeform_viz.obstacles import obstacles_of
@@ -18,7 +18,8 @@ from odeform_viz.recording.entities import COEFFICIENTS, MODES, POINTS, PROVENAN
 from odeform_viz.recording.modes import ModeEncoder
 from odeform_viz.recording.provenance import provenance_of
 from odeform_viz.recording.shown_points import ShownBudget
-from odeform_viz.recording.surroundings import log_arrows, log_obstacles, spheres
+from odeform_viz.recording.splats import ELLIPSOID_BYTES, ellipsoids, paint
+from odeform_viz.recording.surroundings import log_arrows, log_obstacles
 from odeform_viz.view import ColumnFrame
 
 __all__ = ["PLOTS", "LoggedColumn"]
@@ -77,8 +78,7 @@ class LoggedColumn:
             mesh = rr.Mesh3D.from_fields(triangle_indices=column.geometry.faces, vertex_colors=colors)
             self._stream.log(body, mesh, static=True)
         elif isinstance(column.geometry, GaussianSplats):
-            colors, radii = spheres(column.geometry)
-            self._stream.log(body, rr.Points3D.from_fields(colors=colors, radii=radii), static=True)
+            self._stream.log(body, paint(column.geometry), static=True)
         else:
             self._stream.log(body, rr.Points3D.from_fields(colors=_checkerboard(points, color)), static=True)
         for unit, quantities in PLOTS.items():
@@ -95,7 +95,7 @@ class LoggedColumn:
         if self._points is None or not np.abs(points - self._points).max() <= TOLERANCE:  # true also for NaN
             self._points, self.frame = points, frame
             self._log_points(points)
-        self._show_points(points)
+        self._show_points(points, shown.covariances)
         transform = rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3])
         self._stream.log(f"{WORLD}/{self.name}/body", transform)
         for quantity, value in self._numbers(shown, time).items():
@@ -116,19 +116,27 @@ class LoggedColumn:
         # a value is always there: a row without any would not be told from none
         self._stream.log(f"{COEFFICIENTS}/{self.name}", rr.Scalars(np.append(coefficients, 0.0)))
 
-    def _show_points(self, points: Points) -> None:
+    def _show_points(self, points: Points, covariances: Floats | None) -> None:
         """Log what Rerun draws, if it is visibly different from what was drawn last."""
-        mesh = self.column.geometry if isinstance(self.column.geometry, Mesh) else None
+        geometry = self.column.geometry
+        mesh, first = geometry if isinstance(geometry, Mesh) else None, self._shown is None
         size = points.nbytes * (2 if mesh else 1)
-        if self._shown is None:
+        change = np.inf if self._shown is None else float(np.abs(points - self._shown).max())
+        if first:
             self._budget.force(size)
-        elif not self._budget.allows(float(np.abs(points - self._shown).max()), size):
+        elif not self._budget.allows(change, size):
             return
         self._shown = points
         body = f"{WORLD}/{self.name}/body"
         if mesh:
             normals = vertex_normals(points, mesh.faces)
             self._stream.log(body, rr.Mesh3D.from_fields(vertex_positions=points, vertex_normals=normals))
+        elif isinstance(geometry, GaussianSplats):
+            self._stream.log(body, rr.GaussianSplats3D.from_fields(centers=points))
+            # the pose turns them; that they deform as well is seen less than that the centres do
+            if self._budget.allows(change, ELLIPSOID_BYTES * len(points)) or first:
+                moved = geometry.covariances if covariances is None else covariances
+                self._stream.log(body, ellipsoids(moved))
         else:
             self._stream.log(body, rr.Points3D.from_fields(positions=points))
 

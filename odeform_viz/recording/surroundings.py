@@ -7,11 +7,12 @@ import rerun as rr
 
 from odeform.loads.arrow import Arrow
 from odeform.loads.obstacle import Obstacle
-from odeform.types import GaussianSplats, Geometry, Mesh, Perpoint
+from odeform.types import GaussianSplats, Geometry, Mesh
 from odeform_viz.colors import ACTING, BACKGROUND
 from odeform_viz.recording.entities import FLOOR, STILL
+from odeform_viz.recording.splats import splats_at_rest
 
-__all__ = ["log_arrows", "log_obstacles", "log_surroundings", "spheres"]
+__all__ = ["log_arrows", "log_obstacles", "log_surroundings"]
 
 HALF, CELL = 3.0, 0.25  # m; of the floor and its grid
 PLANE, LINES = (236, 238, 242), (190, 194, 202)
@@ -26,9 +27,10 @@ def log_surroundings(stream: rr.RecordingStream, still: Geometry | None) -> None
     stream.log(FLOOR, rr.Clear(recursive=True))
     if isinstance(still, Mesh):
         stream.log(f"{STILL}/mesh", rr.Mesh3D(vertex_positions=still.points, triangle_indices=still.faces))
+    elif isinstance(still, GaussianSplats):
+        stream.log(f"{STILL}/splats", splats_at_rest(still))
     else:
-        colors, radii = spheres(still) if isinstance(still, GaussianSplats) else (None, None)
-        stream.log(f"{STILL}/points", rr.Points3D(still.points, colors=colors, radii=radii))
+        stream.log(f"{STILL}/points", rr.Points3D(still.points))
 
 
 def _log_floor(stream: rr.RecordingStream) -> None:
@@ -71,8 +73,3 @@ def log_obstacles(stream: rr.RecordingStream, entity: str, obstacles: Sequence[O
         stream.log(
             f"{entity}/{index}", rr.Mesh3D(vertex_positions=points, triangle_indices=faces, vertex_colors=colors)
         )
-
-
-def spheres(splats: GaussianSplats) -> tuple[np.ndarray, Perpoint]:
-    """Returns colors (N, 3), and radii (N,) in m of spheres of the same size: Rerun draws no Gaussians."""
-    return splats.colors, np.sqrt(np.trace(splats.covariances, axis1=1, axis2=2) / 3.0)

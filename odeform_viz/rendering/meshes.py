@@ -2,8 +2,8 @@
 
 import numpy as np
 import viser
-from jaxtyping import UInt8
 
+from odeform.geometry.split_colors import split_colors
 from odeform.types import Faces, Floats, Mesh, Points
 from odeform_viz.colors import CLAY, Color, darker
 from odeform_viz.rendering.checkerboard import Part, checkerboard_parts
@@ -21,7 +21,7 @@ class MeshView:
 
     def __init__(self, server: viser.ViserServer, root: str, mesh: Mesh) -> None:
         self._rest = np.asarray(mesh.points, dtype=np.float32)
-        given = None if mesh.colors is None else _VertexColors(mesh, mesh.colors)
+        given = split_colors(mesh)
         radius = _radius(mesh)
         own = given and _Colored(server, f"{root}/own", len(given.vertices), given.faces, radius, unlit=False)
         self._given = (given, own) if given and own else None
@@ -51,20 +51,6 @@ class MeshView:
             view.show(present[given.vertices], given.colors, look)
         elif self._checkerboard is not None:
             self._checkerboard.show(points, self._rest, look)
-
-
-class _VertexColors:
-    """The colors of a file, for each vertex: one whose faces differ in color is split.
-
-    `vertices` (M,) index those of the mesh; `faces` (F, 3) and `colors` (M, 3) refer to the M.
-    """
-
-    def __init__(self, mesh: Mesh, colors: UInt8[np.ndarray, "faces 3 3"]) -> None:
-        red, green, blue = colors.reshape(-1, 3).astype(np.int64).T
-        keys = (mesh.faces.reshape(-1).astype(np.int64) << 24) | (red << 16) | (green << 8) | blue
-        kept, first, faces = np.unique(keys, return_index=True, return_inverse=True)
-        self.vertices, self.faces = kept >> 24, faces.reshape(-1, 3)
-        self.colors = colors.reshape(-1, 3)[first]
 
 
 def _radius(mesh: Mesh) -> float:

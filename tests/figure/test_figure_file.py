@@ -199,3 +199,12 @@ def test_under_a_load_ranges_are_those_that_were_measured() -> None:
     page = figure_page([column]).decode()
     assert "partly outside of what was measured" in page
     assert "of what was trained" not in page
+
+
+def test_colours_of_a_mesh_are_kept(kick: Predictor) -> None:
+    colors = np.random.default_rng(3).integers(0, 256, (len(kick.rest.faces), 1, 3), dtype=np.uint8)
+    painted = replace(kick.rest, colors=np.repeat(colors, 3, axis=1))
+    column = made(Source(kick, (sweep(kick, "force", 100.0, 130.0),), {}, painted), kick.schema.window.times[:8])
+    _, (arrays,) = embedded(figure_page([column]))
+    np.testing.assert_array_equal(arrays["corners"][arrays["faces"]], kick.rest.faces)
+    np.testing.assert_array_equal(arrays["colors"][arrays["faces"]], painted.colors)

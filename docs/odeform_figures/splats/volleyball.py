@@ -1,26 +1,31 @@
 """A volleyball in a small room, as Gaussian splats: `python -m odeform_figures.splats.volleyball --out volleyball.spz`.
 
-The ball has the size of the bundled models' body.
+The ball has the size of the bundled models' body. With `--gloss` it has a highlight that moves with the view, by
+harmonics of degree 3, as a `.ply`.
 """
 
 import argparse
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from odeform.formats.bundled import region_beside
 from odeform.formats.splat_spz import spz_bytes
+from odeform.formats.writing import write_shape
+from odeform.geometry.parts import concatenated, subset
 from odeform.geometry.region import Sphere, region_to_json
 from odeform.geometry.rigid import rotation_from_vector
 from odeform.geometry.similarity import UPRIGHT, Similarity
 from odeform.io import atomic_write
-from odeform.types import Floats, GaussianSplats, Ints, Perpoint, Points, Vectors
-from odeform_figures.splats.room import room
+from odeform.types import Floats, GaussianSplats, Harmonics, Ints, Perpoint, Points, Vectors
+from odeform_figures.splats.gloss import glossy
+from odeform_figures.splats.room import SUN, room
 from odeform_figures.splats.surfels import COVER, Surfels, grid, joined_surfels, splats_of
 
-__all__ = ["BALL", "REGION", "main", "volleyball_in_room"]
+__all__ = ["BALL", "REGION", "main", "polished", "volleyball_in_room"]
 
 RADIUS = 0.1  # m
 BESIDE = (0.65e-3, 0.65e-3, 0.65e-3, 1.2e-3)  # m: rows from a seam on, the first two in its groove
@@ -39,6 +44,24 @@ def volleyball_in_room() -> GaussianSplats:
     """Makes the scene in metres, z up, with the ball on the floor at the origin and its splats first.
     Deterministic."""
     return splats_of(joined_surfels([_ball(), room(RADIUS, np.random.default_rng(7))]))
+
+
+def polished(splats: GaussianSplats) -> GaussianSplats:
+    """Gives the ball of `volleyball_in_room` a highlight of the sun and one of the sky."""
+    ball, around = subset(splats, slice(0, BALL)), subset(splats, slice(BALL, None))
+    normals = (ball.points - np.array([0.0, 0.0, RADIUS])) / RADIUS
+    lit = ball
+    for toward, strength in ((-SUN / np.linalg.norm(SUN), 0.55), (np.array([0.0, 0.0, 1.0]), 0.2)):
+        shone = glossy(replace(ball, harmonics=np.zeros_like(ball.harmonics)), normals, toward, strength)
+        lit = replace(lit, harmonics=shone.harmonics + _padded(lit.harmonics, shone.harmonics.shape[1]))
+    still = replace(around, harmonics=_padded(around.harmonics, lit.harmonics.shape[1]))
+    out = concatenated(lit, still)
+    assert isinstance(out, GaussianSplats)
+    return out
+
+
+def _padded(harmonics: Harmonics, count: int) -> Harmonics:
+    return np.pad(harmonics, ((0, 0), (0, count - harmonics.shape[1]), (0, 0)))
 
 
 def _ball() -> Surfels:
@@ -103,8 +126,13 @@ def main() -> None:
     """Write the splats and their region from the command line."""
     parser = argparse.ArgumentParser(prog="python -m odeform_figures.splats.volleyball", description=__doc__)
     parser.add_argument("--out", required=True, metavar="FILE.spz")
-    path = Path(parser.parse_args().out)
-    atomic_write(path, spz_bytes(FILE.shape(volleyball_in_room()), fraction=14))
+    parser.add_argument("--gloss", action="store_true", help="with a highlight that moves with the view, as FILE.ply")
+    args = parser.parse_args()
+    path = Path(args.out)
+    if args.gloss:
+        write_shape(FILE.shape(polished(volleyball_in_room())), path)
+    else:
+        atomic_write(path, spz_bytes(FILE.shape(volleyball_in_room()), fraction=14))
     atomic_write(region_beside(path), json.dumps(region_to_json(REGION.transformed(FILE)), indent=1).encode())
     print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
 

@@ -12,13 +12,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rerun as rr
+from scipy.spatial.transform import Rotation
 
 from odeform import InputError
 from odeform.geometry.shape import fit_to
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Mesh, PointCloud
+from odeform.types import GaussianSplats, Mesh, PointCloud
 from odeform_viz.columns import Column, Columns, truth_column
 from odeform_viz.fitting import shape_from
 from odeform_viz.recording import writer
@@ -304,7 +305,7 @@ def test_the_still_part_of_a_scene_is_logged_once(kick: Predictor, path: Path, r
     fit = shape_from("volleyball", kick.rest)
     record(path, [Column(name, kick, fit.geometry, fit=fit, origin="kick") for name in ("a", "b")])
     rows = _rows(path)
-    (points,) = rows["/world/still/points:Points3D:positions"]
+    (points,) = rows["/world/still/splats:GaussianSplats3D:centers"]
     assert fit.static is not None
     assert len(points) == len(fit.static.points)
     (shape,) = {str(facts["shape"]) for facts in read_recording(path).columns.values()}
@@ -331,3 +332,30 @@ def test_a_mesh_keeps_its_own_colors(kick: Predictor, path: Path, record: Record
     record(path, [Column("odeform", kick, fit.geometry, fit=fit)])
     ((rgba, *_),) = _rows(path)["/world/column_0/form_0/body:Mesh3D:vertex_colors"]
     assert rgba == 0x0A141EFF
+
+
+def test_splats_keep_their_shapes_and_colours(kick: Predictor, path: Path, record: Record) -> None:
+    rng, points = np.random.default_rng(2), kick.rest.points[::9]
+    count = len(points)
+    sizes, turns = np.exp(rng.uniform(-7.0, -4.0, (count, 3))), Rotation.random(count, random_state=3)
+    half = turns.as_matrix() * sizes[:, None]
+    splats = GaussianSplats(
+        points, half @ half.swapaxes(1, 2), 0.2 * rng.standard_normal((count, 9, 3)), rng.uniform(0.1, 1.0, count)
+    )
+    fit = fit_to(splats, kick.rest)
+    body = fit.geometry
+    assert isinstance(body, GaussianSplats)
+    (_, frame, *_) = record(path, [Column("odeform", kick, body, origin="kick", fit=fit)])
+    rows = _rows(path)
+    name = "/world/column_0/form_0/body:GaussianSplats3D"
+    assert not any(key.startswith("/world/column_0/form_0/body:Points3D") for key in rows)
+    np.testing.assert_allclose(rows[f"{name}:centers"][0], frame.columns[0].motion.deformed(0.0), atol=1e-6)
+    quaternions, scales = np.array(rows[f"{name}:quaternions"][0]), np.array(rows[f"{name}:scales"][0])
+    half = Rotation.from_quat(quaternions).as_matrix() * scales[:, None]
+    np.testing.assert_allclose(half @ half.swapaxes(1, 2), body.covariances, rtol=1e-4, atol=1e-9)
+    (further,) = rows[f"{name}:sh_coefficients"]
+    np.testing.assert_allclose(np.array(further)[:, :8], body.harmonics[:, 1:], atol=2e-3)
+    assert not np.array(further)[:, 8:].any()
+    (colors,) = rows[f"{name}:colors"]
+    rgba = np.array(colors, dtype=np.uint32)[:, None] >> np.array([24, 16, 8, 0]) & 255
+    np.testing.assert_allclose(rgba, 255.0 * np.column_stack([body.colors, body.opacities]), atol=0.51)
