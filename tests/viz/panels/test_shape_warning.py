@@ -59,7 +59,7 @@ def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predicto
     assert "90 %" not in said
     assert "shape not trained" in summarize(frame)
     assert badge_of(frame).level == "unknown"
-    assert "error not known" in badge_of(frame).expected
+    assert "no error estimate" in badge_of(frame).expected
     assert "shape not trained" in title_of(column, 1e3)
 
 
