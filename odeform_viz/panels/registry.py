@@ -41,6 +41,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Record", "odeform_viz.panels.picture:PicturePanel"),
     Entry("bottom/Over time", "odeform_viz.panels.plots:PlotPanel"),
     Entry("side", "odeform_viz.panels.theme:ThemePanel"),
+    Entry("side", "odeform_viz.panels.axes:AxesPanel"),
     Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # last: it lists the hot keys of all others
 )
 
