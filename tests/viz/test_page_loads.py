@@ -47,8 +47,8 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
         ("slope", "angle (°)"),
-        ("hold", "held up (°)"),
-        ("meet", "other turn (°)"),
+        ("hold", "patch elevation (°)"),
+        ("meet", "other's turn (°)"),
         ("push", "force (N)"),
     ):
         app.show_load(load)
@@ -105,6 +105,13 @@ def test_models_of_one_scene_are_left_out(column: Column) -> None:
     assert [c.label for c in columns_under(columns, "drop")] == ["modal"]
     with pytest.raises(InputError, match="no model of the page"):
         columns_under(columns[1:], "drop")
+
+
+def test_a_page_that_begins_under_a_load_gets_to_the_push() -> None:
+    thrown = odeform.load("contact-force:throw")
+    (column,) = columns_under([Column("modal", thrown, thrown.rest, origin="contact-force:throw")], "push")
+    assert column.source.schema.scene == "contact-force"
+    assert column.origin == "contact-force"
 
 
 def test_a_recording_is_of_one_scene(serve: Any, column: Column, tmp_path: Path) -> None:
