@@ -22,7 +22,7 @@ USUAL = 0.2  # of real time, or slower:
 LEAST = 3.0  # s that the trained window takes
 AFTER = {
     "trained": "after the trained window, the motion is extrapolated",
-    "measured": "how far the motion is off was measured up to there",
+    "measured": "the error of such motions was measured up to there",
     "shown": "the motion is computed up to there, and held afterwards",
 }
 QUIET = 0.3  # s after a drag; times that the clock had set have arrived by then

@@ -37,10 +37,12 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     if column.predictor is None:
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
-        lines.append(f"computed: {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms by {stats.solver}")
+        lines.append(
+            f"computed: {stats.evaluations} evaluations of the model in {stats.wall_ms:.3g} ms by {stats.solver}"
+        )
         lines.append(_solver_error(stats, shown.motion.schema.window) if settled else "solver error: …")
     else:
-        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.1f} ms")
+        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.3g} ms")
     if shown.error is not None:
         e = shown.error
         values = f"RMS {e.rms_mm:.2f}, mean {e.mean_mm:.2f}, largest {e.worst_mm:.2f} mm"
@@ -80,11 +82,11 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
 
 
 def _calibrated(shown: ColumnFrame, predictor: Predictor) -> list[str]:
-    """Says what nine in ten are of."""
+    """Says what the expected error was measured on."""
     motions = 0 if shown.untrained else predictor.band_motions(shown.motion.parameters)
     if not motions:
-        return ["expected of: single moments"]
-    return [f"expected of: whole motions, 9 of 10 stay below it throughout; by {motions} that chose nothing"]
+        return ["measured on: moments of motions, one by one"]
+    return [f"measured on: {motions} motions that nothing was fitted to; 9 of 10 stay below it from begin to end"]
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
