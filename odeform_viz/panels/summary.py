@@ -118,8 +118,13 @@ def _expected(models: Sequence[ColumnFrame]) -> str:
     # outside of what was measured the band is carried on
     rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
     of = "" if len(known) == 1 else f", the largest of {len(known)}"
-    text = f"expected error now {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
+    text = f"expected error now {'roughly ' if rough else ''}below {_rounded(max(known), 2)} mm in 9 of 10 cases{of}"
     return "; ".join([text, *(f"{label}: {UNKNOWN_ERROR}" for label in unknown)])
+
+
+def _rounded(value: float, digits: int) -> str:
+    """The value with so many digits, and without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _errors_now(frame: Frame) -> list[str]:
@@ -128,7 +133,9 @@ def _errors_now(frame: Frame) -> list[str]:
     if not known:
         return []
     named = len(known) > 1
-    values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
+    values = ", ".join(
+        f"{escape(c.column.label)} {_rounded(rms, 3)} mm" if named else f"{_rounded(rms, 3)} mm" for c, rms in known
+    )
     lines = [f"error now: {values} (RMS distance)"]
     above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
     if above:
