@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from html import escape
+from time import monotonic
 
 import numpy as np
 
@@ -14,10 +15,11 @@ from odeform.motion.truth_errors import DISTANCE
 from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import ColumnFrame, Description, played_until, shown_until
+from odeform_viz.view import ColumnFrame, Description, played_until, same_motions, shown_until
 
 __all__ = ["StatusPanel", "describe_column", "status_html"]
 
+PAUSE = 1.0  # s between tables while it plays: they are read slowly, and larger than all else that is sent
 STYLE = """<style>
 .odeform-status{width:100%;border-spacing:0;font:12px/1.4 sans-serif;color:var(--mantine-color-text);padding:0 0.6em}
 .odeform-status th{text-align:left;padding:0.5em 0 0.2em}
@@ -111,7 +113,7 @@ def _rest(motion: Motion, settled: bool) -> list[str]:
 
 def status_html(texts: Sequence[str]) -> str:
     """A table: a heading for each text of `describe_column`, and below it what is said, by what it is of."""
-    return f'{STYLE}<table class="odeform-status">{"".join(map(_rows, texts))}</table>'
+    return f'<table class="odeform-status">{"".join(map(_rows, texts))}</table>'
 
 
 def _rows(text: str) -> str:
@@ -124,13 +126,21 @@ def _rows(text: str) -> str:
 
 
 class StatusPanel(Panel):
-    """A table with a part for each column."""
+    """A table with a part for each column; while it plays, it follows once a second."""
 
     def __init__(self, page: Page) -> None:
         with page.server.gui.add_folder("Status"):
+            page.server.gui.add_html(STYLE)  # once: the table changes several times a second
             self._text = page.server.gui.add_html("")
+        self._clock = page.clock
+        self._shown: Description | None = None
+        self._due = 0.0
 
     def describe(self, description: Description) -> None:
-        frame = description.frame
+        frame, shown = description.frame, self._shown
+        same = shown is not None and shown.settled == description.settled and same_motions(frame, shown.frame)
+        if same and self._clock.playing and monotonic() < self._due:
+            return
+        self._shown, self._due = description, monotonic() + PAUSE
         columns = [describe_column(c, frame.request.time, description.settled) for c in frame.columns]
         set_content(self._text, status_html(columns))

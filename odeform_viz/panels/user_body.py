@@ -83,7 +83,7 @@ class UserBodyPanel(Panel):
             self.close()
             args = (geometry, name, self._material.value())
             self._job = Job(make_user_body, args, lambda body: self._made(body, origin), self._failed)
-            self._working(WORKING.format(name))
+            self._working(WORKING.format(name.replace("_", BREAK)))
             self._job.start()
 
     def _remake(self) -> None:
