@@ -97,7 +97,7 @@ class Presenter:
         self._fitted: object = None  # what the scale of colours was fitted to
         self._described: Frame | None = None
         self._described_at = 0.0
-        self._pause = DESCRIBE
+        self._pause = self._pace = DESCRIBE  # until other motions are described, or another moment of the same
 
     @property
     def scale(self) -> ColorScale | None:
@@ -150,11 +150,12 @@ class Presenter:
         self._settled = self.frame is not None and same_motions(frame, self.frame)
         self._publish(frame, options)
         self.frame, self._options = frame, options
-        if self._described is not None and not same_motions(frame, self._described):
+        same = self._described is not None and same_motions(frame, self._described)
+        if self._described is not None and not same:
             self._output.outdate()
         with cancel_unless(lambda: True):  # a frame that was shown is recorded, whatever came since
             self._recording.log(frame)
-        if frame.pending or time.monotonic() - self._described_at > self._pause:
+        if frame.pending or time.monotonic() - self._described_at > (self._pace if same else self._pause):
             self._describe(frame)
 
     def _publish(self, frame: Frame, options: DisplayOptions) -> None:
@@ -178,14 +179,16 @@ class Presenter:
         self._publish(frame, options)
 
     def _describe(self, frame: Frame) -> None:
-        begin = time.monotonic()
+        begin, again = time.monotonic(), self._described is not None and same_motions(frame, self._described)
         curves = tuple(self._session.curves(column, frame.request) for column in frame.columns)
         self._fit_scale(frame, curves)
         coloring = self._coloring
         histogram = histogram_of(coloring.values.values(), coloring.scale) if coloring else None
         self._output.describe(Description(frame, curves, self._options, self.scale, histogram, self._settled))
         self._described, self._described_at = frame, time.monotonic()
-        self._pause = max(DESCRIBE, RARELY * (self._described_at - begin))
+        pause = max(DESCRIBE, RARELY * (self._described_at - begin))
+        # curves are computed once for a motion: how long that takes says nothing of another moment of it
+        self._pause, self._pace = (self._pause, pause) if again else (pause, DESCRIBE)
 
 
 def _quantity(options: DisplayOptions) -> str:

@@ -20,7 +20,13 @@ __all__ = [
     "unit_text",
 ]
 
-PARAMETERS = {"young": "stiffness"}
+PARAMETERS = {
+    "young": "stiffness",
+    "beside": "sideways",
+    "held_around": "patch azimuth",
+    "held_up": "patch elevation",
+    "other_turn": "other's turn",
+}
 CONSTANTS = {
     "young": "Young's modulus",
     "poisson": "Poisson's ratio",

@@ -217,11 +217,11 @@ def _phone(view: View) -> None:
 
 def _stability(view: View) -> None:
     view.show(MOMENT)
-    view.tab("Stability")
+    view.page.get_by_text("Stability map", exact=True).click()
     view.client.click("Map stability")
-    controls = view.client.controls
-    view.wait(lambda: not controls["Map stability"].visible and not controls["Cancel the map"].visible)
-    view.wait(lambda: "A click moves them there" in view.client.text())
+    drawn = view.page.locator(".odeform-map")
+    drawn.wait_for()
+    drawn.scroll_into_view_if_needed()
 
 
 def _simulate(view: View) -> None:

@@ -16,12 +16,12 @@ HIGHEST = 100.0  # m
 
 def _turn(axis: str) -> Parameter:
     return Parameter(
-        f"turn_{axis}", "deg", -180.0, 180.0, 0.0, description=f"turn about {axis} before it falls; x first, z last"
+        f"turn_{axis}", "deg", -180.0, 180.0, 0.0, description=f"turn about {axis} at the start; x first, z last"
     )
 
 
 PARAMETERS = (
-    Parameter("height", "m", 0.05, 0.4, 0.25, description="of the lowest point above the floor"),
+    Parameter("height", "m", 0.05, 0.4, 0.25, description="of the body's lowest point above the floor"),
     _turn("x"),
     _turn("y"),
     _turn("z"),

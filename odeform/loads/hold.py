@@ -57,9 +57,21 @@ LOAD = Load(
     happened="held",
     parameters=(
         Parameter(
-            "held_around", "deg", -180.0, 180.0, -120.0, description="direction of the patch from the middle, about z"
+            "held_around",
+            "deg",
+            -180.0,
+            180.0,
+            -120.0,
+            description="of the held patch about z, from the middle of the body",
         ),
-        Parameter("held_up", "deg", -90.0, 90.0, 30.0, description="direction of the patch from the middle, upward"),
+        Parameter(
+            "held_up",
+            "deg",
+            -90.0,
+            90.0,
+            30.0,
+            description="of the held patch above the horizontal, from the middle",
+        ),
         HEIGHT,
         *PARAMETERS[1:],
     ),

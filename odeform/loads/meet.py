@@ -47,8 +47,8 @@ LOAD = Load(
     title="Throw it at another",
     happened="thrown at another",
     parameters=(
-        Parameter("distance", "m", 0.35, 0.6, 0.55, description="of the other one's middle, along x"),
-        Parameter("beside", "m", -0.06, 0.06, 0.0, description="of the other one's middle, along y"),
+        Parameter("distance", "m", 0.35, 0.6, 0.55, description="from the body's middle to the other's, along x"),
+        Parameter("beside", "m", -0.06, 0.06, 0.0, description="from the body's middle to the other's, along y"),
         Parameter("other_turn", "deg", -180.0, 180.0, 0.0, description="turn of the other one about z"),
         *PARAMETERS,
         velocity("x", 1.5, 3.0, 2.5),

@@ -65,12 +65,12 @@ def situation(rest: Mesh, parameters: Parameters) -> Situation:
 
 LOAD = Load(
     name="slope",
-    title="Let it down on a slope",
-    happened="let down on a slope",
+    title="Put it on a slope",
+    happened="put on a slope",
     parameters=(
-        Parameter("angle", "deg", 10.0, 40.0, 30.0, description="of the slope, which falls along x"),
+        Parameter("angle", "deg", 10.0, 40.0, 30.0, description="of the slope above the horizontal; it falls along x"),
         DISTANCE,
-        Parameter("height", "m", 0.005, 0.1, 0.01, description="of the body above the slope"),
+        Parameter("height", "m", 0.005, 0.1, 0.01, description="of the body's lowest point above the slope"),
         *PARAMETERS[1:],
         velocity("x", -1.0, 1.0, 0.0),
         SPINS[1],

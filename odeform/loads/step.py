@@ -16,7 +16,7 @@ from odeform.types import Mesh
 __all__ = ["LOAD"]
 
 DEEP, WIDE, BELOW = 0.5, 0.5, 0.1  # m: along x, to each side, and what of it is below the floor
-HEIGHT = Parameter("height", "m", 0.18, 0.4, 0.25, description="of the lowest point above the floor")
+HEIGHT = Parameter("height", "m", 0.18, 0.4, 0.25, description="of the body's lowest point above the floor")
 
 
 def step(distance: float, rise: float) -> Obstacle:

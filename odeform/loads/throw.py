@@ -18,11 +18,13 @@ SHOWN = 0.06  # s of the way that the arrow of the velocity is long
 
 def velocity(axis: str, low: float, high: float, default: float) -> Parameter:
     """The slider of one component of the velocity."""
-    return Parameter(f"velocity_{axis}", "m/s", low, high, default, description=f"{axis} of the mass centre's velocity")
+    return Parameter(
+        f"velocity_{axis}", "m/s", low, high, default, description=f"velocity along {axis}, of the centre of mass"
+    )
 
 
 def _spin(axis: str, default: float) -> Parameter:
-    return Parameter(f"spin_{axis}", "rad/s", -10.0, 10.0, default, description=f"spin about {axis}")
+    return Parameter(f"spin_{axis}", "rad/s", -10.0, 10.0, default, description=f"speed of rotation about {axis}")
 
 
 SPINS = (_spin("x", 0.0), _spin("y", 4.0), _spin("z", 0.0))

@@ -15,7 +15,7 @@ __all__ = ["DISTANCE", "LOAD", "distance_of"]
 
 FARTHEST = 100.0  # m
 WIDE, HIGH = 0.45, 0.6  # m, of what is drawn, to each side and above the floor
-DISTANCE = Parameter("distance", "m", 0.25, 0.5, 0.35, description="of the obstacle from the middle of the body")
+DISTANCE = Parameter("distance", "m", 0.25, 0.5, 0.35, description="from the body's middle to the obstacle, along x")
 
 
 def distance_of(parameters: Parameters) -> float:

@@ -79,12 +79,15 @@ def load(name: str | Path) -> Predictor:
         >>> odeform.load("contact-force:drop").schema.scene
         'object-drop'
     """
-    checkpoint = open_checkpoint(name)
+    base, wanted = split_load(str(name))
+    checkpoint = open_checkpoint(base)
     try:
         model_class(checkpoint.model)
     except InputError as error:
         raise InputError(f"checkpoint {name}: {error}") from None
-    return load_model(checkpoint)
+    predictor = load_model(checkpoint)
+    # by `under`, so that it can be brought under other loads, the push among them
+    return predictor if wanted == PUSH else predictor.under(wanted)
 
 
 def load_model(checkpoint: Checkpoint) -> Predictor:

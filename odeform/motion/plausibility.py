@@ -46,7 +46,7 @@ VALID, NON_FINITE, SUNK, DEFORMED, DRIVEN, INSIDE = range(6)
 REASONS = {
     NON_FINITE: "it is not finite",
     SUNK: "it sinks into the floor",
-    DEFORMED: "it deforms more than the body can",
+    DEFORMED: "it deforms more than such a body can",
     DRIVEN: "it gains energy",
     INSIDE: "it sinks into the {}",
 }

@@ -100,13 +100,15 @@ function end(box) {
   return before;
 }
 
+// Reads what is typed; returns whether it can be the value.
 function finish(box) {
-  if (!confirmed.has(box)) return;
+  if (!confirmed.has(box)) return true;
   const text = box.value.trim();
-  if (text === end(box)) return;
+  if (text === end(box)) return true;
   const message = objection(box, text);
   if (message) refuse(box, message);
   else set(box, plain(Number(text)));
+  return message === "";
 }
 
 addEventListener("input", (event) => {
@@ -124,7 +126,8 @@ addEventListener("beforeinput", (event) => {
 addEventListener("keydown", (event) => {
   const box = event.target;
   if (!box.matches?.(BOX)) return;
-  if (event.key === "Enter") finish(box);
+  // keys after it are hot keys; one that is refused is typed again
+  if (event.key === "Enter") finish(box) && setTimeout(() => box.blur(), 0);
   else if (event.key === "Escape" && confirmed.has(box)) end(box);
   else if (event.key.length === 1 || event.key === "Backspace" || event.key === "Delete") {
     event.stopImmediatePropagation(); // viser would drop a comma here

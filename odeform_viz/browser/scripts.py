@@ -22,9 +22,9 @@ def run_scripts(server: viser.ViserServer) -> None:
     run_script(server, "window.odeform.followTheme()")
 
 
-def run_script(server: viser.ViserServer, source: str) -> None:
-    """Run a script in every client, now and each time it connects."""
-    server.gui._websock_interface.queue_message(RunJavascriptMessage(source))
+def run_script(to: viser.ViserServer | viser.ClientHandle, source: str) -> None:
+    """Run a script in every client of a server, now and each time it connects, or in one client."""
+    to.gui._websock_interface.queue_message(RunJavascriptMessage(source))
 
 
 def _once(name: str, source: str) -> str:

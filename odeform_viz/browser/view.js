@@ -33,6 +33,13 @@ style.textContent = `
     display: flex; align-items: center; gap: 12px; background: var(--mantine-color-body);
     box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
   }
+  #odeform-view > .odeform-axes {
+    position: absolute; left: 12px; bottom: 270px; width: 64px; height: 64px; padding: 0; background: none;
+  }
+  .odeform-axes svg { display: block; overflow: visible; stroke-width: 2.5; stroke-linecap: round; }
+  .odeform-axes text {
+    font: 600 13px Inter, sans-serif; text-anchor: middle; dominant-baseline: central; stroke: none; fill: currentColor;
+  }
   .odeform-buttons { display: flex; align-items: center; gap: 2px; }
   [data-odeform-view] [data-hotkey] {
     cursor: pointer; padding: 3px 7px; border-radius: 4px; white-space: nowrap; color: #b4490f; user-select: none;
@@ -75,6 +82,7 @@ style.textContent = `
   @media (max-width: 48em) {
     #odeform-view { padding: 8px 8px 140px; font-size: 12px; }
     #odeform-view > [data-odeform-view=timeline] { left: 8px; right: 8px; bottom: 62px; gap: 6px; padding: 4px 8px; }
+    #odeform-view > .odeform-axes { left: 8px; bottom: 128px; }
     .odeform-wide, .odeform-fine { display: none !important; }
   }`;
 document.head.append(style);
@@ -89,6 +97,21 @@ const shown = new Map(ORDER.map((name) => {
   layer.append(place);
   return [name, place];
 }));
+
+// Axes of the scene: for each how far it goes to the right, down and away; null shows none.
+const axes = document.createElement("div");
+axes.className = "odeform-axes";
+layer.append(axes);
+const COLORS = { x: "#d23f3f", y: "#2e8b45", z: "#3b6fe0" };
+window.odeform.showAxes = (seen) => {
+  const lines = seen && ["x", "y", "z"].map((name, at) => ({ name, right: seen[at][0], down: seen[at][1], away: seen[at][2] }));
+  // the nearest is drawn last
+  const drawn = lines?.sort((one, other) => other.away - one.away).map(({ name, right, down }) =>
+    `<g style="color:${COLORS[name]}"><path d="M0 0L${24 * right} ${24 * down}" stroke="currentColor"/>` +
+    `<text x="${33 * right}" y="${33 * down}">${name}</text></g>`);
+  axes.innerHTML = drawn ? `<svg viewBox="-32 -32 64 64">${drawn.join("")}</svg>` : "";
+};
+window.odeform.showAxes(window.odeform.axes ?? null);
 
 // The control after the one that holds an element: viser gives text boxes no id.
 window.odeform.boxAfter = (element) => {

@@ -19,7 +19,8 @@ class CameraPanel(Panel):
                 "colour by",
                 COLOR_BY,
                 initial_value="error",
-                hint="without the rigid motion; errors need a truth; overlaid columns have their own",
+                hint="displacement and strain leave out the rigid motion; errors need a truth; overlaid columns have "
+                "the colours of their curves",
             )
             self._exaggeration = gui.add_slider(
                 "exaggerate",

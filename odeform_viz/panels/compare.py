@@ -107,7 +107,7 @@ class ComparePanel(Panel):
         over = gui.add_button(
             "Sweep it",
             color="gray",
-            hint=f"{SWEEP} columns over its trained range, or one for each object; the others stay the same",
+            hint=f"{SWEEP} columns over its trained range, or one for each object; other parameters stay the same",
         )
         over.on_click(lambda _: self._guarded("Sweep not added", self._sweep))
 

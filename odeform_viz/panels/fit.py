@@ -20,12 +20,12 @@ from odeform_viz.words import parameter_title, plain
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
-NEXT = "the push that would narrow the widest interval of the body most"
+NEXT = "the push that would tell most of what is least known of the body"
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within."
 FAILED = "⚠ **The fit failed**: {}"
-FURTHER = "The best next push is expected to narrow the widest interval of the body to {:.0%}."
+FURTHER = "After the best next push, the widest interval of the body is expected to be {:.0%} as wide."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 

@@ -9,14 +9,15 @@ from odeform_viz.page import Page, Panel
 
 __all__ = ["HelpPanel", "help_text"]
 
-WHAT = """**ODeform** predicts how a soft body moves and deforms, for any parameters and at any moment, in milliseconds,
-with models learned from simulations. It is an independent implementation of *ODeform: Learning Continuous 4D
-Motion for Shape Deformation with Neural ODEs* by Velikova, Saleh, Kuang and Busam
+WHAT = """**ODeform** predicts how a soft body moves and deforms, for parameters and moments that you choose, while you
+drag a slider, with models learned from simulations. It is an independent implementation of *ODeform: Learning
+Continuous 4D Motion for Shape Deformation with Neural ODEs* by Velikova, Saleh, Kuang and Busam
 ([arXiv:2607.20670](https://arxiv.org/abs/2607.20670)), with models of its own.
 
 **The badge** says whether this moment and these parameters are *inside* what the model was trained on
 (green), outside of it or of a kind that was not trained (amber), or *not modelled* (red). The error beside it
-is measured on sequences that were not used for training: nine of ten had a smaller one.
+is measured on sequences that were not used for training: nine of ten had a smaller one. With *no error estimate*
+the laws of elasticity and contact move the body, and no error is known for what is in view.
 
 **Every error is a distance**: how far each point of the body is from where a simulation, the *truth*, has it.
 *RMS* is the root of the mean of its square over all points; colours show it point by point. The *solver error*

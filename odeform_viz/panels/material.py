@@ -8,8 +8,8 @@ from odeform_viz.panels.callbacks import on_user_change, serialized
 
 __all__ = ["MaterialChoice"]
 
-AUTOMATIC, NUMBERS = "softest that stands", "numbers"
-HINT = "what a shape is of; by itself the softest of the list under which it stands"
+AUTOMATIC, NUMBERS = "softest that stands", "own numbers"
+HINT = "what the shape is made of; at first the softest material of the list with which it stands"
 YOUNG, DENSITY = 60.0, 120.0  # kPa and kg/m^3 that numbers begin with: those of foam
 
 

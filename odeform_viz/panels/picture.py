@@ -23,7 +23,7 @@ RATE, MOST = 25.0, 150  # frames per second of the motion, and of a film
 WIDTH = 720  # px; of a film
 TIMEOUT = 60.0  # s for one picture: browsers may render in software
 POLL = 5e-3  # s
-OF_FILM = "the first window of the motion, from this camera"
+OF_FILM = "the motion until the end of the trained or measured time, from this camera"
 
 File = tuple[str, bytes]
 """A name and its content."""

@@ -9,7 +9,7 @@ from odeform.loads.registry import known_as
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
-from odeform_viz.panels.timeline import Marks, moment_css, timeline_html
+from odeform_viz.panels.timeline import Marks, moment_css, playing_css, timeline_html
 from odeform_viz.pushing import acting_times
 from odeform_viz.state import PageState
 from odeform_viz.view import Description, shown_until
@@ -22,7 +22,7 @@ USUAL = 0.2  # of real time, or slower:
 LEAST = 3.0  # s that the trained window takes
 AFTER = {
     "trained": "after the trained window, the motion is extrapolated",
-    "measured": "how far the motion is off was measured up to there",
+    "measured": "the error of such motions was measured up to there",
     "shown": "the motion is computed up to there, and held afterwards",
 }
 QUIET = 0.3  # s after a drag; times that the clock had set have arrived by then
@@ -50,7 +50,7 @@ class PlaybackPanel(Panel):
             )
             self._time.on_update(self._dragged)
             page.controls.time_slider = self._time._impl.uuid
-            self._play = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE)
+            self._play = gui.add_button("Pause")
             self._play.on_click(lambda _: self.toggle())
             go = gui.add_button_group("go to", ("start", PREVIOUS, NEXT, "peak"))
             go.on_click(self._clicked)
@@ -58,7 +58,7 @@ class PlaybackPanel(Panel):
             self._speed.on_update(lambda _: self._changed())
             self._loop = gui.add_checkbox("loop", initial_value=True)
             self._loop.on_update(lambda _: self._changed())
-        self._timeline, self._moment = gui.add_html(""), gui.add_html("")
+        self._timeline, self._moment, self._state = (gui.add_html("") for _ in range(3))
         self._marks: Marks | None = None
         page.add_hotkey("space K", "play or pause", self.toggle)
         page.add_hotkey("arrowleft J", "previous frame", lambda: self.step(PREVIOUS))
@@ -141,10 +141,11 @@ class PlaybackPanel(Panel):
         self._speed.value = names[(now + 1) % len(names)]
 
     def _draw(self) -> None:
-        slider, playing = self._page.controls.time_slider, self._clock.playing
+        slider = self._page.controls.time_slider
         content = timeline_html(
-            self._window, slider, self._marks, playing, str(self._speed.value), bool(self._loop.value), self._known
+            self._window, slider, self._marks, str(self._speed.value), bool(self._loop.value), self._known
         )
+        set_content(self._state, playing_css(self._clock.playing))
         set_content(self._timeline, in_view("timeline", content))
 
     def _to_frame(self, target: str) -> None:
@@ -166,7 +167,6 @@ class PlaybackPanel(Panel):
         # on the event loop alone: labels set by two threads at once may arrive in the other order
         playing = self._clock.playing
         self._play.label = "Pause" if playing else "Play"
-        self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
         self._draw()
 
     def _follow_clock(self) -> None:

@@ -55,10 +55,10 @@ class PushPanel(Panel):
             self._text = gui.add_markdown("")
             self._strength = gui.add_slider("force (N)", 0.0, 1.0, 0.01, 0.0, hint="")
             self._up = self._add_tilt(
-                gui, "tilt up (°)", "of the force, from straight into the surface: along it and upwards"
+                gui, "tilt up (°)", "angle by which the force leans upwards, from straight into the surface"
             )
             self._side = self._add_tilt(
-                gui, "tilt sideways (°)", "of the force, from straight into the surface: along it"
+                gui, "tilt sideways (°)", "angle by which the force leans sideways, from straight into the surface"
             )
             self._body = {
                 p.name: gui.add_slider(f"{parameter_title(p)} ({p.unit})", 0.0, 1.0, 0.001, 0.0)

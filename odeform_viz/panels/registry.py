@@ -28,6 +28,7 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Explore", "odeform_viz.panels.quality:QualityPanel"),
     Entry("side/Explore", "odeform_viz.panels.shape:ShapePanel"),
     Entry("side/Explore", "odeform_viz.panels.user_body:UserBodyPanel"),
+    Entry("side/Explore", "odeform_viz.panels.stability:StabilityPanel"),
     Entry("side/Compare", "odeform_viz.panels.truth:TruthPanel"),
     Entry("side/Compare", "odeform_viz.panels.fit:FitPanel"),
     Entry("side/Compare", "odeform_viz.panels.compare:ComparePanel"),
@@ -39,8 +40,8 @@ PANELS: tuple[Entry, ...] = (
     Entry("side/Record", "odeform_viz.panels.export:ExportPanel"),
     Entry("side/Record", "odeform_viz.panels.picture:PicturePanel"),
     Entry("bottom/Over time", "odeform_viz.panels.plots:PlotPanel"),
-    Entry("bottom/Stability", "odeform_viz.panels.stability:StabilityPanel"),
     Entry("side", "odeform_viz.panels.theme:ThemePanel"),
+    Entry("side", "odeform_viz.panels.axes:AxesPanel"),
     Entry("side/Help", "odeform_viz.panels.help:HelpPanel"),  # last: it lists the hot keys of all others
 )
 

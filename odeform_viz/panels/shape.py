@@ -24,7 +24,7 @@ from odeform_viz.user_bodies import takes_user_bodies
 
 __all__ = ["ShapePanel"]
 
-TRAINED = "The trained body."
+TRAINED = "This is the body that the model was trained on."
 
 
 class ShapePanel(Panel):

@@ -27,7 +27,7 @@ def shape_warning(similarities: Iterable[ShapeSimilarity | None], model: UserBod
     worst = max(untrained, key=lambda similarity: similarity.mean)
     color = GUESSED if model is not None and model.knows_untrained_errors else UNKNOWN
     away = f"on average {1e3 * worst.mean:.0f} mm from the trained body's"
-    more = f"At most {1e3 * worst.distance:.0f} mm. {_motion(model)}."
+    more = f"The largest distance is {1e3 * worst.distance:.0f} mm. {_motion(model)}."
     return f'<div style="{STYLE}{color}" title="{escape(more)}">⚠ <b>Shape not trained</b>: its surface is {away}</div>'
 
 

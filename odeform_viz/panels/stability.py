@@ -14,11 +14,12 @@ from odeform_viz.view import Description
 __all__ = ["StabilityPanel"]
 
 EXPLAINED = (
-    "How far the body deforms for parameters inside and outside the trained range, within the trained window and after "
+    "How much the body changes its shape inside and outside of the trained range, within the trained time and after "
     "it. Takes about 20 s."
 )
 FOUND = (
-    "From {} motions. White frame: the trained range; orange: the sliders. A click moves them there, up to their ends."
+    "Dark is good, pale is bad. White frame: the trained range; orange: the sliders, which a click moves there, up to "
+    "their ends. From {} motions."
 )
 
 
@@ -35,16 +36,19 @@ class StabilityPanel(Panel):
     def __init__(self, page: Page) -> None:
         gui, self._origin, self._page = page.server.gui, page.model.origin, page
         self._lock = threading.Lock()
-        self._text = gui.add_markdown(EXPLAINED)
-        self._button = gui.add_button("Map stability")
-        self._button.on_click(lambda _: self._start())
-        self._bar = gui.add_progress_bar(0.0, visible=False)
-        self._cancel = gui.add_button("Cancel the map", color="gray", visible=False)
-        self._cancel.on_click(lambda _: self.close())
-        self._here, self._map = gui.add_html(""), gui.add_html("", visible=False)  # the box follows the map
-        # the page hides it: a click on the map writes into it
-        self._place = gui.add_text("place on the map", "", visible=False)
-        self._place.on_update(lambda _: self._go())
+        with gui.add_folder("Stability map", expand_by_default=False):
+            self._text = gui.add_markdown(EXPLAINED)
+            self._button = gui.add_button("Map stability")
+            self._button.on_click(lambda _: self._start())
+            self._bar = gui.add_progress_bar(0.0, visible=False)
+            self._cancel = gui.add_button("Cancel the map", color="gray", visible=False)
+            self._cancel.on_click(lambda _: self.close())
+            self._here, self._map = gui.add_html(""), gui.add_html("", visible=False)  # the box follows the map
+            # the page hides it: a click on the map writes into it
+            self._place = gui.add_text("place on the map", "", visible=False)
+            self._place.on_update(lambda _: self._go())
+            self._closing = gui.add_button("Close the map", color="gray", visible=False)
+            self._closing.on_click(lambda _: self._discard())
         self._found: StabilityMap | None = None
         self._work: Callable[..., StabilityMap] = map_stability
         self._job: Job | None = None
@@ -84,7 +88,13 @@ class StabilityPanel(Panel):
         self._place.visible = True  # before the map: clicks look for it
         self._here.content = here_css(self._page.controls.parameters(), found, (first, second))
         self._map.content = map_html(found, (first, second))
-        self._map.visible = True
+        self._map.visible = self._closing.visible = True
+
+    def _discard(self) -> None:
+        """Take the map away, so that another can be made."""
+        self._found = None
+        self._place.visible = self._map.visible = self._closing.visible = False
+        self._show(working=False)
 
     def _go(self) -> None:
         if self._found is None or not self._place.value:

@@ -1,9 +1,10 @@
-"""The map of stability as a drawing: one panel per moment, ticks, a bar of the colours, and places to click."""
+"""The map of stability as a drawing: one square per moment, ticks, what the colours mean, and places to click."""
 
 import base64
 import io
 import math
 from collections.abc import Mapping
+from html import escape
 
 import numpy as np
 from PIL import Image
@@ -17,37 +18,39 @@ from odeform_viz.words import parameter_title
 
 __all__ = ["here_css", "map_html", "place_of"]
 
-SIDE, LEFT, TOP, FOOT, GAP = 150, 44, 20, 34, 22  # units of the drawing
+SIDE, LEFT, TOP, FOOT, GAP = 108, 34, 16, 16, 16  # units of the drawing, which are px in the panel
+NAMES = 14  # for the name of the parameter below
+BAR = 12  # width of the bar of the colours
+TOP_OF_COLOURS = 2.0  # over the largest change of shape in the trained range
 CLAMPED = (70, 70, 74)
 TICKS = (-3.0, -1.0, 1.0, 3.0)  # halves of the trained range, from its middle
+STYLE = (
+    ".odeform-map{display:block;padding:0 0.5em}"
+    ".odeform-map text{font:9.5px Inter,sans-serif;fill:var(--mantine-color-text)}"
+    ".odeform-map image[data-map]{cursor:crosshair;image-rendering:pixelated}"
+    ".odeform-map .here{fill:#d66030;stroke:#fff;stroke-width:1.5}"
+)
 
 
 def map_html(plot: StabilityMap, parameters: tuple[Parameter, Parameter]) -> str:
-    """Draws the map; a click writes "across,upwards,moment", the first two as fractions, into the text box after it."""
-    top = _top(plot)
-    width = LEFT + len(plot.times) * (SIDE + GAP)
-    panels = "".join(_panel(plot, index, parameters, top) for index in range(len(plot.times)))
+    """Draws the map, two moments in a row, and what its colours mean in the next place.
+
+    A click writes "across,upwards,moment", the first two as fractions, into the text box after it.
+    """
+    count = len(plot.times)
+    places = [_corner(index) for index in range(count + 1)]
+    panels = "".join(_panel(plot, index, parameters, *places[index]) for index in range(count))
+    width, height = LEFT + 2 * (SIDE + GAP), places[-1][1] + SIDE + FOOT + NAMES
     x, y = parameters
     names = (
-        f'<text x="{0.5 * width}" y="{TOP + SIDE + 29}" text-anchor="middle">{_named(x)}</text>'
-        f'<text transform="translate(9,{TOP + 0.5 * SIDE}) rotate(-90)" text-anchor="middle">{_named(y)}</text>'
+        f'<text x="{LEFT + 0.5 * SIDE}" y="{height - 4}" text-anchor="middle">{_named(x)}</text>'
+        f'<text transform="translate(9,{0.5 * height}) rotate(-90)" text-anchor="middle">{_named(y)}</text>'
     )
-    drawing = (
-        f'<svg class="odeform-map" viewBox="0 0 {width} {TOP + SIDE + FOOT}" width="100%" style="max-height:230px">'
-        f"<style>.odeform-map text{{font:9px sans-serif;fill:var(--mantine-color-text)}}"
-        f".odeform-map image{{cursor:crosshair;image-rendering:pixelated}}"
-        f".odeform-map .here{{fill:#d66030;stroke:#fff;stroke-width:1.5}}</style>{panels}{names}</svg>"
+    legend = _legend(1e3 * plot.largest, *places[-1])
+    return (
+        f'<svg class="odeform-map" viewBox="0 0 {width} {height}" width="100%">'
+        f"<style>{STYLE}</style>{panels}{legend}{names}</svg>"
     )
-    bar = _png(colors_of(np.linspace(0.0, top, 256), _scale(top))[None])
-    legend = (
-        '<div style="display:flex;gap:0.5em;align-items:center;font:11px sans-serif;padding:0 0.8em 0.6em">'
-        f'<span>change of shape (RMS) 0</span><img src="{bar}" style="flex:1;height:10px;max-width:16em">'
-        f"<span>≥ {top:.3g} mm</span>"
-        f'<span style="width:1em;height:10px;background:rgb{CLAMPED}"></span>'
-        "<span>stopped: not possible any more</span>"
-        "</div>"
-    )
-    return drawing + legend
 
 
 def place_of(text: str, plot: StabilityMap, parameters: tuple[Parameter, Parameter]) -> tuple[dict[str, float], float]:
@@ -75,20 +78,21 @@ def _reach(plot: StabilityMap) -> float:
     return float(plot.units[-1] + 0.5 * (plot.units[1] - plot.units[0]))
 
 
-def _top(plot: StabilityMap) -> float:
-    """mm at the end of the colours: what nine in ten of the valid cells stay below, or the largest trained."""
-    valid = 1e3 * plot.largest * plot.values[plot.sound]
-    return max(float(np.quantile(valid, 0.9)) if valid.size else 0.0, 1e3 * plot.largest)
+def _corner(index: int) -> tuple[int, int]:
+    """Left and top of a place."""
+    row, column = divmod(index, 2)
+    return LEFT + column * (SIDE + GAP), TOP + row * (TOP + SIDE + FOOT)
 
 
-def _scale(top: float) -> ColorScale:
-    return ColorScale("displacement", "mm", top, False)
+def _scale(largest: float) -> ColorScale:
+    """Colours up to twice the `largest` change of shape in the trained range, in mm."""
+    return ColorScale("displacement", "mm", TOP_OF_COLOURS * largest, False)
 
 
-def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Parameter], top: float) -> str:
-    left, reach = LEFT + index * (SIDE + GAP), _reach(plot)
-    values = 1e3 * plot.largest * plot.values[index]
-    colors = np.where(plot.sound[index][..., None], colors_of(values, _scale(top)), CLAMPED).astype(np.uint8)
+def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Parameter], left: int, top: int) -> str:
+    reach, largest = _reach(plot), 1e3 * plot.largest
+    colors = colors_of(largest * plot.values[index], _scale(largest))
+    cells = np.where(plot.sound[index][..., None], colors, CLAMPED).astype(np.uint8)
 
     def at(unit: float) -> float:
         return 0.5 * SIDE * (1.0 + unit / reach)
@@ -97,21 +101,39 @@ def _panel(plot: StabilityMap, index: int, parameters: tuple[Parameter, Paramete
     windows = plot.times[index] / plot.window
     when = f"{plot.times[index]:.3g} s" + ("" if windows <= 1.0 else f" ({windows:g} × trained)")
     parts = [
-        f'<text x="{left + 0.5 * SIDE}" y="13" text-anchor="middle">{when}</text>',
-        f'<image href="{_png(colors[::-1])}" x="{left}" y="{TOP}" width="{SIDE}" height="{SIDE}" '
+        f'<text x="{left + 0.5 * SIDE}" y="{top - 4}" text-anchor="middle">{when}</text>',
+        f'<image href="{_png(cells[::-1])}" x="{left}" y="{top}" width="{SIDE}" height="{SIDE}" '
         f'preserveAspectRatio="none" data-map="{index}"/>',
-        f'<rect x="{left + low:.1f}" y="{TOP + low:.1f}" width="{high - low:.1f}" height="{high - low:.1f}" '
+        f'<rect x="{left + low:.1f}" y="{top + low:.1f}" width="{high - low:.1f}" height="{high - low:.1f}" '
         'fill="none" stroke="#fff" stroke-width="1.5" pointer-events="none"/>',
-        f'<g transform="translate({left},{TOP})" pointer-events="none"><circle class="here" r="3.5"/></g>',
+        f'<g transform="translate({left},{top})" pointer-events="none"><circle class="here" r="3.5"/></g>',
     ]
     for unit in TICKS:
-        x, y = left + at(unit), TOP + SIDE - at(unit)
+        x, y = left + at(unit), top + SIDE - at(unit)
         parts.append(
-            f'<text x="{x:.1f}" y="{TOP + SIDE + 12}" text-anchor="middle">{_tick(parameters[0], unit)}</text>'
+            f'<text x="{x:.1f}" y="{top + SIDE + 11}" text-anchor="middle">{_tick(parameters[0], unit)}</text>'
         )
-        if index == 0:
+        if left == LEFT:
             parts.append(f'<text x="{left - 4}" y="{y + 3:.1f}" text-anchor="end">{_tick(parameters[1], unit)}</text>')
     return "".join(parts)
+
+
+def _legend(largest: float, left: int, top: int) -> str:
+    """A bar of the colours, with what they say of a motion beside it; `largest` in the trained range, in mm."""
+    colours = _png(colors_of(np.linspace(TOP_OF_COLOURS * largest, 0.0, 128), _scale(largest))[:, None])
+    tall, beside = SIDE - 26, left + BAR + 6
+    lines = (
+        (top + 7, f"≥ {TOP_OF_COLOURS * largest:.3g} mm: bad,"),
+        (top + 18, "twice as much or more"),
+        (top + 0.5 * tall, f"{largest:.3g} mm: the most"),
+        (top + 0.5 * tall + 11, "in the trained range"),
+        (top + tall, "0 mm: good, no change"),
+        (top + SIDE - 3, "no motion: it stopped"),
+    )
+    swatch = f'<rect x="{left}" y="{top + SIDE - BAR}" width="{BAR}" height="{BAR}" fill="rgb{CLAMPED}"/>'
+    texts = "".join(f'<text x="{beside}" y="{y:.1f}">{escape(text)}</text>' for y, text in lines)
+    bar = f'<image href="{colours}" x="{left}" y="{top}" width="{BAR}" height="{tall}" preserveAspectRatio="none"/>'
+    return f'{bar}{swatch}{texts}<text x="{left}" y="{top - 5}">change of shape, RMS</text>'
 
 
 def _named(parameter: Parameter) -> str:

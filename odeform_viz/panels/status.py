@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from html import escape
+from time import monotonic
 
 import numpy as np
 
@@ -14,10 +15,11 @@ from odeform.motion.truth_errors import DISTANCE
 from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
-from odeform_viz.view import ColumnFrame, Description, played_until, shown_until
+from odeform_viz.view import ColumnFrame, Description, played_until, same_motions, shown_until
 
 __all__ = ["StatusPanel", "describe_column", "status_html"]
 
+PAUSE = 1.0  # s between tables while it plays: they are read slowly, and larger than all else that is sent
 STYLE = """<style>
 .odeform-status{width:100%;border-spacing:0;font:12px/1.4 sans-serif;color:var(--mantine-color-text);padding:0 0.6em}
 .odeform-status th{text-align:left;padding:0.5em 0 0.2em}
@@ -37,10 +39,12 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
     if column.predictor is None:
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
-        lines.append(f"computed: {stats.evaluations} evaluations in {stats.wall_ms:.1f} ms by {stats.solver}")
+        lines.append(
+            f"computed: {stats.evaluations} evaluations of the model in {stats.wall_ms:.3g} ms by {stats.solver}"
+        )
         lines.append(_solver_error(stats, shown.motion.schema.window) if settled else "solver error: …")
     else:
-        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.1f} ms")
+        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.3g} ms")
     if shown.error is not None:
         e = shown.error
         values = f"RMS {e.rms_mm:.2f}, mean {e.mean_mm:.2f}, largest {e.worst_mm:.2f} mm"
@@ -80,11 +84,11 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
 
 
 def _calibrated(shown: ColumnFrame, predictor: Predictor) -> list[str]:
-    """Says what nine in ten are of."""
+    """Says what the expected error was measured on."""
     motions = 0 if shown.untrained else predictor.band_motions(shown.motion.parameters)
     if not motions:
-        return ["expected of: single moments"]
-    return [f"expected of: whole motions, 9 of 10 stay below it throughout; by {motions} that chose nothing"]
+        return ["measured on: moments of motions, one by one"]
+    return [f"measured on: {motions} motions that nothing was fitted to; 9 of 10 stay below it from begin to end"]
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:
@@ -109,7 +113,7 @@ def _rest(motion: Motion, settled: bool) -> list[str]:
 
 def status_html(texts: Sequence[str]) -> str:
     """A table: a heading for each text of `describe_column`, and below it what is said, by what it is of."""
-    return f'{STYLE}<table class="odeform-status">{"".join(map(_rows, texts))}</table>'
+    return f'<table class="odeform-status">{"".join(map(_rows, texts))}</table>'
 
 
 def _rows(text: str) -> str:
@@ -122,13 +126,21 @@ def _rows(text: str) -> str:
 
 
 class StatusPanel(Panel):
-    """A table with a part for each column."""
+    """A table with a part for each column; while it plays, it follows once a second."""
 
     def __init__(self, page: Page) -> None:
         with page.server.gui.add_folder("Status"):
+            page.server.gui.add_html(STYLE)  # once: the table changes several times a second
             self._text = page.server.gui.add_html("")
+        self._clock = page.clock
+        self._shown: Description | None = None
+        self._due = 0.0
 
     def describe(self, description: Description) -> None:
-        frame = description.frame
+        frame, shown = description.frame, self._shown
+        same = shown is not None and shown.settled == description.settled and same_motions(frame, shown.frame)
+        if same and self._clock.playing and monotonic() < self._due:
+            return
+        self._shown, self._due = description, monotonic() + PAUSE
         columns = [describe_column(c, frame.request.time, description.settled) for c in frame.columns]
         set_content(self._text, status_html(columns))

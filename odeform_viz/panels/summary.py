@@ -19,21 +19,22 @@ __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
 INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
-PHYSICS, UNTESTED, REFUSED = "physics only", "not tested", "not modelled"
+UNKNOWN_ERROR, UNTESTED, REFUSED = "no error estimate", "not tested", "not modelled"
 UNRELIABLE, LIMITED, UNLEARNED = "not reliable", "too much deformation", "nothing learned"
 LARGE = 0.2  # of the body's size: an error from which on nothing is told of where the body is
 WHY = {
     INSIDE: "Parameters and time are within those of the simulations that the model has learned from.",
     EXTRAPOLATED: "The model has not learned from simulations like this one; its motion is carried on from them.",
     UNTRAINED: "The model has learned from simulations of other shapes.",
-    PHYSICS: "Elasticity and contacts move the body. Only its contacts were fitted to such motions: no error is known.",
+    UNKNOWN_ERROR: "The body moves by the laws of elasticity and contact. At most its contacts were fitted to motions "
+    "like this one, so that no error is known for it. The documentation of loads says how far others were off.",
     UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
     UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
     LIMITED: "The body deforms more than the model can follow: its way is computed, its shape is a guess.",
     UNLEARNED: "The elasticity of the body moves it. Nothing of it was learned from motions.",
     REFUSED: "The motion would not be physically possible from here on, so its last valid moment is shown.",
 }
-UNKNOWN = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
+OF_TRUTH = "Not known of the truth: {}. Errors are those of the model and of the sliders together."
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def badge_of(frame: Frame) -> Badge:
         return Badge("outside" if known else "unknown", UNTRAINED, outside, expected)
     if load_of_scene(models[0].motion.schema.scene) is not None:
         # amber: what moves it is modelled, and no data say how well under this load
-        return Badge("outside", PHYSICS, outside, expected)
+        return Badge("outside", UNKNOWN_ERROR, outside, "" if expected == UNKNOWN_ERROR else expected)
     if models[0].motion.schema.scene == CLAMPED:
         return Badge("outside", UNLEARNED, outside, expected)
     if any(c.changed for c in models):
@@ -113,12 +114,17 @@ def _expected(models: Sequence[ColumnFrame]) -> str:
     unknown = [shown.column.label for shown, band in zip(models, bands, strict=True) if band is None]
     known = [band for band in bands if band is not None]
     if not known:
-        return "error not known"
+        return UNKNOWN_ERROR
     # outside of what was measured the band is carried on
     rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
     of = "" if len(known) == 1 else f", the largest of {len(known)}"
-    text = f"expected error now {'roughly ' if rough else ''}below {max(known):.2g} mm in 9 of 10 cases{of}"
-    return "; ".join([text, *(f"{label}: error not known" for label in unknown)])
+    text = f"expected error now {'roughly ' if rough else ''}below {_rounded(max(known), 2)} mm in 9 of 10 cases{of}"
+    return "; ".join([text, *(f"{label}: {UNKNOWN_ERROR}" for label in unknown)])
+
+
+def _rounded(value: float, digits: int) -> str:
+    """The value with so many digits, and without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _errors_now(frame: Frame) -> list[str]:
@@ -127,7 +133,9 @@ def _errors_now(frame: Frame) -> list[str]:
     if not known:
         return []
     named = len(known) > 1
-    values = ", ".join(f"{escape(c.column.label)} {rms:.3g} mm" if named else f"{rms:.3g} mm" for c, rms in known)
+    values = ", ".join(
+        f"{escape(c.column.label)} {_rounded(rms, 3)} mm" if named else f"{_rounded(rms, 3)} mm" for c, rms in known
+    )
     lines = [f"error now: {values} (RMS distance)"]
     above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]
     if above:
@@ -153,7 +161,7 @@ def summarize(frame: Frame) -> str:
     if frame.off_truth:
         lines.append(OFF_TRUTH)
     elif truth is not None and truth.column.truth and truth.column.truth.unknown:
-        lines.append(UNKNOWN.format(escape(", ".join(truth.column.truth.unknown))))
+        lines.append(OF_TRUTH.format(escape(", ".join(truth.column.truth.unknown))))
     return "<br>".join(lines)
 
 

@@ -78,7 +78,7 @@ class Teaching:
             MOTIONS,
             initial_value=MOTIONS[1],
             visible=False,
-            hint="pushes to simulate; more of them take longer",
+            hint="how many pushes are simulated: with more it learns more, and takes longer",
         )
         self._start = gui.add_button("Teach this shape", visible=False, hint=OFFER)
         self._start.on_click(serialized(self._teach))

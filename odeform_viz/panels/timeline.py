@@ -8,7 +8,7 @@ import numpy as np
 from odeform.schema import Window
 from odeform_viz.view import Curves, shown_until
 
-__all__ = ["Marks", "moment_css", "timeline_html"]
+__all__ = ["Marks", "moment_css", "playing_css", "timeline_html"]
 
 WIDTH, HEIGHT = 1000, 32  # units of the drawing
 ICONS = {
@@ -30,11 +30,12 @@ class Marks:
 
 
 def timeline_html(
-    window: Window, slider: str, marks: Marks | None, playing: bool, speed: str, loop: bool, known: str = "trained"
+    window: Window, slider: str, marks: Marks | None, speed: str, loop: bool, known: str = "trained"
 ) -> str:
     """Buttons that press hot keys, and the track, which moves the slider of that id; `known` says what ends with the
     window."""
-    play = _button("K", _icon("pause" if playing else "play"), "pause" if playing else "play")
+    both = "".join(f'<span class="odeform-to-{name}">{_icon(name)}</span>' for name in ("play", "pause"))
+    play = _button("K", both, "play or pause")
     steps = (
         _button("0", _icon("0"), "go to the start", "wide")
         + _button("J", _icon("J"), "previous frame", "fine")
@@ -58,6 +59,11 @@ def moment_css(window: Window, time: float) -> str:
         f"<style>.odeform-track i{{left:{100.0 * min(max(share, 0.0), 1.0):.2f}%}}"
         f'.odeform-moment::after{{content:"{time:.3f} s"}}</style>'
     )
+
+
+def playing_css(playing: bool) -> str:
+    """A style that shows what the button of playing does next; sent instead of the timeline."""
+    return f"<style>.odeform-to-{'play' if playing else 'pause'}{{display:none}}</style>"
 
 
 def _button(key: str, content: str, title: str, narrow: str = "") -> str:

@@ -55,13 +55,16 @@ def entry_label(entry: Entry, schema: Schema) -> str:
 
 
 def physics_difference(trained: Mapping[str, float], simulated: Mapping[str, float]) -> str:
-    """The constants in which the training data and the simulator differ, in words; empty if in none."""
-    names = [name for name in {**trained, **simulated} if trained.get(name) != simulated.get(name)]
+    """The constants of the simulator in which the training data differ, in words; empty if they differ in none.
 
-    def value(physics: Mapping[str, float], name: str) -> str:
-        return constant_text(name, physics[name]) if name in physics else "none"
+    Those that act in the training data only, such as the mass of a sphere, are not of the motion that is simulated.
+    """
+    names = [name for name, value in simulated.items() if trained.get(name) != value]
 
-    return ", ".join(f"{value(simulated, name)} (trained on {value(trained, name)})" for name in names)
+    def known(name: str) -> str:
+        return f"trained with {constant_text(name, trained[name])}" if name in trained else "not known of the training"
+
+    return ", ".join(f"{constant_text(name, simulated[name])} ({known(name)})" for name in names)
 
 
 class TruthPanel(Panel):

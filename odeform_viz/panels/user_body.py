@@ -27,7 +27,10 @@ from odeform_viz.user_bodies import (
 
 __all__ = ["UserBodyPanel"]
 
-TRAINED = "The trained bodies. A mesh with any defects, or points or splats of a solid, can be pushed as well."
+TRAINED = (
+    "These are the bodies that the model was trained on. Another solid body can be loaded and pushed as well: a mesh, "
+    "which may have defects, points, or splats."
+)
 BREAK = "_\u200b"  # names of files are long, and the panel is narrow
 WORKING = (
     "**{}** is being filled with tetrahedra and laid on the floor. It takes five seconds on an idle machine, and "
@@ -80,7 +83,7 @@ class UserBodyPanel(Panel):
             self.close()
             args = (geometry, name, self._material.value())
             self._job = Job(make_user_body, args, lambda body: self._made(body, origin), self._failed)
-            self._working(WORKING.format(name))
+            self._working(WORKING.format(name.replace("_", BREAK)))
             self._job.start()
 
     def _remake(self) -> None:

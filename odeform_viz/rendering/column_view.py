@@ -125,7 +125,9 @@ class ColumnView:
         # invisible rotations are dropped, so that a body that falls without rotating sends a position only
         step = 0.5 * INVISIBLE / self._extent
         self._body.wxyz = np.round(vtf.SO3.from_matrix(frame.pose[:3, :3]).wxyz / step) * step
-        self._body.position = frame.pose[:3, 3] + self._shift
+        # a tenth of that for the position: what stays is nothing on the wire, and a slow body still moves evenly
+        fine = 0.1 * INVISIBLE
+        self._body.position = np.round((frame.pose[:3, 3] + self._shift) / fine) * fine
         if self._shadow is not None:
             self._shadow.show(self.centre(frame))
         points = self._deformed(frame, options.exaggeration)

@@ -34,7 +34,7 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
 
 
 def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math.inf) -> Box:
-    """The box of the body within the trained window, of what acts on it, and of the middle of obstacles.
+    """The box of the body within the trained window, of what acts on it, and of the obstacles that it meets.
 
     Where it goes along the floor counts if it `travels` through the view, and not if the view follows it, as it does
     where the centre is more than `most` m above its lowest.
@@ -54,7 +54,7 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
     if acting is not None and _flies(shown):
         acting = acting + centres[0] - true[0]  # the arrow of a velocity goes with the body
     parts = [turned.reshape(-1, 3)] if acting is None else [turned.reshape(-1, 3), acting]
-    parts += [obstacle.mesh.points * [1.0, 0.0, 1.0] for obstacle in obstacles_of(shown.motion)]
+    parts += [obstacle.mesh.points for obstacle in obstacles_of(shown.motion)]
     if meets_twin(shown.motion.schema.scene):
         parts.append(_twin(shown))
     return _seen(np.concatenate(parts), axes)

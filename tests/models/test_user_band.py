@@ -77,7 +77,9 @@ def test_coverage_is_measured_on_shapes_that_are_left_out_in_turn() -> None:
 
 def test_a_band_says_of_how_many_shapes_it_is() -> None:
     band = replace(calibrated_shape_band(shapes(11, 0), TIMES), covered=0.91)
-    assert band.describe() == "as measured on 11 other unseen shapes, of which the 90 % band covers 91 % when left out"
+    assert band.describe() == (
+        "as measured on 11 other shapes that were not trained, where the limit for 9 of 10 cases held in 91 %"
+    )
     assert ShapeBand.from_json(band.to_json()) == band
 
 

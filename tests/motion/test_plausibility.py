@@ -105,7 +105,7 @@ def test_impossible_deformations_stop_it() -> None:
     wild, _ = plausibility(deformation=lambda t: np.where(t > 0.6, 1.4, 1.2))
     stop = wild.stop_at(0.9)
     assert stop is not None
-    assert (stop.time, stop.reason) == (pytest.approx(0.6, abs=2e-5), "it deforms more than the body can")
+    assert (stop.time, stop.reason) == (pytest.approx(0.6, abs=2e-5), "it deforms more than such a body can")
 
 
 def test_energy_from_nowhere_stops_it() -> None:
@@ -185,7 +185,7 @@ def test_mechanics_that_deforms_too_much_goes_on_and_says_so() -> None:
     times = np.array([1.1, 1.25, 1.29, 1.31])
     assert np.array_equal(check.clamped(times), times)
     stop = check.stop_at(1.25)
-    assert str(stop) == "limited in its deformation at t = 1.250 s: it deforms more than the body can"
+    assert str(stop) == "limited in its deformation at t = 1.250 s: it deforms more than such a body can"
     assert check.stop_at(1.31) is None
     first = check.first_stop(1.5)
     assert first is not None

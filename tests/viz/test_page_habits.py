@@ -83,6 +83,17 @@ def test_what_is_typed_stays_while_the_page_plays(dark: Tab) -> None:
     assert until(lambda: dark.slider("time (s)").get_attribute("aria-valuenow") == "0.25")
 
 
+def test_keys_after_a_number_are_hot_keys(dark: Tab) -> None:
+    box, speed = dark.row("mass (kg)", "input[@inputmode='decimal']"), dark.app.clock.speed
+    box.fill("")
+    box.press_sequentially("0.75")
+    box.press("Enter")
+    assert until(lambda: _mass(dark) == 0.75 and dark.page.evaluate("document.activeElement === document.body"))
+    dark.page.keyboard.press("s")
+    assert until(lambda: dark.app.clock.speed != speed)
+    assert box.input_value() == "0.75"
+
+
 def test_a_number_without_a_slider_is_refused_in_words_too(dark: Tab) -> None:
     dark.choose("quality", "time budget")
     box = dark.row("at most (ms)", "input[@inputmode='decimal']")

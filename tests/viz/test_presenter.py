@@ -13,7 +13,7 @@ from odeform.errors import InputError
 from odeform.motion.recorded import RecordedMotion
 from odeform_viz import session as session_module
 from odeform_viz.columns import Column, Columns
-from odeform_viz.presenter import SETTLE, TICK, Presenter
+from odeform_viz.presenter import DESCRIBE, SETTLE, TICK, Presenter
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.session import Session
 from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest
@@ -110,6 +110,35 @@ def test_the_solver_error_is_left_until_the_view_has_settled(loop: Loop) -> None
 def test_while_playing_the_next_frame_is_due_after_a_tick(loop: Loop) -> None:
     loop.clock.play()
     assert loop.serve() == TICK
+
+
+def test_a_long_first_description_does_not_hold_up_those_of_later_moments(
+    loop: Loop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall, took = [0.0], [0.9]
+    monkeypatch.setattr("odeform_viz.presenter.time.monotonic", lambda: wall[0])
+    described = loop.describe
+
+    def describe(description: Description) -> None:
+        described(description)
+        wall[0] += took[0]
+
+    loop.describe = describe  # type: ignore[method-assign]
+    for _ in range(4):
+        loop.serve()  # until the motion is described completely
+    took[0] = 0.0
+    wall[0] += 1.5 * DESCRIBE
+    loop.ask(time=0.3)
+    loop.serve()
+    assert "describe" in loop.kinds
+    took[0] = 0.9
+    wall[0] += 1.5 * DESCRIBE
+    loop.ask(time=0.31)
+    loop.serve()
+    wall[0] += 1.5 * DESCRIBE
+    loop.ask(time=0.32)
+    loop.serve()
+    assert "describe" not in loop.kinds, "one that takes long each time is rare"
 
 
 def test_a_newer_request_cancels_the_one_being_computed(loop: Loop, models: tuple[StubPredictor, ...]) -> None:

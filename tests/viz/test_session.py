@@ -189,6 +189,8 @@ def test_an_error_above_the_expected_one_is_remarked_and_a_large_one_is_not_reli
         text = summarize(replace(frame, columns=(replace(shown, error=error),)))
         assert "error now: " in text
         assert ("above what is expected" in text) == remarked
+    huge = Error(np.full(len(shown.column.geometry.points), 1e-3), 2e3 / DISTANCE, 2e3 / DISTANCE)
+    assert "error now: 2000 mm" in summarize(replace(frame, columns=(replace(shown, error=huge),)))
     late = session.frame(replace(view_request, time=2.0 * session.schema.window.stop))
     assert (badge_of(late).level, badge_of(late).text) == ("unknown", "not reliable")
 

@@ -70,10 +70,10 @@ class ShapeBand:
         return scale * profile * np.maximum(times / self.times[-1], 1.0)[:, None]
 
     def describe(self) -> str:
-        """Says what it rests on, as in "as measured on 30 other unseen shapes"."""
+        """Says what it rests on, as in "as measured on 30 other shapes that were not trained"."""
         count = f"{self.shapes} " if self.shapes else ""
-        covers = f", of which the 90 % band covers {100.0 * self.covered:.0f} % when left out" if self.covered else ""
-        return f"as measured on {count}other unseen shapes{covers}"
+        held = f", where the limit for 9 of 10 cases held in {100.0 * self.covered:.0f} %" if self.covered else ""
+        return f"as measured on {count}other shapes that were not trained{held}"
 
     def to_json(self) -> dict[str, Any]:
         """Returns plain values."""

@@ -40,8 +40,9 @@ RESOLUTIONS = (SEGMENTS, 8, 5)
 MATERIAL = Material(young=0.13e6, poisson=0.3, viscosity=19.0, friction=0.5, contact_time=0.002)
 
 NOTES = (
-    "The wall is 0.29 of the radius or more: too thick for thin-shell theory, bending and stretching follow "
-    "E h^3 / (12 (1 - nu^2)) and E h by definition of the scene.",
+    "The ball is hollow. Its wall is 0.29 of the radius or thicker, too thick for the theory of thin shells, but the "
+    "scene defines its stiffness by that theory: E h³ / (12 (1 - ν²)) in bending and E h in stretching, for Young's "
+    "modulus E, Poisson's ratio ν and thickness h.",
     "The wall loses energy by a viscosity that does not depend on its stiffness, so that mass and bending stiffness "
     "have effects of their own.",
 )
@@ -65,7 +66,7 @@ def mass(low: float, high: float, default: float) -> Parameter:
 
 def bending(high: float) -> Parameter:
     """Returns the parameter `bending`, up to `high` N m."""
-    return Parameter("bending", "N m", 0.3, high, 0.6, scale="log", description="bending stiffness EI of its wall")
+    return Parameter("bending", "N m", 0.3, high, 0.6, scale="log", description="bending stiffness of its wall")
 
 
 def sphere(segments: int = SEGMENTS) -> Mesh:

@@ -118,5 +118,5 @@ def _unit(extent: float, scale: float, like: str) -> str:
 
 
 def _described(material: SoftMaterial, chosen: str) -> str:
-    figures = f"{1e-3 * material.young:g} kPa and {material.density:g} kg/m^3"
-    return f"{chosen} ({figures}), the softest material under which it stands" if chosen else figures
+    figures = f"{1e-3 * material.young:g} kPa and {material.density:g} kg/m³"
+    return f"{chosen} ({figures}), the softest material with which it stands" if chosen else figures

@@ -53,7 +53,7 @@ SCHEMA = Schema(
     window=Window(0.0, 0.19, 100.0),
     objects=OBJECTS,
     notes=(
-        "The body rests on the floor. A rigid sphere (radius 20 mm, 20 g, weightless) touches it at the contact, is "
+        "The body rests on the floor. A rigid sphere of 20 mm radius and 20 g, not pulled by gravity, touches it, is "
         "driven by the constant force along its direction for 40 ms, and is then gone.",
         "Contacts lie on the surface of the settled body, forces within 45 degrees of the inward normal.",
     ),

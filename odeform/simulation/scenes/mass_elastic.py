@@ -38,7 +38,7 @@ SCHEMA = Schema(
     impact=(0.25, 0.75),
     notes=(
         *NOTES,
-        "A sequence ends when the RMS speed has been below 1 mm/s for 0.1 s; at later times the ball lies as it was.",
+        "A sequence ends when the RMS speed has been below 1 mm/s for 0.1 s; later the ball lies as it lay then.",
     ),
 )
 

@@ -107,7 +107,7 @@ def test_a_mesh_becomes_a_solid_of_its_size():
     placed = placed_object(mesh_of(shape), "ring")
     item = placed.item
     assert item.material == CHOICE["plush"]
-    assert placed.material.startswith("plush (12 kPa and 50 kg/m^3), the softest")
+    assert placed.material.startswith("plush (12 kPa and 50 kg/m³), the softest")
     assert item.name == "ring"
     assert np.ptp(item.settled, axis=0) == pytest.approx([0.17, 0.17, 0.05], abs=0.004)
     assert shape_of(item.rest_mesh()).is_watertight

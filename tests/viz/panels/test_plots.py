@@ -135,7 +135,7 @@ def test_title_status_and_legend_say_the_same_at_any_moment(drop: Predictor, tim
     assert band is not None
     assert f"90 % below {band[0, 1]:.2f} mm" in status
     assert f"90 %: {band[0, 1]:.2f} mm" in legend
-    assert "9 of 10 stay below it throughout; by 50 that chose nothing" in status
+    assert "50 motions that nothing was fitted to; 9 of 10 stay below it" in status
 
 
 def test_a_turn_is_counted_past_half_and_whole_turns(kick: Predictor) -> None:

@@ -59,7 +59,7 @@ def test_no_figure_of_the_trained_body_is_shown_for_another_shape(kick: Predicto
     assert "90 %" not in said
     assert "shape not trained" in summarize(frame)
     assert badge_of(frame).level == "unknown"
-    assert "error not known" in badge_of(frame).expected
+    assert "no error estimate" in badge_of(frame).expected
     assert "shape not trained" in title_of(column, 1e3)
 
 
@@ -81,7 +81,7 @@ def test_the_warning_gives_the_distance_and_is_empty_without_a_reason() -> None:
     assert shape_warning([None, same]) == ""
     text = shape_warning([near, same, far, None])
     assert "on average 71 mm" in text
-    assert "At most 128 mm" in text
+    assert "The largest distance is 128 mm" in text
 
 
 def test_it_is_there_before_a_frame_of_the_shape_and_goes_with_it(stubbed: tuple[App, LoopbackClient]) -> None:

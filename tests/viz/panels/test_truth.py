@@ -166,10 +166,16 @@ def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve:
     made = kick.checkpoint.provenance
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
     _, client = serve(Column("odeform", load_model(other), kick.rest))
-    assert "Young's modulus 130 kPa (trained on Young's modulus 170 kPa)" in client.text()
+    assert "Young's modulus 130 kPa (trained with Young's modulus 170 kPa)" in client.text()
     trained_with = load("mass-elastic").checkpoint.provenance["fixed"]
     assert physics_difference(trained_with, open_dataset("mass-elastic").fixed) == ""
-    assert physics_difference({"a": 1.0}, {"b": 2.0}) == "none (trained on a 1), b 2 (trained on none)"
+    assert physics_difference({"b": 1.0}, {"b": 2.0}) == "b 2 (trained with b 1)"
+    assert physics_difference({}, {"b": 2.0}) == "b 2 (not known of the training)"
+
+
+def test_constants_of_the_training_that_do_not_act_here_are_not_remarked() -> None:
+    sphere = {"gravity_m_s2": 9.81, "projectile_mass_kg": 0.02}
+    assert physics_difference(sphere, {"gravity_m_s2": 9.81}) == ""
 
 
 def test_errors_are_painted_and_follow_the_key(dropped: View) -> None:

@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 import viser
+from test_framing import project
 
 import odeform
 from odeform.models.base import Predictor
 from odeform_viz.columns import Column, Columns
-from odeform_viz.rendering.framing import Axes, free_area
+from odeform_viz.obstacles import obstacles_of
+from odeform_viz.rendering.framing import Axes, Viewport, free_area
 from odeform_viz.rendering.outline import RISE, ceiling_of, outline_of
 from odeform_viz.rendering.scene import SceneView
 from odeform_viz.session import Session
@@ -45,6 +47,18 @@ def test_a_fall_is_followed_down_to_what_is_framed(server: viser.ViserServer, ti
     assert centre[2] + view._stage.position[2] == pytest.approx(min(centre[2], ceiling), abs=1e-3)
     view.publish(frame, DisplayOptions(follow=False), None)
     assert view._stage.position == pytest.approx(np.zeros(3))
+
+
+@pytest.mark.parametrize("viewport", [(1280, 760), (1440, 900), (390, 844)])
+@pytest.mark.parametrize("load", ["wall", "step", "slope"])
+def test_panels_cover_no_part_of_an_obstacle(server: viser.ViserServer, load: str, viewport: Viewport) -> None:
+    frame, view = shown(odeform.load(f"contact-force:{load}"), 0.0), SceneView(server, 0.2, lambda: None)
+    view.publish(frame, DisplayOptions(viewport=viewport), None)
+    (obstacle,) = obstacles_of(frame.columns[0].motion)
+    pixels = project(obstacle.mesh.points, view._framing.camera(viewport), viewport)
+    left, top, right, bottom = free_area(viewport)
+    assert (pixels >= (left, top)).all()
+    assert (pixels <= (right, bottom)).all()
 
 
 def test_the_whole_height_is_framed_where_nothing_is_followed() -> None:
