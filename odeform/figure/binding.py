@@ -46,7 +46,7 @@ class Binding:
     """(3, 3, n): those at rest, canonical; of those that `slopes` leaves out, the last stays their normal."""
 
     def of(self, kept: Ints) -> "Binding":
-        """Returns that of the points `kept` (n,); nodes stay."""
+        """Returns that of the points `kept` (S,); nodes stay."""
         return replace(self, near=self.near[kept], weights=self.weights[kept])
 
     def carried(self, moved: Float[np.ndarray, "times nodes 3"]) -> Floats:

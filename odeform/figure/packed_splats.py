@@ -56,7 +56,7 @@ def splat_bytes(degree: int) -> int:
 
 
 def packed(splats: GaussianSplats, degree: int, kept: Ints) -> PackedSplats:
-    """Packs the splats `kept` (n,), at least one, with harmonics up to `degree` at most."""
+    """Packs the splats `kept` (S,), at least one, with harmonics up to `degree` at most."""
     points = np.asarray(splats.points[kept], dtype=float)
     sizes, turns = axes_from_covariances(splats.covariances[kept])
     logs = np.log(np.maximum(sizes, THINNEST))
