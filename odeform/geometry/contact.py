@@ -4,12 +4,13 @@ import math
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
+import igl
 import numpy as np
 import trimesh
 
 from odeform.errors import InputError
 from odeform.geometry.normals import vertex_normals
-from odeform.types import Faces, Floats, Ints, Mesh, Perpoint, Points, Vector
+from odeform.types import Faces, Floats, Mesh, Points, Vector
 
 __all__ = [
     "CONE",
@@ -53,15 +54,16 @@ class _Surface:
     """Holds what all searches of nearest points on a mesh need."""
 
     def __init__(self, mesh: Mesh) -> None:
-        points = np.asarray(mesh.points, dtype=float)
-        self.normals = vertex_normals(points, mesh.faces)
-        self.corners = points[mesh.faces]
-        sides = self.corners - np.roll(self.corners, 1, axis=1)
-        self.longest = float(np.linalg.norm(sides, axis=-1).max())
+        self.points = np.ascontiguousarray(mesh.points, dtype=float)
+        self.faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+        self.normals = vertex_normals(self.points, mesh.faces)
+        self._tree = igl.AABB()
+        self._tree.init(self.points, self.faces)
 
-    def around(self, distances: Perpoint, faces: Faces, radius: float) -> Ints:
-        """Faces that may be within `radius` m of a point, from the distances (N,) of the vertices in m."""
-        return np.flatnonzero((distances <= radius + self.longest)[faces].any(axis=1))
+    def nearest(self, point: Floats) -> tuple[float, int, Vector]:
+        """The distance of a point (3,) m from the surface in m, the face that is nearest to it, and where that is."""
+        squares, faces, feet = self._tree.squared_distance(self.points, self.faces, point[None])
+        return math.sqrt(squares[0]), int(faces[0]), feet[0]
 
 
 _surfaces: WeakKeyDictionary[Mesh, _Surface] = WeakKeyDictionary()
@@ -77,7 +79,7 @@ def _surface_of(mesh: Mesh) -> _Surface:
 def surface_point(mesh: Mesh, face: int, barycentric: Floats, distance: float = 0.0) -> SurfacePoint:
     """Returns the point of a face with barycentric coordinates `barycentric` (3,)."""
     surface = _surface_of(mesh)
-    corners = surface.corners[face]
+    corners = surface.points[surface.faces[face]]
     normal = np.asarray(barycentric) @ surface.normals[mesh.faces[face]]
     size = float(np.linalg.norm(normal))
     if size < 1e-9:
@@ -89,16 +91,11 @@ def surface_point(mesh: Mesh, face: int, barycentric: Floats, distance: float = 
 
 def nearest_on(mesh: Mesh, point: Floats) -> SurfacePoint:
     """The point of a mesh that is nearest to `point` (3,) m."""
-    surface, point = _surface_of(mesh), np.asarray(point, dtype=float)
-    distances = np.linalg.norm(mesh.points - point, axis=1)
-    faces = surface.around(distances, mesh.faces, float(distances.min()))  # no other can be as near
-    corners = surface.corners[faces]
-    feet = trimesh.triangles.closest_point(corners, np.broadcast_to(point, (len(corners), 3)))
-    away = ((feet - point) ** 2).sum(axis=1)
-    near = int(away.argmin())
-    barycentric = trimesh.triangles.points_to_barycentric(corners[near : near + 1], feet[near : near + 1])[0]
+    surface = _surface_of(mesh)
+    distance, face, foot = surface.nearest(np.asarray(point, dtype=float))
+    barycentric = trimesh.triangles.points_to_barycentric(surface.points[surface.faces[face]][None], foot[None])[0]
     barycentric = barycentric if np.isfinite(barycentric).all() else np.full(3, 1.0 / 3.0)
-    return surface_point(mesh, int(faces[near]), barycentric, float(np.sqrt(away[near])))
+    return surface_point(mesh, face, barycentric, distance)
 
 
 def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
@@ -107,16 +104,10 @@ def touching_centre(mesh: Mesh, contact: SurfacePoint) -> Vector | None:
     The centre lies on the outward normal, at the distance at which the sphere touches the faces: its radius on flat
     and convex parts. It does not fit where another part of the surface or the floor z = 0 is in its way.
     """
-    surface, radius = _surface_of(mesh), RADIUS + CREVICE
-    distances = np.linalg.norm(mesh.points - contact.point, axis=1)
-    corners = surface.corners[surface.around(distances, mesh.faces, 2.0 * radius)]
-    height = RADIUS
+    surface, height = _surface_of(mesh), RADIUS
     for _ in range(20):
         centre = contact.point + height * contact.normal
-        feet = trimesh.triangles.closest_point(corners, np.broadcast_to(centre, (len(corners), 3)))
-        away = np.linalg.norm(feet - centre, axis=1)
-        gap = RADIUS - float(away.min())
-        corners = corners[away <= away.min() + 2.0 * CREVICE]  # it only moves outward, by less than a crevice
+        gap = RADIUS - surface.nearest(centre)[0]
         height += gap
         if height > RADIUS + CREVICE or centre[2] < RADIUS:
             return None

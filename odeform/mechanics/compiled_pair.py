@@ -10,11 +10,12 @@ import numpy as np
 from numpy import ndarray
 
 from odeform.compiling import compiled_with
+from odeform.mechanics import compiled_algebra
 from odeform.mechanics import compiled_push as one_body
+from odeform.mechanics.compiled_algebra import add_squares, room, solve
 from odeform.mechanics.compiled_push import (
     MARGIN,
     SLIP,
-    _along,
     _bent,
     _contacts,
     _copy,
@@ -25,17 +26,18 @@ from odeform.mechanics.compiled_push import (
     _moved,
     _moves,
     _near,
+    _press,
+    _relative,
     _resist,
     _second_order,
     _slope,
-    _solve,
     _turn,
     _turned,
 )
 
 __all__ = ["Between", "advance_pair"]
 
-compiled = compiled_with(__file__, one_body.__file__)
+compiled = compiled_with(__file__, one_body.__file__, compiled_algebra.__file__)
 
 
 class Between(NamedTuple):
@@ -235,7 +237,7 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
 @no_type_check
 def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
     """The states of both after one step of first order; false where it cannot be solved for."""
-    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _ = work
+    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _, own, common = work
     width = 6 + size
     v, momentum, rate, right = np.empty(2 * width), np.empty(2 * width), np.empty(2 * width), np.empty(2 * width)
     for b in range(2):
@@ -244,7 +246,7 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
         _free(c, b, states[b], size, False, end, v[some], momentum[some], rate[some])
     for k in range(2 * width):
         momentum[k] += step * rate[k]
-    time, weighted = step + c.floor_damping, np.empty((3 * count, 2 * width))
+    time, none = step + c.floor_damping, (np.empty((0, width)), np.empty(0))
     for _ in range(2):
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
@@ -256,33 +258,24 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
             _resist(
-                c, b, step, v[some], chosen[b], floors[b], floors[b], jacobian[b], gaps[b], matrix[some, some],
-                right[some],
+                c, b, step, v[some], chosen[b], floors[b], floors[b], jacobian[b], gaps[b], none[0], none[1],
+                own, matrix[some, some], right[some],
             )  # fmt: skip
         pressed = 0
         for j in range(count):
             n, t0, t1, i = rows[j, 0], rows[j, 1], rows[j, 2], met[j]
-            r0, r1, r2 = _along(n, v), _along(t0, v), _along(t1, v)
+            r0, r1, r2 = _relative(n, t0, t1, v)
             force = s.stiffness[i] * (-distances[j] - time * r0)
             if force <= 0.0 or distances[j] + step * r0 > 0.0:
                 continue
             active, limit = step * s.stiffness[i], c.floor_friction * force
             drag = step * limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / s.grip[i]) ** 2 + SLIP * SLIP)
-            normal, across, impulse = np.sqrt(time * active), np.sqrt(drag), -active * distances[j]
-            for k in range(2 * width):
-                right[k] += impulse * n[k]
-                weighted[pressed, k] = normal * n[k]
-                weighted[pressed + 1, k], weighted[pressed + 2, k] = across * t0[k], across * t1[k]
-            pressed += 3
+            pressed = _press(n, t0, t1, time * active, drag, -active * distances[j], common, pressed, right)
         if pressed:
-            # one product: contact by contact it takes several times as long
-            square = np.dot(weighted[:pressed].T, weighted[:pressed])
-            for i in range(2 * width):
-                for k in range(i + 1):
-                    matrix[i, k] += square[i, k]
-            good = _solve(matrix, right)
+            add_squares(common, pressed, matrix)
+            good = solve(matrix, right)
         else:  # each by itself, which takes a quarter of the time
-            good = _solve(matrix[:width, :width], right[:width]) and _solve(matrix[width:, width:], right[width:])
+            good = solve(matrix[:width, :width], right[:width]) and solve(matrix[width:, width:], right[width:])
         if not good:
             return False
         _copy(right, v)
@@ -309,6 +302,8 @@ def _work(c):
         np.empty((2, state)),
         np.empty((2 * width, 2 * width)),
         np.empty(2, np.int64),
+        room(width, 3 * most),
+        room(2 * width, 6 * most),
     )
 
 
@@ -317,7 +312,7 @@ def _work(c):
 def advance_pair(c, s, time, states, step, out, slopes):
     """States (2, 20 + 2 K) of both after a step of `step` s, slopes there; returns the error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors = work = _work(c)
+    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors, _, _ = work = _work(c)
     for b in range(2):
         floors[b], _ = _near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
     first, count = _met(c, s, states, size, step, met, distances)

@@ -2,14 +2,16 @@
 
 The formulas are those of the NumPy code, which is the reference and says what they mean; the tests compare both to
 rounding. Loops in place of arrays save what leads there: the overhead of some hundred small array operations a step.
-All of it is in one file: Numba's cache of a function does not notice that one in another file has changed.
 """
 
 from typing import NamedTuple, no_type_check
 
-import numba
 import numpy as np
 from numpy import ndarray
+
+from odeform.compiling import compiled_with
+from odeform.mechanics import compiled_algebra
+from odeform.mechanics.compiled_algebra import add_squares, room, solve
 
 __all__ = ["Constants", "advance_all", "follow", "slope_of"]
 
@@ -21,8 +23,7 @@ SHORTEST = 1e-9
 SMALL = 1e-18
 LONGEST = 0.25
 
-# sums may be reordered, so that they use all lanes of a vector; what is not finite stays so
-compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract"})
+compiled = compiled_with(__file__, compiled_algebra.__file__)
 
 
 class Constants(NamedTuple):
@@ -352,43 +353,12 @@ def _hold(c, b, z, size, jacobian, away):
 
 @compiled
 @no_type_check
-def _solve(matrix, right):
-    """Overwrite `right` with the solution for the lower half of a positive matrix, which becomes its Cholesky factor;
-    false where it is not positive."""
-    count = len(right)
-    for j in range(count):
-        row = matrix[j]
-        for i in range(j + 1):
-            other = matrix[i]
-            total = row[i]
-            for k in range(i):
-                total -= row[k] * other[k]
-            if i < j:
-                row[i] = total / other[i]
-            elif total > 0.0:
-                row[j] = np.sqrt(total)
-            else:
-                return False
-        total = right[j]
-        for k in range(j):
-            total -= row[k] * right[k]
-        right[j] = total / row[j]
-    for j in range(count - 1, -1, -1):
-        right[j] /= matrix[j, j]
-        value, row = right[j], matrix[j]
-        for k in range(j):
-            right[k] -= value * row[k]
-    return True
-
-
-@compiled
-@no_type_check
 def _solve_apart(matrix, right):
-    """What `_solve` does, for a matrix of masses, in which only the inertia is more than a diagonal."""
+    """What `solve` does, for a matrix of masses, in which only the inertia is more than a diagonal."""
     for k in range(len(right)):
         if k < 3 or k > 5:
             right[k] /= matrix[k, k]
-    return _solve(matrix[3:6, 3:6], right[3:6])
+    return solve(matrix[3:6, 3:6], right[3:6])
 
 
 @compiled
@@ -499,12 +469,14 @@ def _along(row, v):
 
 @compiled
 @no_type_check
-def _add(row, weight, width, matrix):
-    """Adds the weighted product of a row of the Jacobian with itself to the lower half of a matrix."""
-    for i in range(width):
-        scaled, out = weight * row[i], matrix[i]
-        for k in range(i + 1):
-            out[k] += scaled * row[k]
+def _relative(n, s, t, v):
+    """The three rows of a contact times the velocities."""
+    r0 = r1 = r2 = 0.0
+    for k in range(len(v)):
+        r0 += n[k] * v[k]
+        r1 += s[k] * v[k]
+        r2 += t[k] * v[k]
+    return r0, r1, r2
 
 
 @compiled
@@ -517,30 +489,41 @@ def _drag(c, b, j, i, floor, force, r1, r2):
 
 @compiled
 @no_type_check
-def _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, matrix, right):
-    """Add the chosen contacts to the lower half of a matrix and to the momentum, at about these velocities."""
+def _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, springs, away, rows, matrix, right):
+    """Add the chosen contacts, and the springs that hold it, to the lower half of a matrix and to the momentum, at
+    about these velocities."""
+    added = len(away)
+    for j in range(added):
+        row, active = springs[j], step * c.hold_stiffness[b, j // 3]
+        rows.weights[j] = active * (step + c.hold_damping)
+        for k in range(len(right)):
+            rows.columns[k, j] = row[k]
+            right[k] -= active * away[j] * row[k]
     for j in range(count):
         n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
-        r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
+        r0, r1, r2 = _relative(n, s, t, v)
         time = step + (c.floor_damping if j < floor else c.push_damping)
         force = c.stiffness[b, i] * (-gaps[j] - time * r0)
         if force <= 0.0 or (j < floor and gaps[j] + (step + c.onset) * r0 > 0.0):
             continue
         active = step * c.stiffness[b, i]
         drag = step * _drag(c, b, j, i, floor, force, r1, r2)
-        _press(n, s, t, time * active, drag, -active * gaps[j], matrix, right)
+        added = _press(n, s, t, time * active, drag, -active * gaps[j], rows, added, right)
+    add_squares(rows, added, matrix)
 
 
 @compiled
 @no_type_check
-def _press(n, s, t, normal, drag, impulse, matrix, right):
-    """Add a contact with its three rows of the Jacobian to the lower half of a matrix and to the momentum."""
-    for i in range(len(right)):
-        a0, a1, a2 = normal * n[i], drag * s[i], drag * t[i]
-        right[i] += impulse * n[i]
-        row = matrix[i]
-        for k in range(i + 1):
-            row[k] += a0 * n[k] + a1 * s[k] + a2 * t[k]
+def _press(n, s, t, normal, drag, impulse, rows, added, right):
+    """Add the three rows of a contact to those that resist, and what it adds to the momentum; how many rows there
+    are then."""
+    columns, weights = rows.columns, rows.weights
+    weights[added], weights[added + 1], weights[added + 2] = normal, drag, drag
+    for k in range(len(right)):
+        column = columns[k]
+        column[added], column[added + 1], column[added + 2] = n[k], s[k], t[k]
+        right[k] += impulse * n[k]
+    return added + 3
 
 
 @compiled
@@ -567,7 +550,7 @@ def _moved(z, v, size, pushed, step, out):
 
 @compiled
 @no_type_check
-def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, springs, away, matrix, out):
+def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, gaps, springs, away, rows, matrix, out):
     """The state after one step of first order, which ends at a time; false where it cannot be solved for."""
     width = 6 + size + (1 if pushed else 0)
     v, momentum, rate, right = np.empty(width), np.empty(width), np.empty(width), np.empty(width)
@@ -580,13 +563,8 @@ def _implicit(c, b, z, size, pushed, step, end, chosen, floor, count, jacobian, 
     for _ in range(2 if touches else 1):
         _masses(c, b, size, pushed, step * (step + c.relaxation), matrix)
         _copy(momentum, right)
-        for j in range(len(away)):
-            row, active = springs[j], step * c.hold_stiffness[b, j // 3]
-            _add(row, active * (step + c.hold_damping), width, matrix)
-            for k in range(width):
-                right[k] -= active * away[j] * row[k]
-        _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, matrix, right)
-        if not (_solve(matrix, right) if touches else _solve_apart(matrix, right)):
+        _resist(c, b, step, v, chosen, floor, count, jacobian, gaps, springs, away, rows, matrix, right)
+        if not (solve(matrix, right) if touches else _solve_apart(matrix, right)):
             return False
         for k in range(width):
             v[k] = right[k]
@@ -636,7 +614,7 @@ def _second_order(c, size, pushed, whole, out):
 def _step(c, b, z, pushed, time, step, out, work):
     """The state after a step of second order from a time on; returns its error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, springs, away, whole, half, matrix = work
+    chosen, gaps, what, jacobian, springs, away, whole, half, rows, matrix = work
     floor, count = _near(c, b, z, size, pushed, step, chosen, gaps, what)
     good, begin = True, z
     # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
@@ -649,7 +627,23 @@ def _step(c, b, z, pushed, time, step, out, work):
             end = out
         last = time + (0.5 * step if part == 1 else step)
         good &= _implicit(
-            c, b, begin, size, pushed, length, last, chosen, floor, count, jacobian, gaps, springs, away, matrix, end
+            c,
+            b,
+            begin,
+            size,
+            pushed,
+            length,
+            last,
+            chosen,
+            floor,
+            count,
+            jacobian,
+            gaps,
+            springs,
+            away,
+            rows,
+            matrix,
+            end,
         )
         if part == 1:
             begin = half
@@ -696,6 +690,7 @@ def _work(c):
         np.empty(3 * c.hold_points.shape[2]),
         np.empty(state),
         np.empty(state),
+        room(width, 3 * (most + c.hold_points.shape[2])),
         np.empty((width, width)),
     )
 
@@ -775,7 +770,7 @@ def follow(c, b, control, times, states, slopes, rates, tried):
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, springs, away, _, _, matrix = _work(c)
+    chosen, gaps, what, jacobian, springs, away, _, _, _, matrix = _work(c)
     start = 13 + size
     for row in range(len(rows)):
         b, z, pushed = rows[row], states[row], times[row] < c.pulse
@@ -794,7 +789,7 @@ def slope_of(c, rows, times, states, out):
                 rate[k] -= pull * springs[j, k]
         for j in range(count):
             n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
-            r0, r1, r2 = _along(n, v), _along(s, v), _along(t, v)
+            r0, r1, r2 = _relative(n, s, t, v)
             force = c.stiffness[b, i] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
             if force <= 0.0 or (j < floor and gaps[j] + c.onset * r0 > 0.0):
                 continue
@@ -802,7 +797,7 @@ def slope_of(c, rows, times, states, out):
             for k in range(width):
                 rate[k] += force * n[k] - drag * (r1 * s[k] + r2 * t[k])
         _masses(c, b, size, pushed, 0.0, matrix)
-        if not _solve(matrix, rate):
+        if not solve(matrix, rate):
             for k in range(width):
                 rate[k] = np.nan
         _slope(z, z, size, pushed, 1.0, out[row])

@@ -17,6 +17,8 @@ __all__ = ["FRAMES", "ContactInputs", "contact_inputs", "has_contact"]
 FRAMES = ("body", "azimuth", "normal")
 """Axes of the body; turned about the vertical axis to the contact's normal; the normal and a horizontal tangent."""
 UP = np.array([0.0, 0.0, 1.0])
+ACROSS_UP = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+"""v -> UP x v, for rows."""
 VECTORS = ("contact", "force")
 STEEP = 1e-6  # length of a horizontal part that gives no direction
 
@@ -42,6 +44,10 @@ class ContactInputs:
         """Rotations and features in the frames asked for so far: several regressions ask for the same."""
         return {}
 
+    @cached_property
+    def _torque(self) -> Rows:
+        return np.cross(self.contact, self.force)
+
     def frames(self, frame: str) -> Rotations:
         """Computes (S, 3, 3) rotations from the axes of the body to those of one of `FRAMES`."""
         return self._in(frame)[0]
@@ -65,15 +71,15 @@ class ContactInputs:
             return np.broadcast_to(np.eye(3), (len(self.contact), 3, 3))
         if frame == "azimuth":
             along = _unit(self.normal * (1.0 - UP), np.array([1.0, 0.0, 0.0]))
-            return np.stack([along, np.cross(UP, along), np.broadcast_to(UP, along.shape)], axis=1)
-        across = _unit(np.cross(UP, self.normal), np.array([0.0, 1.0, 0.0]))
+            return np.stack([along, along @ ACROSS_UP, np.broadcast_to(UP, along.shape)], axis=1)
+        across = _unit(self.normal @ ACROSS_UP, np.array([0.0, 1.0, 0.0]))
         return np.stack([self.normal, across, np.cross(self.normal, across)], axis=1)
 
     def _features(self, frame: str, turn: Rotations) -> tuple[list[Floats], Rows]:
         if frame == "body":
             return [self.contact, self.force], self.force
         force = np.einsum("sij,sj->si", turn, self.force)
-        torque = np.einsum("sij,sj->si", turn, np.cross(self.contact, self.force))
+        torque = np.einsum("sij,sj->si", turn, self._torque)
         inward = (self.force * self.normal).sum(axis=1, keepdims=True)
         return [self.contact, self.normal, force, inward, torque], force
 

@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 
 from odeform.arrays import in_steps, row_steps
 from odeform.dataset.training_data import ROUNDING
-from odeform.models.contact.inputs import ContactInputs
+from odeform.models.contact.inputs import FRAMES, ContactInputs
 from odeform.models.kernels.likelihood import fit_kernel, ridge_of
 from odeform.models.kernels.regression import KernelRegression
 from odeform.models.residual import PARTS
@@ -76,9 +76,10 @@ class _Expert:
     regression: KernelRegression
     mean: Floats
 
-    def predict(self, inputs: ContactInputs, turned: bool) -> Floats:
-        """(R, M) outputs; with `turned`, three-vectors, carried from the expert's frame to the axes of the body."""
-        values = self.regression(self.scaling(inputs)) + self.mean
+    def predict(self, inputs: ContactInputs, turned: bool, scaled: Floats | None = None) -> Floats:
+        """(R, M) outputs; with `turned`, three-vectors, carried from the expert's frame to the axes of the body.
+        `scaled` are the inputs by its scaling, where they are known."""
+        values = self.regression(self.scaling(inputs) if scaled is None else scaled) + self.mean
         return _turned_back(values, inputs.frames(self.scaling.frame)) if turned else values
 
 
@@ -110,6 +111,8 @@ class ContactRegression:
         self._known = ContactInputs(*(arrays[f"gp.{name}"].astype(float) for name in INPUTS))
         self._frames = len(arrays["times"])
         self._modes = arrays["gp.modes"].astype(np.float32)  # read whole for each push, and stored with less
+        # of all experts in a frame, since these know the same motions
+        self._scalings = {frame: _Scaling.of(self._known, frame) for frame in FRAMES}
         blend = settings["blend"]
         self._experts = {
             part: [(weight, self._expert(arrays, part, index)) for index, weight in enumerate(blend[part]) if weight]
@@ -119,7 +122,7 @@ class ContactRegression:
     def _expert(self, arrays: Arrays, part: str, index: int) -> _Expert:
         """Reads the kernel of an expert and solves for its weights; older checkpoints hold them."""
         (frame, linear), name = EXPERTS[index], f"gp.{part}.{index}"
-        scaling, logs = _Scaling.of(self._known, frame), arrays[f"{name}.logs"].astype(float)
+        scaling, logs = self._scalings[frame], arrays[f"{name}.logs"].astype(float)
         ridge, x = ridge_of(logs, len(scaling.scale), scaling.places if linear else 0), scaling(self._known)
         if f"{name}.weights" in arrays:
             regression = KernelRegression(ridge.kernel, x, arrays[f"{name}.weights"].astype(float))
@@ -132,13 +135,13 @@ class ContactRegression:
 
     def predict(self, inputs: ContactInputs) -> Float[np.ndarray, "sequences times y"]:
         """Predicts the motions of S contacts."""
-        parts = []
+        parts, scaled = [], {frame: scaling(inputs) for frame, scaling in self._scalings.items()}
         for part, experts in self._experts.items():
             turned = part != "deformation"
             # all weights may be zero
             values = np.zeros((len(inputs.contact), 3 * self._frames if turned else len(self._modes)))
             for weight, expert in experts:
-                values += weight * expert.predict(inputs, turned)
+                values += weight * expert.predict(inputs, turned, scaled[expert.scaling.frame])
             flat = values if turned else (values.astype(np.float32) @ self._modes).astype(float)
             parts.append(flat.reshape(len(values), self._frames, -1))
         return np.concatenate(parts, axis=2)

@@ -5,15 +5,29 @@ The order p is the number of times that a function drawn from the Gaussian proce
 Matern (p + 1/2), a polynomial of degree p times an exponential.
 """
 
+from dataclasses import dataclass
 from functools import cache
 from math import factorial
 
 import numpy as np
 from jaxtyping import Float
 
-__all__ = ["gaussian", "matern", "matern_slope", "scaled_distance"]
+__all__ = ["Known", "gaussian", "matern", "matern_slope", "scaled_distance"]
 
 Inputs = Float[np.ndarray, "rows inputs"]
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Inputs with which many covariances are computed, divided by length scales, and their squared norms."""
+
+    values: Inputs
+    squares: Float[np.ndarray, " rows"]
+
+    @classmethod
+    def of(cls, values: Inputs) -> "Known":
+        """Of inputs (S, D)."""
+        return cls(values, (values**2).sum(axis=1))
 
 
 def gaussian(one: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[np.ndarray, "rows columns"]:
@@ -23,7 +37,7 @@ def gaussian(one: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[n
 
 
 def matern(
-    one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2
+    one: Inputs, other: Float[np.ndarray, "columns inputs"] | Known, order: int = 2
 ) -> Float[np.ndarray, "rows columns"]:
     """Kernel values; of order 2, (1 + r + r^2 / 3) exp(-r), where r is the scaled distance."""
     r = scaled_distance(one, other, order)
@@ -39,10 +53,11 @@ def matern_slope(difference: Inputs, order: int = 2) -> Inputs:
 
 
 def scaled_distance(
-    one: Inputs, other: Float[np.ndarray, "columns inputs"], order: int = 2
+    one: Inputs, other: Float[np.ndarray, "columns inputs"] | Known, order: int = 2
 ) -> Float[np.ndarray, "rows columns"]:
     """Returns sqrt(2 p + 1) times the Euclidean distance."""
-    squares = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2.0 * one @ other.T
+    known = other if isinstance(other, Known) else Known.of(other)
+    squares = (one**2).sum(axis=1)[:, None] + known.squares - 2.0 * one @ known.values.T
     return np.sqrt((2.0 * order + 1.0) * np.maximum(squares, 0.0))
 
 

@@ -1,11 +1,12 @@
 """Kernel regression: the one that all models use, whatever it is a function of."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from odeform.models.kernels.functions import gaussian, matern, matern_slope
+from odeform.models.kernels.functions import Known, gaussian, matern, matern_slope
 
 __all__ = ["Kernel", "KernelRegression", "LinearTerm"]
 
@@ -35,14 +36,29 @@ class Kernel:
 
     def __call__(self, x: Inputs, other: Float[np.ndarray, "columns inputs"]) -> Float[np.ndarray, "rows columns"]:
         """Covariances between two sets of inputs, in units of the signal."""
+        return self.with_known(x, *self.known(other))
+
+    def known(self, other: Inputs) -> tuple[Known, Known | None, Inputs]:
+        """What covariances with inputs (S, D) take: these by their scales, the places of the linear term by theirs, and
+        the forces."""
         size = len(self.scales)
-        one, two = x[:, :size] / self.scales, other[:, :size] / self.scales
-        out = gaussian(one, two) if self.order is None else matern(one, two, self.order)
+        places = None if self.linear is None else Known.of(self._places(other, self.linear))
+        return Known.of(other[:, :size] / self.scales), places, other[:, size:]
+
+    def with_known(self, x: Inputs, known: Known, places: Known | None, forces: Inputs) -> Float[np.ndarray, "rows s"]:
+        """Covariances of inputs (R, D) with `known` ones."""
+        size = len(self.scales)
+        one = x[:, :size] / self.scales
+        out = gaussian(one, known.values) if self.order is None else matern(one, known, self.order)
         if self.linear is not None:
-            places = len(self.linear.scales)
-            near = matern(x[:, :places] / self.linear.scales, other[:, :places] / self.linear.scales)
-            out = out + self.linear.variance * near * (x[:, size:] @ other[:, size:].T)
+            assert places is not None
+            near = matern(self._places(x, self.linear), places)
+            out = out + self.linear.variance * near * (x[:, size:] @ forces.T)
         return out
+
+    @staticmethod
+    def _places(x: Inputs, linear: LinearTerm) -> Inputs:
+        return x[:, : len(linear.scales)] / linear.scales
 
     def slopes(self, x: Float[np.ndarray, " inputs"], other: Inputs) -> Float[np.ndarray, "inputs rows"]:
         """Computes (D, S): derivatives of the covariances with S others by each input; Matern kernels without a linear
@@ -64,8 +80,12 @@ class KernelRegression:
 
     def __call__(self, x: Inputs) -> Float[np.ndarray, "rows outputs"]:
         """Evaluates the regression at inputs (R, D)."""
-        out = self.kernel(x, self.inputs) @ self.weights
+        out = self.kernel.with_known(x, *self._known) @ self.weights
         return out if self.trend is None else self.trend[0] + x @ self.trend[1:] + out
+
+    @cached_property
+    def _known(self) -> tuple[Known, Known | None, Inputs]:
+        return self.kernel.known(self.inputs)
 
     def jet(self, x: Float[np.ndarray, " inputs"]) -> Float[np.ndarray, "jet outputs"]:
         """Computes (1 + D, M) at one input (D,): the value, and its derivatives by each input."""
