@@ -62,7 +62,8 @@ class _Surface:
 
     def nearest(self, point: Floats) -> tuple[float, int, Vector]:
         """The distance of a point (3,) m from the surface in m, the face that is nearest to it, and where that is."""
-        squares, faces, feet = self._tree.squared_distance(self.points, self.faces, point[None])
+        found: Any = self._tree.squared_distance(self.points, self.faces, point[None])
+        squares, faces, feet = found
         return math.sqrt(squares[0]), int(faces[0]), feet[0]
 
 

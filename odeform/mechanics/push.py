@@ -113,11 +113,12 @@ def make_push(body: ReducedBody, soft: int, contacts: Vectors, centres: Vectors,
     rows = np.empty((batch, 6, samples, modes.shape[2]))
     points[..., :count], points[..., count:] = support.points.T, surface.points[near].swapaxes(1, 2)
     masses[:, :count], masses[:, count:] = support.masses, surface.masses[near]
+    single = modes.astype(surface.rows.dtype)
     for index in range(batch):
         for row, stand, touched in zip(rows[index], support.rows, surface.rows, strict=True):
             # one component after the other: what is gathered stays in the cache
             _fill(row[:count], stand, modes[index], soft)
-            _fill(row[count:], touched.take(near[index], axis=0), modes[index], soft)
+            _fill(row[count:], touched.take(near[index], axis=0), single[index], soft)
     return Push(modes, eigenvalues, count, points, rows, masses, centres, guides, strength)
 
 
@@ -169,7 +170,7 @@ def _directions(body: ReducedBody, soft: int, contacts: Vectors, around: Ints) -
     """(B, M, K) and (B, K): see `Push`. `around` (B, N) are the samples of the surface nearest to the contacts."""
     away = ((body.surface.points[around] - contacts[:, None]) ** 2).sum(axis=2)
     patches = body.surface.masses[around] * np.exp(-away / np.square(WIDTHS)[:, None, None])
-    patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1)
+    patches = (patches / patches.sum(axis=2, keepdims=True)).swapaxes(0, 1).astype(body.surface.rows.dtype)
     stiff, batch = body.eigenvalues[soft:], len(around)
     loads = np.empty((batch, len(stiff), 3, len(WIDTHS)))
     # from near to far; the nearest one is loaded wherever it is

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.models.kernels.functions import Known, gaussian, matern, matern_slope
+from odeform.types import Floats
 
 __all__ = ["Kernel", "KernelRegression", "LinearTerm"]
 
@@ -38,15 +39,17 @@ class Kernel:
         """Covariances between two sets of inputs, in units of the signal."""
         return self.with_known(x, *self.known(other))
 
-    def known(self, other: Inputs) -> tuple[Known, Known | None, Inputs]:
+    def known(self, other: Inputs) -> tuple[Known, Known | None, Floats]:
         """What covariances with inputs (S, D) take: these by their scales, the places of the linear term by theirs, and
         the forces."""
         size = len(self.scales)
         places = None if self.linear is None else Known.of(self._places(other, self.linear))
         return Known.of(other[:, :size] / self.scales), places, other[:, size:]
 
-    def with_known(self, x: Inputs, known: Known, places: Known | None, forces: Inputs) -> Float[np.ndarray, "rows s"]:
-        """Covariances of inputs (R, D) with `known` ones."""
+    def with_known(
+        self, x: Inputs, known: Known, places: Known | None, forces: Float[np.ndarray, "columns axes"]
+    ) -> Float[np.ndarray, "rows columns"]:
+        """Covariances (R, S) of inputs (R, D) with `known` ones."""
         size = len(self.scales)
         one = x[:, :size] / self.scales
         out = gaussian(one, known.values) if self.order is None else matern(one, known, self.order)
@@ -57,7 +60,7 @@ class Kernel:
         return out
 
     @staticmethod
-    def _places(x: Inputs, linear: LinearTerm) -> Inputs:
+    def _places(x: Inputs, linear: LinearTerm) -> Floats:
         return x[:, : len(linear.scales)] / linear.scales
 
     def slopes(self, x: Float[np.ndarray, " inputs"], other: Inputs) -> Float[np.ndarray, "inputs rows"]:
@@ -84,7 +87,7 @@ class KernelRegression:
         return out if self.trend is None else self.trend[0] + x @ self.trend[1:] + out
 
     @cached_property
-    def _known(self) -> tuple[Known, Known | None, Inputs]:
+    def _known(self) -> tuple[Known, Known | None, Floats]:
         return self.kernel.known(self.inputs)
 
     def jet(self, x: Float[np.ndarray, " inputs"]) -> Float[np.ndarray, "jet outputs"]:
