@@ -31,7 +31,7 @@ from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames, Mesh
 from odeform_figures.output import write_or_print
 
-__all__ = ["fit", "measured", "timed"]
+__all__ = ["fit", "measured", "relative_errors", "timed"]
 
 TIMED = ("throw", "wall", "step", "slope", "meet")
 RIGID = 1e6  # times its stiffness: a body that does not deform
@@ -84,7 +84,7 @@ def choose(data: str, checkpoint: str) -> None:
             trial = load_model(replace(known, config=_with_part(known.config, name, option)))
             model = _part(trial.under("kick"), name)
             evaluated = model.evaluate_basis(model.rest, 0.0)
-            found = [_relative(one, predicted(model, one, evaluated, len(one.times))) for one in impacts]
+            found = [relative_errors(one, predicted(model, one, evaluated, len(one.times))) for one in impacts]
             errors.append([row["first_120_ms"] for row in found])
         gain = np.subtract(*errors)
         falls = bool(len(gain) > 1 and gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)))
@@ -122,7 +122,7 @@ def _rival(predictor: Predictor, dataset: Dataset, split: str) -> dict[str, Any]
         for impact in impacts:
             motion = predictor.solve(parameters=impact.parameters)
             points = [np.asarray(motion.vertices(float(t)), float) for t in impact.times[impact.first :]]
-            rows.append(_relative(impact, np.stack(points)))
+            rows.append(relative_errors(impact, np.stack(points)))
         if rows:
             means = {key: round(float(np.mean([row[key] for row in rows])), 4) for key in rows[0]}
             out[name] = {"motions": len(rows), "model": means}
@@ -136,7 +136,7 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     rows: dict[str, Any] = {"motions": len(impacts)}
     for key, one in models.items():
         motions = [predicted(one, impact, evaluated, len(impact.times)) for impact in impacts]
-        each = [_relative(impact, points) for impact, points in zip(impacts, motions, strict=True)]
+        each = [relative_errors(impact, points) for impact, points in zip(impacts, motions, strict=True)]
         rows[key] = {k: round(float(np.mean([row[k] for row in each])), 4) for k in each[0]}
         deep = [_depths(one, impact, points) for impact, points in zip(impacts, motions, strict=True)]
         rows[key].update({k: round(max(row[k] for row in deep), 1) for k in deep[0]})
@@ -148,7 +148,9 @@ def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     return rows
 
 
-def _relative(impact: Impact, points: Frames) -> dict[str, float]:
+def relative_errors(impact: Impact, points: Frames) -> dict[str, float]:
+    """Errors of points (T, S, 3) m from the first contact of an impact on, relative to the displacement since then, and
+    how far place and orientation are off at the end."""
     truth = impact.vertices[impact.first :]
     square = ((points - truth) ** 2).sum(axis=2) @ impact.weights
     moved = ((truth - truth[0]) ** 2).sum(axis=2) @ impact.weights
