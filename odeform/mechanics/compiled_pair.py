@@ -10,34 +10,34 @@ import numpy as np
 from numpy import ndarray
 
 from odeform.compiling import compiled_with
-from odeform.mechanics import compiled_algebra
 from odeform.mechanics import compiled_push as one_body
 from odeform.mechanics.compiled_algebra import add_squares, room, solve
-from odeform.mechanics.compiled_push import (
+from odeform.mechanics.compiled_contacts import (
     MARGIN,
-    SLIP,
-    _bent,
-    _contacts,
-    _copy,
-    _free,
-    _keep,
-    _local,
-    _masses,
-    _moved,
-    _moves,
-    _near,
-    _press,
-    _relative,
-    _resist,
-    _second_order,
-    _slope,
-    _turn,
-    _turned,
+    bend,
+    copy,
+    find_near,
+    keep,
+    linearise,
+    move_along,
+    turn,
+    turn_sample,
 )
+from odeform.mechanics.compiled_forces import (
+    SLIP,
+    free_motion,
+    local_velocity,
+    move,
+    press,
+    relative_velocity,
+    resist,
+    set_masses,
+)
+from odeform.mechanics.compiled_push import second_order, slope_between
 
 __all__ = ["Between", "advance_pair"]
 
-compiled = compiled_with(__file__, one_body.__file__, compiled_algebra.__file__)
+compiled = compiled_with(__file__, one_body.__file__, *one_body.SOURCES)
 
 
 class Between(NamedTuple):
@@ -58,9 +58,9 @@ def _carry(c, b, z, size, i, motion, memo):
     known, where, turns = memo
     if not known[b, i]:
         known[b, i] = True
-        _turn(c.rows[b], i, z, size, motion)
-        square, once, twice = _bent(c.points[b], i, motion, where[b, i])
-        _turned(motion, square, once, twice, turns[b, i])
+        turn(c.rows[b], i, z, size, motion)
+        square, once, twice = bend(c.points[b], i, motion, where[b, i])
+        turn_sample(motion, square, once, twice, turns[b, i])
 
 
 @compiled
@@ -187,7 +187,7 @@ def _met(c, s, states, size, step, chosen, gaps):
             gap, _ = _inside(c, s, 1 - b, other, size, at, back, motion, memo, normal)
             gaps[i] = gap
             if gap < margin:
-                count = _keep(chosen, begin, count, c.most, gaps, i)
+                count = keep(chosen, begin, count, c.most, gaps, i)
         if b == 0:
             first = count
     return first, count
@@ -218,14 +218,14 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
                 axes[row, axis] = scale * half[row] * half[axis] - (sign if row == axis else 0.0)
             a0, a1, a2 = axes[row, 0], axes[row, 1], axes[row, 2]
             out = jacobian[j, row, b * width : (b + 1) * width]
-            _moves(
+            move_along(
                 z[3] * a0 + z[6] * a1 + z[9] * a2,
                 z[4] * a0 + z[7] * a1 + z[10] * a2,
                 z[5] * a0 + z[8] * a1 + z[11] * a2,
                 place, own, c.rows[b], i, size, out,
             )  # fmt: skip
             out = jacobian[j, row, (1 - b) * width : (2 - b) * width]
-            _moves(
+            move_along(
                 -(other[3] * a0 + other[6] * a1 + other[9] * a2),
                 -(other[4] * a0 + other[7] * a1 + other[10] * a2),
                 -(other[5] * a0 + other[8] * a1 + other[11] * a2),
@@ -242,35 +242,35 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
     v, momentum, rate, right = np.empty(2 * width), np.empty(2 * width), np.empty(2 * width), np.empty(2 * width)
     for b in range(2):
         some = slice(b * width, (b + 1) * width)
-        _local(states[b], size, v[some])
-        _free(c, b, states[b], size, False, end, v[some], momentum[some], rate[some])
+        local_velocity(states[b], size, v[some])
+        free_motion(c, b, states[b], size, False, end, v[some], momentum[some], rate[some])
     for k in range(2 * width):
         momentum[k] += step * rate[k]
     time, none = step + c.floor_damping, (np.empty((0, width)), np.empty(0))
     for _ in range(2):
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
-            _masses(c, b, size, False, step * (step + c.relaxation), matrix[some, some])
+            set_masses(c, b, size, False, step * (step + c.relaxation), matrix[some, some])
         for i in range(width, 2 * width):
             for k in range(width):
                 matrix[i, k] = 0.0
-        _copy(momentum, right)
+        copy(momentum, right)
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
-            _resist(
+            resist(
                 c, b, step, v[some], chosen[b], floors[b], floors[b], jacobian[b], gaps[b], none[0], none[1],
                 own, matrix[some, some], right[some],
             )  # fmt: skip
         pressed = 0
         for j in range(count):
             n, t0, t1, i = rows[j, 0], rows[j, 1], rows[j, 2], met[j]
-            r0, r1, r2 = _relative(n, t0, t1, v)
+            r0, r1, r2 = relative_velocity(n, t0, t1, v)
             force = s.stiffness[i] * (-distances[j] - time * r0)
             if force <= 0.0 or distances[j] + step * r0 > 0.0:
                 continue
             active, limit = step * s.stiffness[i], c.floor_friction * force
             drag = step * limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / s.grip[i]) ** 2 + SLIP * SLIP)
-            pressed = _press(n, t0, t1, time * active, drag, -active * distances[j], common, pressed, right)
+            pressed = press(n, t0, t1, time * active, drag, -active * distances[j], common, pressed, right)
         if pressed:
             add_squares(common, pressed, matrix)
             good = solve(matrix, right)
@@ -278,9 +278,9 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
             good = solve(matrix[:width, :width], right[:width]) and solve(matrix[width:, width:], right[width:])
         if not good:
             return False
-        _copy(right, v)
+        copy(right, v)
     for b in range(2):
-        _moved(states[b], v[b * width : (b + 1) * width], size, False, step, out[b])
+        move(states[b], v[b * width : (b + 1) * width], size, False, step, out[b])
     return True
 
 
@@ -314,14 +314,14 @@ def advance_pair(c, s, time, states, step, out, slopes):
     size = c.eigenvalues.shape[1]
     chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors, _, _ = work = _work(c)
     for b in range(2):
-        floors[b], _ = _near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
+        floors[b], _ = find_near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
     first, count = _met(c, s, states, size, step, met, distances)
     good, begin = True, states
     # a whole step, its first half with the same contacts, and the second
     for part in range(3):
         if part != 1:
             for b in range(2):
-                _contacts(c, b, begin[b], size, False, chosen[b], what, floors[b], floors[b], jacobian[b], gaps[b])
+                linearise(c, b, begin[b], size, False, chosen[b], what, floors[b], floors[b], jacobian[b], gaps[b])
             _between(c, s, begin, size, met, first, count, rows, distances)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
@@ -335,6 +335,6 @@ def advance_pair(c, s, time, states, step, out, slopes):
         if not good:
             for k in range(out.shape[1]):
                 out[b, k] = np.nan
-        error = max(error, _second_order(c, size, False, whole[b], out[b]))
-        _slope(states[b], out[b], size, False, step, slopes[b])
+        error = max(error, second_order(c, size, False, whole[b], out[b]))
+        slope_between(states[b], out[b], size, False, step, slopes[b])
     return error if good else np.nan

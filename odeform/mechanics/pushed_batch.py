@@ -15,7 +15,7 @@ from odeform.mechanics.step import Mechanics, Steps
 from odeform.mechanics.touching import most_contacts
 
 if TYPE_CHECKING:
-    from odeform.mechanics.compiled_push import Constants
+    from odeform.mechanics.compiled_contacts import Constants
 
 __all__ = ["CompiledBodies", "PushedBodies", "pushed_bodies"]
 
@@ -103,7 +103,7 @@ class CompiledBodies:
     @cached_property
     def constants(self) -> "Constants":
         """What steps in machine code take."""
-        from odeform.mechanics.compiled_push import Constants  # importing Numba takes half a second
+        from odeform.mechanics.compiled_contacts import Constants  # importing Numba takes half a second
 
         mechanics, push, parameters = self._mechanics, self._push, self._mechanics.parameters
         solid, floor, stands = mechanics.body.solid, mechanics.floor, push.support
