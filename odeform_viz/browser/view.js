@@ -87,6 +87,14 @@ style.textContent = `
   }`;
 document.head.append(style);
 
+// The page is laid out in pixels of CSS. viser tells the server how many the canvas has: more on a fine screen, and fewer
+// where drawing is slow.
+const canvas = document.querySelector("canvas[data-engine]");
+for (const [side, shown] of [["width", "clientWidth"], ["height", "clientHeight"]]) {
+  const { set } = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
+  Object.defineProperty(canvas, side, { get: () => canvas[shown], set });
+}
+
 const layer = document.createElement("div");
 layer.id = "odeform-view";
 document.body.append(layer);
