@@ -23,8 +23,8 @@ __all__ = [
 PARAMETERS = {
     "young": "stiffness",
     "beside": "sideways",
-    "held_around": "patch azimuth",
-    "held_up": "patch elevation",
+    "held_around": "azimuth",
+    "held_up": "elevation",
     "other_turn": "other's turn",
 }
 CONSTANTS = {

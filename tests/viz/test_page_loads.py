@@ -47,7 +47,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
         ("slope", "angle (°)"),
-        ("hold", "patch elevation (°)"),
+        ("hold", "elevation (°)"),
         ("meet", "other's turn (°)"),
         ("push", "force (N)"),
     ):
