@@ -28,7 +28,7 @@ def _acting_on(shown: ColumnFrame) -> Floats | None:
     push = push_shown(shown.column, shown.motion)
     if push is not None:
         tail, head = push.arrow
-        return np.stack([tail, head, tail + [0.0, 0.0, LABEL * push.size]])
+        return np.stack([tail, head, tail + LABEL * push.size * np.array([0.0, 0.0, 1.0])])
     scene = find_scene(shown.motion.schema.scene)
     if scene is None or not isinstance(shown.motion, Motion):
         return None
