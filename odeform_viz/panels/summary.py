@@ -64,7 +64,8 @@ def badge_of(frame: Frame) -> Badge:
         return Badge("unknown", "no model in view", "only the truth" if frame.columns else "")
     for shown in models:
         if stop := shown.stop_at(frame.request.time):
-            return Badge("unknown", LIMITED if stop.limited else REFUSED, str(stop))
+            of = f"{shown.column.label}: " if len(models) > 1 else ""
+            return Badge("unknown", LIMITED if stop.limited else REFUSED, f"{of}{stop}")
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
             return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
