@@ -38,7 +38,10 @@ style.textContent = `
   #odeform-view > .odeform-axes {
     position: absolute; left: 12px; bottom: 270px; width: 64px; height: 64px; padding: 0; background: none;
   }
-  .odeform-axes svg { display: block; overflow: visible; stroke-width: 2.5; stroke-linecap: round; }
+  .odeform-axes svg {
+    display: block; overflow: visible; stroke-width: 2.5; stroke-linecap: round;
+    filter: drop-shadow(0 0 1px var(--mantine-color-body)) drop-shadow(0 0 2px var(--mantine-color-body));
+  }
   .odeform-axes text {
     font: 600 13px Inter, sans-serif; text-anchor: middle; dominant-baseline: central; stroke: none; fill: currentColor;
   }
