@@ -36,7 +36,7 @@ __all__ = ["PICTURES", "take"]
 SIZE, FILM_SIZE, FILM_WIDTH = (1440, 900), (1280, 720), 880  # px
 MOST_BYTES = 120_000  # of a picture
 SHOWN = 4  # test sequence of each pushed object
-STAGE = (0, 20, 1080, 640)  # px: where two bodies stand side by side
+STAGE = (0, 20, 1080, 630)  # px: where two bodies stand side by side
 MOMENT = 0.012  # s; the kicked ball is deformed then
 LESSON = 1800.0  # s for a few simulated pushes, and what is learned of them
 # which `kick/gp` lets sink into the floor
