@@ -23,7 +23,7 @@ from odeform.errors import InputError
 from odeform.formats.writing import write_shape
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats
-from odeform_figures.bodies.scan import scanned_shoe
+from odeform_figures.bodies.scan import write_shoe
 from odeform_figures.opened_page import CHROMIUM, FLAGS, View, opened
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Column, truth_column
@@ -67,7 +67,7 @@ def _shoe() -> list[Column]:
     """A soft body of a shape that is like a scan."""
     with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
         path = Path(folder) / "shoe.ply"
-        write_shape(scanned_shoe(), path)
+        write_shoe(path)
         return make_columns("contact-force", (), str(path))
 
 
