@@ -24,7 +24,7 @@ from odeform_viz.runtime.access import Access, reachable_address
 from odeform_viz.runtime.clock import Clock
 from odeform_viz.runtime.memory import Tidier, share_memory
 from odeform_viz.runtime.notices import Notices
-from odeform_viz.runtime.server import forget_clients, open_server, stop_server
+from odeform_viz.runtime.server import clear_page, open_server, stop_server
 from odeform_viz.runtime.worker import Worker
 from odeform_viz.session import Session
 from odeform_viz.view import Coloring, Description, DisplayOptions, Frame, ViewRequest, played_until
@@ -127,11 +127,9 @@ class App:
     def _rebuild(self, columns: Sequence[Column]) -> None:
         self._end_page()
         self.scene.close()
-        forget_clients(self.server)
-        self.server.gui.reset()
-        self.server.scene.reset()
-        self.server.gui.set_panel_label(_title(columns))
-        self._build(columns)
+        with clear_page(self.server):
+            self.server.gui.set_panel_label(_title(columns))
+            self._build(columns)
 
     def _end_page(self) -> None:
         for panel in self.page.panels:

@@ -17,14 +17,15 @@ __all__ = [
     "origin_title",
     "parameter_title",
     "plain",
+    "rounded",
     "unit_text",
 ]
 
 PARAMETERS = {
     "young": "stiffness",
     "beside": "sideways",
-    "held_around": "patch azimuth",
-    "held_up": "patch elevation",
+    "held_around": "azimuth",
+    "held_up": "elevation",
     "other_turn": "other's turn",
 }
 CONSTANTS = {
@@ -85,6 +86,11 @@ def notes_of(schema: Schema) -> tuple[str, ...]:
     """Remarks on a scene: as it makes them now, or those of the file of one that was imported."""
     scene = find_scene(schema.scene)
     return schema.notes if scene is None else scene.schema.notes
+
+
+def rounded(value: float, digits: int = 3) -> str:
+    """The value with so many digits, and without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def unit_text(unit: str) -> str:

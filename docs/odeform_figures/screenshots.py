@@ -1,19 +1,15 @@
 """The pictures of the documentation, taken from the page itself: `python -m odeform_figures.screenshots`.
 
-Needs playwright (of the development dependencies) and Chromium on the PATH, or in the environment variable CHROMIUM.
+Needs playwright and Chromium, as `opened_page` does.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
-import os
-import shutil
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,85 +23,25 @@ from odeform.errors import InputError
 from odeform.formats.writing import write_shape
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.types import Floats
-from odeform_figures.viewer_benchmark.client import LoopbackClient
-from odeform_viz.app import App
+from odeform_figures.bodies.scan import write_shoe
+from odeform_figures.opened_page import CHROMIUM, FLAGS, View, opened
 from odeform_viz.cli import make_columns
 from odeform_viz.columns import Column, truth_column
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser
 
-__all__ = ["CHROMIUM", "FLAGS", "View", "take"]
+__all__ = ["PICTURES", "take"]
 
-CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
-DEADLINE = 300.0  # s, for a busy machine and a browser that renders in software
 SIZE, FILM_SIZE, FILM_WIDTH = (1440, 900), (1280, 720), 880  # px
 MOST_BYTES = 120_000  # of a picture
 SHOWN = 4  # test sequence of each pushed object
-STAGE = (0, 20, 1080, 560)  # px: where two bodies stand side by side
+STAGE = (0, 20, 1080, 630)  # px: where two bodies stand side by side
 MOMENT = 0.012  # s; the kicked ball is deformed then
+LESSON = 1800.0  # s for a few simulated pushes, and what is learned of them
 # which `kick/gp` lets sink into the floor
 SINKING = {"mass (kg)": 1.38, "bending (N m)": 0.365, "force (N)": 101.0, "elevation (rad)": 0.585}
 FILM_RATE, FILM_QUALITY = 12.5, 60  # frames per second; of WebP
-
-
-@dataclass(frozen=True)
-class View:
-    """A page in a browser, the app that serves it, and a client that sets its controls."""
-
-    app: App
-    page: Page
-    client: LoopbackClient
-
-    def tab(self, name: str) -> None:
-        """Turn to a tab."""
-        self.page.get_by_role("tab", name=name, exact=True).click()
-
-    def set(self, label: str, value: object) -> None:
-        """Set a control."""
-        self.client.set(label, value)
-
-    def show(self, moment: float) -> None:
-        """Pause at `moment` in s, and wait for its frame."""
-        self.client.set("time (s)", moment)
-        self.wait(lambda: (f := self.app.presenter.frame) is not None and f.request.time == moment and not f.pending)
-
-    def wait(self, holds: Callable[[], bool]) -> None:
-        """Wait for a condition. `TimeoutError` if it does not come to hold."""
-        if not self.client.until(holds, DEADLINE):
-            raise TimeoutError(f"the page did not get there within {DEADLINE:g} s")
-
-    def largest_error_time(self) -> float:
-        """Finds the time, in s, of the largest error of the first column against the truth."""
-        frame = self.app.presenter.frame
-        assert frame is not None
-        curves = self.app.session.curves(frame.columns[0], frame.request)
-        assert curves.error is not None
-        return round(float(curves.times[np.nanargmax(curves.error)]), 4)
-
-    def picture(self) -> Image.Image:
-        """The page once two pictures in a row agree."""
-        end, last = time.monotonic() + DEADLINE, self._shot()
-        while time.monotonic() < end:
-            self.client.collect(0.3)
-            current = self._shot()
-            if np.abs(np.asarray(current, dtype=int) - np.asarray(last, dtype=int)).max() < 8:
-                return current
-            last = current
-        raise TimeoutError(f"the page kept changing for {DEADLINE:g} s")
-
-    def _shot(self) -> Image.Image:
-        return Image.open(io.BytesIO(self.page.screenshot())).convert("RGB")
 
 
 def _kick() -> list[Column]:
@@ -125,6 +61,14 @@ def _donut() -> list[Column]:
         path = Path(folder) / "donut.ply"
         write_shape(get_object("donut").rest_mesh(), path)
         return make_columns("kick", (), str(path))
+
+
+def _shoe() -> list[Column]:
+    """A soft body of a shape that is like a scan."""
+    with tempfile.TemporaryDirectory(prefix="odeform-") as folder:
+        path = Path(folder) / "shoe.ply"
+        write_shoe(path)
+        return make_columns("contact-force", (), str(path))
 
 
 def _drop() -> list[Column]:
@@ -176,7 +120,7 @@ def _fit(view: View) -> None:
     view.tab("Compare")
     view.client.click("Fit to the truth")
     view.wait(lambda: "of what is expected" in view.client.text())
-    view.show(0.008)
+    view.show(0.3)
     view.wait(lambda: view.app.presenter.settled)
 
 
@@ -233,6 +177,16 @@ def _simulate(view: View) -> None:
     view.show(view.largest_error_time())
 
 
+def _taught(view: View) -> None:
+    view.page.get_by_text("Shape", exact=True).click()
+    view.set("motions", "10")
+    view.client.click("Teach this shape")
+    view.wait(lambda: "Taught in" in view.client.text(), LESSON)
+    view.wait(lambda: (frame := view.app.presenter.frame) is not None and len(frame.columns) == 2)
+    view.show(0.04)
+    view.page.get_by_text("Taught in").scroll_into_view_if_needed()
+
+
 PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] = {
     "explore": (_kick, _explore),
     "compare": (_rivals, _compare),
@@ -250,6 +204,7 @@ PICTURES: dict[str, tuple[Callable[[], list[Column]], Callable[[View], None]]] =
     "untrained": (_donut, _explore),
     "stopped": (_regressed, _stopped),
     "push": (_push, _pushed),
+    "teaching": (_shoe, _taught),
 }
 """Name, columns, and what is done before the picture is taken."""
 OTHERS = ("animation", "pushed")
@@ -262,28 +217,10 @@ DEVICES: dict[str, dict[str, Any]] = {
 """Options of the browser's context, for pictures that need some."""
 
 
-@contextmanager
-def _open(browser: Browser, columns: Sequence[Column], size: tuple[int, int], **device: Any) -> Iterator[View]:
-    app = App(columns, port=0)
-    page = browser.new_page(**{"viewport": {"width": size[0], "height": size[1]}, **device})
-    page.set_default_timeout(1e3 * DEADLINE)
-    try:
-        page.goto(app.url)
-        page.wait_for_selector("canvas")
-        page.get_by_text("time (s)").first.wait_for(state="attached")
-        # a notification says that the browser renders in software
-        page.add_style_tag(content=".mantine-Notifications-root { display: none }")
-        with LoopbackClient(app.server.get_port()) as client:
-            yield View(app, page, client)
-    finally:
-        page.close()
-        app.close()
-
-
 def take(browser: Browser, name: str, out: Path) -> None:
     """Take one of `PICTURES` into the folder `out`, as `NAME.webp`."""
     columns, prepare = PICTURES[name]
-    with _open(browser, columns(), SIZE, **DEVICES.get(name, {})) as view:
+    with opened(browser, columns(), SIZE, **DEVICES.get(name, {})) as view:
         prepare(view)
         picture = view.picture()
     (out / f"{name}.webp").write_bytes(_packed(picture))
@@ -325,7 +262,7 @@ def _loaded(load: str) -> list[Column]:
 def _take_film(browser: Browser, out: Path) -> None:
     frames = []
     for shot in FILM:
-        with _open(browser, shot.columns(), FILM_SIZE) as view:
+        with opened(browser, shot.columns(), FILM_SIZE) as view:
             view.show(0.0)
             for label, value in shot.settings.items():
                 view.set(label, value)
@@ -342,7 +279,7 @@ def _take_objects(browser: Browser, out: Path) -> None:
     """Every pushed object at its largest deformation, predicted and simulated, as rows of two."""
     parts = []
     for name in OBJECTS:
-        with _open(browser, _push(name), SIZE) as view:
+        with opened(browser, _push(name), SIZE) as view:
             view.page.add_style_tag(content="#odeform-view { display: none }")  # words would lie over the bodies
             view.show(0.0)
             view.set("go to", "peak")

@@ -12,7 +12,7 @@ style.textContent = `
     padding: 12px ${SIDE}px 84px 12px;
   }
   #odeform-view > * {
-    border-radius: 6px; padding: 5px 10px; max-width: 46em;
+    border-radius: 6px; padding: 5px 10px; max-width: 62em;
     background: color-mix(in srgb, var(--mantine-color-body) 86%, transparent);
   }
   #odeform-view > :empty { display: none; }
@@ -25,7 +25,9 @@ style.textContent = `
   .odeform-bar { width: 27em; max-width: 100%; }
   @media (min-width: 75em) {
     #odeform-view > [data-odeform-view=scale] { position: absolute; right: ${SIDE}px; top: 12px; }
-    #odeform-view > :is([data-odeform-view=caption], [data-odeform-view=trust]) { max-width: calc(100% - 30em); }
+    #odeform-view:has(> [data-odeform-view=scale]:not(:empty)) > :is([data-odeform-view=caption], [data-odeform-view=trust]) {
+      max-width: calc(100% - 30em);
+    }
   }
   .odeform-bar svg { display: block; width: 100%; height: 14px; }
   #odeform-view > [data-odeform-view=timeline] {
@@ -36,7 +38,10 @@ style.textContent = `
   #odeform-view > .odeform-axes {
     position: absolute; left: 12px; bottom: 270px; width: 64px; height: 64px; padding: 0; background: none;
   }
-  .odeform-axes svg { display: block; overflow: visible; stroke-width: 2.5; stroke-linecap: round; }
+  .odeform-axes svg {
+    display: block; overflow: visible; stroke-width: 2.5; stroke-linecap: round;
+    filter: drop-shadow(0 0 1px var(--mantine-color-body)) drop-shadow(0 0 2px var(--mantine-color-body));
+  }
   .odeform-axes text {
     font: 600 13px Inter, sans-serif; text-anchor: middle; dominant-baseline: central; stroke: none; fill: currentColor;
   }
@@ -52,7 +57,7 @@ style.textContent = `
     margin: calc(-1.15em - 12px) calc(4.5em + 4px) calc(1.15em + 9px) calc(7.6em - 4px); }
   .odeform-range svg { height: 3px; }
   .odeform-range b {
-    position: absolute; right: calc(100% + 4px); top: 17px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
+    position: absolute; right: calc(100% + 4px); top: 19px; font: 10.5px/1 Inter, sans-serif; color: #b3450c;
     white-space: nowrap;
   }
   [data-mantine-color-scheme=dark] .odeform-range b { color: #f0955f; }
@@ -86,6 +91,14 @@ style.textContent = `
     .odeform-wide, .odeform-fine { display: none !important; }
   }`;
 document.head.append(style);
+
+// The page is laid out in pixels of CSS. viser tells the server how many the canvas has: more on a fine screen, and fewer
+// where drawing is slow.
+const canvas = document.querySelector("canvas[data-engine]");
+for (const [side, shown] of [["width", "clientWidth"], ["height", "clientHeight"]]) {
+  const { set } = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
+  Object.defineProperty(canvas, side, { get: () => canvas[shown], set });
+}
 
 const layer = document.createElement("div");
 layer.id = "odeform-view";

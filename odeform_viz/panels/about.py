@@ -2,6 +2,7 @@
 
 import re
 
+from odeform.loads.registry import load_of_scene
 from odeform.models.names import ALIASES
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
@@ -21,8 +22,11 @@ class AboutPanel(Panel):
 def _about(column: Column) -> str:
     assert column.predictor is not None
     provenance = column.predictor.checkpoint.provenance
-    lines = list(notes_of(column.source.schema))
-    if fixed := ", ".join(constant_text(name, value) for name, value in provenance.get("fixed", {}).items()):
+    schema = column.source.schema
+    lines = list(notes_of(schema))
+    # under a load those of the scene that the model was trained in say nothing
+    constants = {} if load_of_scene(schema.scene) is not None else provenance.get("fixed", {})
+    if fixed := ", ".join(constant_text(name, value) for name, value in constants.items()):
         lines.append(f"Constant: {fixed}.")
     lines += [f"Made with `{_current(command)}`." for command in provenance.get("command", [])]
     return "\n\n".join(lines)

@@ -15,8 +15,8 @@ ENLARGE = "B"  # the hot key of the size of the plots
 STYLE = "padding:0 0.8em 0.3em;font:11px/1.5 sans-serif;color:var(--mantine-color-text)"
 QUIET = "opacity:0.65"
 CUT = (
-    "The axes fit the time before the orange part; ↑ is the largest value after it. Deformation and errors are RMS "
-    "distances over the body; dashed is the error that is expected, nine of ten are below it."
+    "Axes fit the time before the orange part; ↑ is the largest value after it. Deformation and errors are RMS "
+    "distances; nine of ten errors are below the dashed line."
 )
 
 

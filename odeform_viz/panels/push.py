@@ -260,10 +260,11 @@ class PushPanel(Panel):
         forces, most = self._forces(parameters), self._forces()
         excess = push_excess(push, forces, known_as(self._schema.scene))
         parts = ", ".join(f"{name} ({limit})" for name, limit in excess.items())
-        warning = f"⚠ **beyond what is known**: {parts}  \n" if excess else ""
         what = "the sphere pushes" if self._sphere else "it is kicked"
+        # in place of the hint, which is as long: a line of its own would shove the sliders while one drags
+        said = f"⚠ **beyond what is known**: {parts}" if excess else HINT.format(what=what)
         thin = f"  \n{THIN.format(forces[0], forces[1], most[1])}" if forces[1] < most[1] else ""
-        set_content(self._text, warning + HINT.format(what=what) + thin)
+        set_content(self._text, said + thin)
 
     async def _clicked(self, event: viser.GuiEvent) -> None:
         # a coroutine runs soon where the message arrives, before a drag that follows it

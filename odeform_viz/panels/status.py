@@ -7,6 +7,7 @@ from time import monotonic
 
 import numpy as np
 
+from odeform.loads.registry import load_of_scene
 from odeform.models.base import Predictor
 from odeform.models.error_band import FEWEST
 from odeform.motion.base import Motion, SolveStats
@@ -16,6 +17,7 @@ from odeform.schema import Window
 from odeform_viz.page import Page, Panel
 from odeform_viz.panels.callbacks import set_content
 from odeform_viz.view import ColumnFrame, Description, played_until, same_motions, shown_until
+from odeform_viz.words import rounded
 
 __all__ = ["StatusPanel", "describe_column", "status_html"]
 
@@ -40,11 +42,11 @@ def describe_column(shown: ColumnFrame, time: float, settled: bool = True) -> st
         return "  \n".join([*lines, stats.solver, "cubic interpolation between frames"])
     if stats.evaluations:
         lines.append(
-            f"computed: {stats.evaluations} evaluations of the model in {stats.wall_ms:.3g} ms by {stats.solver}"
+            f"computed: {stats.evaluations} evaluations of the model in {rounded(stats.wall_ms)} ms by {stats.solver}"
         )
         lines.append(_solver_error(stats, shown.motion.schema.window) if settled else "solver error: …")
     else:
-        lines.append(f"{stats.solver}, no ODE to solve · {stats.wall_ms:.3g} ms")
+        lines.append(f"{stats.solver}, no ODE to solve · {rounded(stats.wall_ms)} ms")
     if shown.error is not None:
         e = shown.error
         values = f"RMS {e.rms_mm:.2f}, mean {e.mean_mm:.2f}, largest {e.worst_mm:.2f} mm"
@@ -69,6 +71,8 @@ def _model_error(shown: ColumnFrame, predictor: Predictor, time: float) -> list[
     if shown.untrained and not predictor.knows_untrained_errors:
         return ["error expected: not known, this shape was not trained"]
     band = shown.error_band(np.array([time]))
+    if band is None and load_of_scene(shown.motion.schema.scene) is not None:
+        return ["error expected here: not known for motions of this kind"]
     if band is None and shown.changed:
         lines = ["error expected here: not known, no data have this mass or stiffness"]
     elif band is None:
@@ -88,7 +92,7 @@ def _calibrated(shown: ColumnFrame, predictor: Predictor) -> list[str]:
     motions = 0 if shown.untrained else predictor.band_motions(shown.motion.parameters)
     if not motions:
         return ["measured on: moments of motions, one by one"]
-    return [f"measured on: {motions} motions that nothing was fitted to; 9 of 10 stay below it from begin to end"]
+    return [f"measured on: {motions} motions that nothing was fitted to; 9 of 10 stay below it from beginning to end"]
 
 
 def _stops(motion: Motion, time: float, settled: bool) -> list[str]:

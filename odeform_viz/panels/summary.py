@@ -13,7 +13,7 @@ from odeform_viz.panels.callbacks import set_content
 from odeform_viz.panels.in_view import in_view
 from odeform_viz.pushing import describe_push, first_push, outside_of_push
 from odeform_viz.view import ColumnFrame, Description, Frame
-from odeform_viz.words import known_range, parameter_title
+from odeform_viz.words import known_range, parameter_title, rounded
 
 __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
@@ -64,7 +64,8 @@ def badge_of(frame: Frame) -> Badge:
         return Badge("unknown", "no model in view", "only the truth" if frame.columns else "")
     for shown in models:
         if stop := shown.stop_at(frame.request.time):
-            return Badge("unknown", LIMITED if stop.limited else REFUSED, str(stop))
+            of = f"{shown.column.label}: " if len(models) > 1 else ""
+            return Badge("unknown", LIMITED if stop.limited else REFUSED, f"{of}{stop}")
         only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
             return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
@@ -118,13 +119,8 @@ def _expected(models: Sequence[ColumnFrame]) -> str:
     # outside of what was measured the band is carried on
     rough = any(c.motion.outside or c.motion.extrapolates(c.time) for c in models)
     of = "" if len(known) == 1 else f", the largest of {len(known)}"
-    text = f"expected error now {'roughly ' if rough else ''}below {_rounded(max(known), 2)} mm in 9 of 10 cases{of}"
+    text = f"expected error now {'roughly ' if rough else ''}below {rounded(max(known), 2)} mm in 9 of 10 cases{of}"
     return "; ".join([text, *(f"{label}: {UNKNOWN_ERROR}" for label in unknown)])
-
-
-def _rounded(value: float, digits: int) -> str:
-    """The value with so many digits, and without an exponent."""
-    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def _errors_now(frame: Frame) -> list[str]:
@@ -134,7 +130,7 @@ def _errors_now(frame: Frame) -> list[str]:
         return []
     named = len(known) > 1
     values = ", ".join(
-        f"{escape(c.column.label)} {_rounded(rms, 3)} mm" if named else f"{_rounded(rms, 3)} mm" for c, rms in known
+        f"{escape(c.column.label)} {rounded(rms)} mm" if named else f"{rounded(rms)} mm" for c, rms in known
     )
     lines = [f"error now: {values} (RMS distance)"]
     above = [c.column.label for c, rms in known if (below := _below(c)) is not None and rms > below]

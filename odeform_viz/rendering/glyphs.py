@@ -48,7 +48,7 @@ class GlyphView:
         while len(self._labels) > len(labelled):
             self._labels.pop().remove()
         for index, each in enumerate(labelled):
-            self._show_label(index, each.placed(time, points, pose)[0], each.label(time))
+            self._show_label(index, each, each.free_end(time, points, pose), each.label(time))
 
     def _show_shafts(self, arrows: Sequence[tuple[Vector, Vector]]) -> None:
         if not arrows:
@@ -70,12 +70,12 @@ class GlyphView:
             head_length=min(0.12 * self._extent, 0.6 * shortest),
         )
 
-    def _show_label(self, index: int, tail: Vector, text: str) -> None:
+    def _show_label(self, index: int, of: "_Attached", position: Vector, text: str) -> None:
         if index == len(self._labels):
-            name = f"{self._root}/arrow_label_{index}"
-            self._labels.append(self._server.scene.add_label(name, text, position=tail, anchor="top-right"))
+            name, anchor = f"{self._root}/arrow_label_{index}", "center-left" if of.arrow.leaves else "top-center"
+            self._labels.append(self._server.scene.add_label(name, text, position=position, anchor=anchor))
         else:
-            self._labels[index].position = tail
+            self._labels[index].position = position
             if self._labels[index].text != text:
                 self._labels[index].text = text
 
@@ -100,15 +100,23 @@ class _Attached:
         return cls(arrow, carriers, end - rest[carriers].mean(axis=0))
 
     def placed(self, time: float, points: Points, pose: Pose) -> tuple[Vector, Vector]:
-        """Tail and head (3,) m at `time` s."""
+        """Tail and head (3,) m at `time` s. An arrow that leaves the body is seen from where it comes out of it."""
         end = pose[:3, :3] @ (points[self.carriers].mean(axis=0) + self.offset) + pose[:3, 3]
         vector = max(self.arrow.strength(time), SHORTEST) * self.arrow.vector
-        return (end, end + vector) if self.arrow.leaves else (end - vector, end)
+        if not self.arrow.leaves:
+            return end - vector, end
+        along = vector / np.linalg.norm(vector)
+        out = end + float((points @ pose[:3, :3].T + pose[:3, 3] - end).dot(along).max()) * along
+        return out, out + vector
+
+    def free_end(self, time: float, points: Points, pose: Pose) -> Vector:
+        """(3,) m: the end that is away from the body."""
+        return self.placed(time, points, pose)[1 if self.arrow.leaves else 0]
 
     def label(self, time: float) -> str:
         """The strength now, and the largest."""
         share = self.arrow.strength(time)
         if share > 0.995:
             return self.arrow.label
-        value, _, unit = self.arrow.label.partition(" ")
-        return f"{share * float(value):.3g} {unit} (peak {self.arrow.label})"
+        value, _, _ = self.arrow.label.partition(" ")
+        return f"{share * float(value):.3g} of {self.arrow.label}"

@@ -18,14 +18,18 @@ __all__ = ["RISE", "ceiling_of", "direction_of", "outline_of"]
 MOMENTS = 60  # of a motion that are looked at
 POINTS = 200  # of a body
 AWAY = 5.0  # heights of a box alone, from which the camera looks at it
+LABEL = 0.13  # of a body's size: the handle at an arrow's tail, and the label above it
+AROUND = np.array([[0.0, 0.0, 1.0], [0.7, 0.0, 0.0], [-0.7, 0.0, 0.0], [0.0, 0.7, 0.0], [0.0, -0.7, 0.0]])
 RISE = 0.25  # of a body's size: what rises higher is followed, so that bodies that fall are not seen from far away
 
 
 def _acting_on(shown: ColumnFrame) -> Floats | None:
-    """(2, 3) m: tail and head of the arrow of what acts first on a body; None if nothing does."""
+    """(A, 3) m: tail and head of the arrow of what acts first on a body, and what stands over it; None if nothing
+    acts."""
     push = push_shown(shown.column, shown.motion)
     if push is not None:
-        return np.stack(push.arrow)
+        tail, head = push.arrow
+        return np.stack([tail, head, *(tail + LABEL * push.size * AROUND)])
     scene = find_scene(shown.motion.schema.scene)
     if scene is None or not isinstance(shown.motion, Motion):
         return None

@@ -79,7 +79,7 @@ class _Nodes:
         self.sphere.position, self.sphere.visible = push.centre, acting and push.contacts.radius > 0.0
         self.handle.position, self.handle.scale = tail, HANDLE_SIZE * push.size
         self.label.position = tail + np.array([0.0, 0.0, HANDLE_SIZE * push.size])
-        text = f"{push.push.strength:.3g} N" + ("" if acting else f", until {push.contacts.pulse:.2g} s")
+        text = f"{push.push.strength:.3g} N" + ("" if acting else f"\nuntil {push.contacts.pulse:.2g} s")
         if self.label.text != text:
             self.label.text = text
         self._show_arrow(push, tail, head, HANDLE if acting else paler(HANDLE))

@@ -12,13 +12,14 @@ from typing import Any
 
 import viser
 import websockets.asyncio.server as websockets_server
+from viser._messages import GetRenderRequestMessage
 from viser.infra import WebsockMessageHandler
 
 from odeform.errors import InputError
 from odeform_viz.colors import HANDLE
 from odeform_viz.runtime.access import Access
 
-__all__ = ["forget_clients", "open_server", "set_theme", "stop_server"]
+__all__ = ["clear_page", "open_server", "set_theme", "stop_server"]
 
 SWITCH_INTERVAL = 2e-4  # s after which a waiting thread gets the GIL
 STARTING = threading.Lock()
@@ -97,10 +98,25 @@ def _guarded(access: Access) -> Iterator[None]:
         raise RuntimeError("viser started its server in an unknown way, without a check of Host and Origin")
 
 
-def forget_clients(server: viser.ViserServer) -> None:
-    """No longer call what was registered for clients that come and go: the page that did so has ended."""
+@contextlib.contextmanager
+def clear_page(server: viser.ViserServer) -> Iterator[None]:
+    """Take the page away, of which nothing is written any more, and no longer call what it registered for clients that
+    come and go; the next page is built within this context.
+
+    A client of viser 1.1 applies the updates of controls after all else that it handles at once, so that one which was
+    busy would look for controls that are gone. It handles a request for a picture by itself: what was sent before is
+    done before what is sent after it.
+    """
     server._client_connect_cb.clear()
     server._client_disconnect_cb.clear()
+    request = GetRenderRequestMessage("image/jpeg", 32, 32, 1, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, "odeform")
+    server.gui._websock_interface.queue_message(request)
+    server.gui.reset()
+    server.scene.reset()
+    try:
+        yield
+    finally:  # clients that connect later have no use for it
+        server._websock_server.get_message_buffer().remove_from_buffer(lambda message: message is request)
 
 
 def stop_server(server: viser.ViserServer) -> None:

@@ -18,6 +18,8 @@ from odeform.geometry.contact import nearest_on
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.modal.elastic_body import elastic_body
+from odeform.models.modal.loaded import ROOM
+from odeform.models.modal.model import ModalModel
 from odeform.models.modal.taught_body import TaughtBodyPredictor, item_of, taught
 from odeform.models.modal.training import fit
 from odeform.models.modal.training import refine as refining
@@ -72,6 +74,8 @@ def test_the_error_falls_to_less_than_half_of_the_first_guess(dataset: Dataset, 
 
 def test_the_checkpoint_holds_the_body_that_can_be_simulated(dataset: Dataset, refined: PerObject) -> None:
     body, item = body_in(dataset.root), item_of(refined, {"object": "block"})
+    assert isinstance(part := refined.parts["block"], ModalModel)
+    assert part.space.largest[1] >= ROOM * np.ptp(refined.rest.points, axis=0).max(), "few motions are no bound"
     assert body is not None
     assert item is not None
     assert np.array_equal(item.elements, body.item.elements)

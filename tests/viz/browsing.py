@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Locator, Page, sync_playwright
 
-from odeform_figures.screenshots import CHROMIUM, FLAGS
+from odeform_figures.opened_page import CHROMIUM, FLAGS
 from odeform_viz.app import App
 from odeform_viz.columns import Column
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from odeform.figure import Source, Sweep, column_bytes, figure_page, interpolated
 from odeform.models.base import Predictor
-from odeform_figures.screenshots import CHROMIUM, FLAGS
+from odeform_figures.opened_page import CHROMIUM, FLAGS
 
 pytestmark = [pytest.mark.slow, needs_chromium]
 

@@ -14,7 +14,7 @@ from odeform.figure import FigureColumn, Source, Sweep, column_bytes, figure_pag
 from odeform.geometry.harmonics import harmonic_basis
 from odeform.models.base import Predictor
 from odeform.types import GaussianSplats, Mesh
-from odeform_figures.screenshots import CHROMIUM, FLAGS
+from odeform_figures.opened_page import CHROMIUM, FLAGS
 
 pytestmark = [pytest.mark.slow, needs_chromium]
 

@@ -51,9 +51,9 @@ def test_axes_turn_with_the_camera_and_go_with_their_scene(tab: Tab) -> None:
     mouse.move(0.5 * VIEW["width"], 0.35 * VIEW["height"], steps=5)
     mouse.up()
     assert until(lambda: _drawn(tab)["x"] != before["x"])
-    assert not tab.errors
     tab.app.show_load("push")
     assert until(lambda: not _drawn(tab))
     assert tab.says("straight into the surface")
     tab.app.show_load("drop")
     assert until(lambda: set(_drawn(tab)) == {"x", "y", "z"})
+    assert tab.errors == []

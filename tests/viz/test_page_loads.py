@@ -47,7 +47,7 @@ def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: 
         ("wall", "distance (m)"),
         ("step", "rise (m)"),
         ("slope", "angle (°)"),
-        ("hold", "patch elevation (°)"),
+        ("hold", "elevation (°)"),
         ("meet", "other's turn (°)"),
         ("push", "force (N)"),
     ):
@@ -167,3 +167,16 @@ def test_a_choice_in_the_browser_builds_the_page_anew(tab: Tab) -> None:
     assert tab.says("tilt up")
     assert until(lambda: _shows(tab.app, "contact-force"))
     assert not tab.errors
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_a_busy_browser_looks_for_no_control_of_the_page_before(tab: Tab) -> None:
+    for load, control in (("drop", "turn x"), ("throw", "spin y"), ("push", "tilt up")):
+        tab.app.clock.play()
+        # what arrives meanwhile is handled at once: frames that play, the end of two pages, and the next one
+        tab.page.evaluate("() => setTimeout(() => { for (const end = Date.now() + 2500; Date.now() < end; ); })")
+        tab.app.show_load("wall")
+        tab.app.show_load(load)
+        assert tab.says(control)
+    assert tab.errors == []

@@ -118,3 +118,15 @@ def test_on_a_phone_the_body_fills_the_width(tab: Tab) -> None:
         assert np.ptp(pixels[:, 0]) > 0.6 * 390
     finally:
         page.close()
+
+
+def test_a_fine_screen_is_laid_out_as_a_coarse_one(tab: Tab) -> None:
+    browser = tab.page.context.browser
+    assert browser is not None
+    page = browser.new_page(viewport={"width": 700, "height": 400}, device_scale_factor=3)
+    try:
+        page.goto(tab.app.url)
+        page.wait_for_selector("canvas")
+        assert until(lambda: (700, 400) in [(c.camera.image_width, c.camera.image_height) for c in _clients(tab)])
+    finally:
+        page.close()

@@ -20,6 +20,7 @@ from odeform_viz.panels.status import describe_column, status_html
 from odeform_viz.panels.summary import badge_of, summarize
 from odeform_viz.session import Session, visible_deformation
 from odeform_viz.view import INVISIBLE, Error, ViewRequest
+from odeform_viz.words import rounded
 
 
 @pytest.fixture
@@ -225,6 +226,18 @@ def test_status_names_solver_error_as_such(session: Session, view_request: ViewR
     assert "error on the test sequences" in text
     assert re.search(r"\d+ evaluations", text)
     assert "error expected here: not known, with fewer than 8 validation sequences" in text
+
+
+def test_status_claims_no_error_of_pushes_for_another_load() -> None:
+    session, view_request = _alone(odeform.load("contact-force:drop"))
+    text = describe_column(session.frame(view_request).columns[0], view_request.time)
+    assert "error expected here: not known for motions of this kind" in text
+    assert "test sequences" not in text
+
+
+@pytest.mark.parametrize(("value", "text"), [(3491.2, "3490"), (0.03852, "0.0385"), (12.0, "12")])
+def test_numbers_have_no_exponent(value: float, text: str) -> None:
+    assert rounded(value) == text
 
 
 def test_status_says_how_far_off_the_model_is() -> None:

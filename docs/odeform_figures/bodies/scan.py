@@ -14,7 +14,7 @@ from odeform.types import Mesh, Perpoint, Points
 from odeform_figures.bodies.level_set import surface_of
 from odeform_figures.bodies.signed_distance import capsule, smooth_intersection, smooth_union
 
-__all__ = ["scanned_shoe"]
+__all__ = ["scanned_shoe", "write_shoe"]
 
 LENGTH, EDGE, NOISE = 0.26, 0.004, 2e-4  # m: of the shoe, of a triangle, and of the scanner
 WALL = 0.010  # m
@@ -51,17 +51,21 @@ def _distance(points: Points) -> Perpoint:
     return smooth_intersection(body, -cavity, 0.004)
 
 
-def main() -> None:
-    """Write the file of the command line."""
-    parser = argparse.ArgumentParser(prog="python -m odeform_figures.bodies.scan", description=__doc__)
-    parser.add_argument("out", type=Path, metavar="FILE", help="the file to write, .ply")
+def write_shoe(path: str | Path) -> None:
+    """Write the shoe as a `.ply` with its colours, which our own writer of shapes has not."""
     shoe = scanned_shoe()
     corner = np.zeros(len(shoe.points), dtype=int)
     corner[shoe.faces.ravel()] = np.arange(shoe.faces.size)
     assert shoe.colors is not None
     colors = shoe.colors.reshape(-1, 3)[corner]
-    # our own writer of shapes has no colours
-    trimesh.Trimesh(shoe.points, shoe.faces, vertex_colors=colors, process=False).export(parser.parse_args().out)
+    trimesh.Trimesh(shoe.points, shoe.faces, vertex_colors=colors, process=False).export(path)
+
+
+def main() -> None:
+    """Write the file of the command line."""
+    parser = argparse.ArgumentParser(prog="python -m odeform_figures.bodies.scan", description=__doc__)
+    parser.add_argument("out", type=Path, metavar="FILE", help="the file to write, .ply")
+    write_shoe(parser.parse_args().out)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from odeform_figures.screenshots import CHROMIUM, FLAGS
+from odeform_figures.opened_page import CHROMIUM, FLAGS
 from odeform_figures.speed.firefox import open_firefox
 
 __all__ = ["frames_per_second"]

@@ -1,6 +1,6 @@
 """A figure of splats from two sides: `python -m odeform_figures.splats.figure_picture FIGURE.html --out PICTURE.webp`.
 
-Needs playwright and Chromium, as `odeform_figures.screenshots` does.
+Needs playwright and Chromium, as `odeform_figures.opened_page` does.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
-from odeform_figures.screenshots import CHROMIUM, FLAGS
+from odeform_figures.opened_page import CHROMIUM, FLAGS
 
 __all__ = ["main", "views"]
 

@@ -28,7 +28,7 @@ from odeform.types import Floats, Points, Rotations, Vector
 __all__ = ["ROOM", "SUPPORT", "Beginning", "LoadedBody", "under_load"]
 
 SUPPORT = 400  # points all over the surface that may touch the floor
-ROOM = 0.08  # of a body's size: the largest RMS deformation under any load
+ROOM = 0.08  # of a body's size: the largest RMS deformation under any load, or where few motions are known
 OF_PUSHES = ("correction", "qualities", "frontier", "free_from_s", "val", "own_band", "shape_band")
 MEASURED = ("val.", "gp.", "gains", "times")  # starts of the names of arrays that only pushes have
 

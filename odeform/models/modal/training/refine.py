@@ -9,6 +9,7 @@ from odeform.checkpoint import Checkpoint
 from odeform.dataset.index import Dataset
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.models.modal.body_parameters import schema_of
+from odeform.models.modal.loaded import ROOM
 from odeform.models.modal.training.contact_fit import STEP, fit_contact_parameters, relative_errors
 from odeform.models.modal.training.fit import Checkpointed, checkpoint_of, inputs_of, training_pushes, with_qualities_of
 from odeform.models.modal.training.parameter_cache import ParameterCache
@@ -131,5 +132,9 @@ def _model(
     part = checkpoint_of(schema, theta, train, parameters, pulse, item.material.young, residual)
     part = with_qualities_of(part, inputs_of(dataset, "val"), val)
     arrays, config = parts_of_item(item)
+    # a few motions do not say how far a body can deform: another push may go beyond all of them
+    shift, deformation = part.config["largest"]
+    room = ROOM * float(np.ptp(train.body.points, axis=0).max())
+    config = {**config, "largest": [shift, max(deformation, room)]}
     part = replace(part, arrays={**part.arrays, **arrays}, config={**part.config, **config})
     return joined(schema, {item.name: part})
