@@ -25,6 +25,7 @@ PARAMETERS = {
     "beside": "sideways",
     "held_around": "patch azimuth",
     "held_up": "patch elevation",
+    "held_width": "patch width",
     "other_turn": "other's turn",
 }
 CONSTANTS = {
