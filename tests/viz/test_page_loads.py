@@ -130,7 +130,8 @@ def test_a_patch_of_nothing_is_refused_on_the_page_in_words(serve: Any, column: 
     client.set("patch width (%)", 4.7)
     assert client.until(lambda: "which holds" in client.text())
     client.set("patch width (%)", 25.0)
-    assert client.until(lambda: app.presenter.frame.columns[0].motion.parameters["held_width"] == 25.0)
+    assert client.until(lambda: _shows(app, "object-hold"))
+    assert app.presenter.frame.columns[0].motion.parameters["held_width"] == 25.0
 
 
 @pytest.mark.parametrize("load", known_loads()[1:])
