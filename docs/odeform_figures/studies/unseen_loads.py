@@ -27,7 +27,7 @@ from odeform.simulation.objects.user_object import UserObject, read_user_object,
 from odeform.simulation.user_data import body_in, digest, simulate_item
 from odeform_figures.output import write_or_print
 from odeform_figures.studies.loads import errors_of
-from odeform_figures.unseen.instances import factors_of
+from odeform_figures.unseen.instances import EXTREMES, factors_of
 from odeform_figures.unseen.shapes import UnseenShape, instance, scan
 
 __all__ = ["compared", "means", "measured", "table"]
@@ -44,7 +44,7 @@ def makers(instances: Sequence[str], files: Sequence[Path]) -> dict[str, Callabl
     found: dict[str, Callable[[], UnseenShape]] = {}
     for key in instances:
         name = key.rpartition("-")[0]
-        factors = factors_of(name).get(key) if name else None
+        factors = factors_of(name).get(key) if name in EXTREMES else None
         if factors is None:
             raise InputError(f"instance {key!r}: expected a class and which, as in {INSTANCES[0]}")
         found[key] = partial(instance, key, name, factors)
@@ -135,7 +135,7 @@ def _ratios(ratio: Mapping[str, float]) -> list[str]:
 
 
 def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+    return "|" + "".join(f" {cell} |" if cell else " |" for cell in cells)
 
 
 def main() -> None:
