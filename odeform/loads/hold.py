@@ -62,7 +62,8 @@ def _radius(points: Points, vertex: int, parameters: Parameters) -> float:
         raise InputError(f"held_width: expected more than 0 % of the body's size, got {width:g}, which holds nothing")
     radius = 1e-2 * width * float(np.ptp(points, axis=0).max())
     held = np.exp(-((points - points[vertex]) ** 2).sum(axis=1) / radius**2)
-    if (count := int((held > np.exp(-1.0)).sum())) < LEAST:
+    count = int((held > np.exp(-1.0)).sum())
+    if count < LEAST and width < WIDTH.default:  # a coarse body is held at any rate as it was before there were widths
         raise InputError(
             f"held_width: expected a patch of at least {LEAST} vertices of the body, got {width:g} % of its size, "
             f"which holds {count}"

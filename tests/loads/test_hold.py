@@ -29,6 +29,14 @@ def test_data_without_a_width_are_held_as_they_were() -> None:
     assert clamp.radius == clamp_of(rest).radius
 
 
+def test_a_coarse_body_is_held_without_a_width_and_by_none_that_is_narrower() -> None:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=np.float32)
+    coarse = Mesh(0.1 * corners, np.array([[0, 1, 3]], dtype=np.int32))
+    assert clamp_of(coarse).radius == pytest.approx(0.012)
+    with pytest.raises(InputError, match="which holds 1"):
+        clamp_of(coarse, held_width=11.0)
+
+
 def test_a_patch_is_as_wide_as_asked_for_and_as_stiff_in_all() -> None:
     rest = get_object("dog").rest_mesh()
     masses = np.full(len(rest.points), 1.0 / len(rest.points))
