@@ -26,6 +26,7 @@ PARAMETERS = {
     "beside": "sideways",
     "held_around": "azimuth",
     "held_up": "elevation",
+    "held_width": "patch width",
     "other_turn": "other's turn",
 }
 CONSTANTS = {

@@ -7,7 +7,7 @@ from odeform.loads.arrow import Arrow
 from odeform.loads.obstacle import Obstacle
 from odeform.loads.situation import Situation
 from odeform.schema import Parameter, Parameters, Window
-from odeform.types import Mesh
+from odeform.types import Mesh, Vector
 
 __all__ = ["SCENES_OF_LOADS", "Load"]
 
@@ -56,6 +56,12 @@ class Load:
     pulse: float | None = None
     """s: how long a force acts at a contact that one chooses on the surface of the body on the floor, with parameters
     `contact_x` to `_z` and `force_x` to `_z`; None for a load under which it begins in the air."""
+
+    pick: Callable[[Mesh, Vector], Mapping[str, float]] | None = None
+    """`pick(rest, place)` are the parameters that a click on the body sets, at a place (3,) m of it where it rests on
+    the floor; None for a load under which clicks mean nothing."""
+    picks: str = ""
+    """What such a click chooses, as in "where it is held"."""
 
     held: bool = False
     """Whether a patch of the body is held: it deforms as its own modulus and damping say, and not as what was fitted to

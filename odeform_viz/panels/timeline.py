@@ -11,6 +11,7 @@ from odeform_viz.view import Curves, shown_until
 __all__ = ["Marks", "moment_css", "playing_css", "timeline_html"]
 
 WIDTH, HEIGHT = 1000, 32  # units of the drawing
+ROOM = 0.2 * WIDTH  # of two labels at the end
 ICONS = {
     "0": "M6 5h2v14H6zM20 5v14L9 12z",
     "J": "M17 5v14L6 12zM18 5h2v14h-2z",
@@ -87,6 +88,7 @@ def _track(window: Window, slider: str, marks: Marks | None, known: str) -> str:
         f'<rect class="beyond" x="{at(window.stop):.1f}" width="{WIDTH - at(window.stop):.1f}" height="{HEIGHT}"/>',
     ]
     labels = [(0.0, f"{window.start:g} s", ""), (at(window.stop), f"{known} until {window.stop:g} s", "until")]
+    last = f"{end:.3g} s"
     if marks is not None:
         parts.append(f'<path class="shape" d="{_profile(marks.curves)}"/>')
         parts += [
@@ -96,9 +98,11 @@ def _track(window: Window, slider: str, marks: Marks | None, known: str) -> str:
         if marks.truth_end is not None:
             x = at(min(marks.truth_end, end))
             parts.append(f'<path class="mark" d="M{x:.1f} 0V{HEIGHT}"/>')
-            if abs(x - at(window.stop)) > 0.12 * WIDTH:
+            if x > WIDTH - ROOM:  # both would stand in one place
+                last = f"truth until {marks.truth_end:.3g} s"
+            elif abs(x - at(window.stop)) > 0.12 * WIDTH:
                 labels.append((x, f"truth until {marks.truth_end:.3g} s", "truth"))
-    labels.append((WIDTH, f"{end:.3g} s", "last"))
+    labels.append((WIDTH, last, "last"))
     texts = "".join(
         f'<span class="{kind}" style="left:{100.0 * x / WIDTH:.1f}%">{text}</span>' for x, text, kind in labels
     )

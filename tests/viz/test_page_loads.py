@@ -1,6 +1,6 @@
 """*What happens*: the page of one model under several loads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,12 @@ from browsing import Tab, needs_chromium, open_tab, until
 
 import odeform
 from odeform.errors import InputError
-from odeform.loads.registry import known_loads
+from odeform.loads.hold import held_vertex
+from odeform.loads.registry import get_load, known_loads
 from odeform.models.base import Predictor
 from odeform.schema import OBJECT
+from odeform.simulation.objects.catalog import get_object
+from odeform.types import Mesh
 from odeform_viz.app import App
 from odeform_viz.columns import Column, columns_under
 from odeform_viz.page import Page
@@ -85,6 +88,50 @@ def test_a_kick_has_no_sphere_and_needs_no_room_for_one(serve: Any, column: Colu
     panel.pick(shown.column, low)  # on the floor, where no sphere fits
     contact = [panel.parameters()[f"contact_{axis}"] for axis in "xyz"]
     assert np.linalg.norm(np.array(contact) - low) < 1e-3
+
+
+def test_a_click_chooses_where_the_body_is_held(serve: Any, column: Column) -> None:
+    app, client = serve(column)
+    app.show_load("hold")
+    assert client.until(lambda: _shows(app, "object-hold"))
+    client.set("object", "dog")
+    assert client.until(lambda: app.presenter.frame.columns[0].motion.parameters[OBJECT] == "dog")
+    panel, shown = app.panel(LoadPanel), app.presenter.frame.columns[0].column
+    rest = shown.predictor.rest_of({OBJECT: "dog"})
+    asked = {"held_around": 35.0, "held_up": 5.0}
+    place = rest.points[held_vertex(rest.points, asked)].astype(float)
+    before = app.request().parameters
+    panel.pick(None, place)
+    assert app.request().parameters == before, "a click beside the body means nothing"
+    panel.pick(shown, place)
+    after = app.request().parameters
+    held = rest.points[held_vertex(rest.points, after)]
+    assert np.linalg.norm(held - place) < 0.06 * np.ptp(rest.points, axis=0).max()
+    assert {name for name in after if after[name] != before[name]} == {"held_around", "held_up"}
+    assert client.until(lambda: app.presenter.frame.columns[0].motion.parameters["held_up"] == after["held_up"])
+
+
+def _refused(rest: Mesh, parameters: Mapping[str, Any]) -> bool:
+    try:
+        get_load("hold").situation(rest, parameters)
+    except InputError:
+        return True
+    return False
+
+
+def test_a_patch_of_nothing_is_refused_on_the_page_in_words(serve: Any, column: Column) -> None:
+    app, client = serve(column)
+    app.show_load("hold")
+    assert client.until(lambda: _shows(app, "object-hold"))
+    client.set("object", "donut")
+    rest, given = get_object("donut").rest_mesh(), app.request().parameters | {"held_width": 4.7}
+    around = next(float(a) for a in range(-180, 180, 5) if _refused(rest, {**given, "held_around": float(a)}))
+    client.set("patch azimuth (°)", around)
+    client.set("patch width (%)", 4.7)
+    assert client.until(lambda: "which holds" in client.text())
+    client.set("patch width (%)", 25.0)
+    assert client.until(lambda: _shows(app, "object-hold"))
+    assert app.presenter.frame.columns[0].motion.parameters["held_width"] == 25.0
 
 
 @pytest.mark.parametrize("load", known_loads()[1:])

@@ -31,7 +31,7 @@ from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames, Mesh
 from odeform_figures.output import write_or_print
 
-__all__ = ["fit", "measured", "relative_errors", "timed"]
+__all__ = ["errors_of", "fit", "measured", "relative_errors", "timed"]
 
 TIMED = ("throw", "wall", "step", "slope", "meet")
 RIGID = 1e6  # times its stiffness: a body that does not deform
@@ -109,7 +109,7 @@ def measured(data: str, checkpoint: str, split: str = "test") -> dict[str, Any]:
     predictor, out = predictor.under(found.name), {}
     for name in dataset.schema.objects:
         if impacts := _impacts(dataset, name, ("train", "val", "test") if split == "all" else (split,)):
-            out[name] = _errors(_part(predictor, name), impacts)
+            out[name] = errors_of(_part(predictor, name), impacts)
     return out
 
 
@@ -129,7 +129,7 @@ def _rival(predictor: Predictor, dataset: Dataset, split: str) -> dict[str, Any]
     return out
 
 
-def _errors(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
+def errors_of(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
     evaluated = model.evaluate_basis(model.rest, 0.0)
     stiff = replace(model.contact_parameters, stiffness=RIGID)
     models = {"model": model, "rigid": model.with_contact_parameters(stiff)}
