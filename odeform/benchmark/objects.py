@@ -19,13 +19,14 @@ from odeform.types import MotionSequence
 __all__ = ["bench_objects"]
 
 SEQUENCES = 12  # of the test split of each object
+FIRST = 0.03  # s: a frame in the middle of the push
 
 
 def bench_objects(predictor: PerObject, dataset: Dataset | None) -> dict[str, Any]:
     """Measures the rows of each object: time and error of each quality, time of a frame, and of the simulator.
 
     A new motion is the trajectory after a change of the push, with its deformations around the contact, and all frames
-    of the window at all vertices. Solver errors compare it with an integration in much smaller steps, model errors with
+    of the window at all vertices; `first_ms` is with a single frame. Solver errors compare it with an integration in much smaller steps, model errors with
     the truth. `InputError` without a data set.
     """
     if dataset is None:
@@ -51,7 +52,11 @@ def _row(
         motion.vertices(truth.times)
         motions.append(motion)
 
+    def begin(index: int) -> None:
+        predictor.solve(None, truths[index].parameters, quality).vertices(FIRST)
+
     whole = quantiles(milliseconds(push, len(truths), warm=1))
+    first = quantiles(milliseconds(begin, len(truths), warm=1))
     scrub = quantiles(milliseconds(lambda i: motions[0].vertices(0.19 * np.modf(0.618 * i)[0]), 50))
     errors, scores = [], Scores()
     for motion, truth, fine in zip(motions[1:], truths, exact, strict=True):
@@ -66,6 +71,7 @@ def _row(
         "steps": float(np.median([motion.stats.steps for motion in motions])),
         "ms_p50": whole["p50"],
         "ms_p95": whole["p95"],
+        "first_ms": first["p50"],
         "frame_ms": scrub["p50"],
         "solver_error_mm": 1e3 * float(np.sqrt(np.mean(errors))),
         "model_error_mm": scores.result()["rmse_pooled_mm"],

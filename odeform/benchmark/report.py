@@ -27,7 +27,7 @@ def report(result: Mapping[str, Any]) -> str:
 
 def _objects(result: Mapping[str, Any]) -> list[str]:
     found = result["objects"]
-    columns = ("object", "quality", "points", "steps", "ms_p50", "ms_p95", "frame_ms", "solver_error_mm")
+    columns = ("object", "quality", "points", "steps", "ms_p50", "ms_p95", "first_ms", "frame_ms", "solver_error_mm")
     title = f"a new motion of {found['sequences']} pushes of the test split: a trajectory and all of its frames"
     lines = _table(title, found["qualities"], (*columns, "model_error_mm"))
     return lines + _table("the simulator, beside the default quality", found["simulator"], ("object", *SIMULATED))
