@@ -26,8 +26,8 @@ def bench_objects(predictor: PerObject, dataset: Dataset | None) -> dict[str, An
     """Measures the rows of each object: time and error of each quality, time of a frame, and of the simulator.
 
     A new motion is the trajectory after a change of the push, with its deformations around the contact, and all frames
-    of the window at all vertices; `first_ms` is with a single frame. Solver errors compare it with an integration in much smaller steps, model errors with
-    the truth. `InputError` without a data set.
+    of the window at all vertices; `first_ms` is with a single frame. Solver errors compare it with an integration in
+    much smaller steps, model errors with the truth. `InputError` without a data set.
     """
     if dataset is None:
         raise InputError("bench: expected a data set of pushed objects: --data DIR")

@@ -1,6 +1,6 @@
 """The basis on a geometry: what is computed once per geometry and azimuth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ from odeform.geometry.rigid import rotation_z
 from odeform.geometry.shape import surface_weights
 from odeform.motion.local_frames import Axes, LocalFrames, evaluate_local_frames
 from odeform.motion.reduced_space import ReducedSpace, to_canonical
-from odeform.types import GaussianSplats, Geometry, Perpoint, Points
+from odeform.types import GaussianSplats, Geometry, Ints, Perpoint, PointCloud, Points
 
 __all__ = ["STILL", "EvaluatedBasis", "evaluate_basis"]
 
@@ -41,6 +41,13 @@ class EvaluatedBasis:
     def values(self) -> Float[np.ndarray, "modes entries"]:
         """(K, 3 N): the modes."""
         return self.rows[STILL:]
+
+    def some(self, chosen: Ints) -> "EvaluatedBasis":
+        """The basis on `chosen` (M,) of its points alone."""
+        points = self.points[chosen]
+        rows = self.rows.reshape(len(self.rows), -1, 3)[:, chosen].reshape(len(self.rows), -1)
+        rest, areas = self.rest[chosen], self.areas[chosen]
+        return replace(self, geometry=PointCloud(points), points=points, rest=rest, rows=rows, areas=areas)
 
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:

@@ -39,6 +39,7 @@ from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
+from odeform.motion.body import CheckedBody
 from odeform.motion.evaluated_basis import EvaluatedBasis
 from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.ground import Ground
@@ -51,14 +52,14 @@ from odeform.schema import Parameters
 from odeform.simulation.contacts import MASS, YOUNG
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.solver.integrate import SolverSettings
-from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, Times, Vectors
+from odeform.types import Basis, Floats, Geometry, Mesh, MotionSequence, PointCloud, Times, Vectors
 
 if TYPE_CHECKING:
     from odeform.models.training.run import Run
 
 __all__ = ["EXACT", "QUALITIES", "ModalModel"]
 
-HEIGHTS = 2  # times of each trained frame at which it is looked up how low a body is
+HEIGHTS = 1  # times of each trained frame at which it is looked up how low a body is
 SAME = 1e-3  # relative difference of mass or stiffness from which on they count as changed
 SETTLED = 4  # bodies of another mass and stiffness that are kept
 SKIN = 1e-3  # m below the floor, where what lies on it is flat: bodies at rest are up to that deep in it
@@ -225,8 +226,6 @@ class ModalModel(Model):
         # a softer body deforms more before it is lost
         largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
         out.space = replace(self.space, largest=largest)
-        every = replace(self.checked_body.all, space=out.space)
-        out.checked_body = replace(self.checked_body, all=every)
         if self.residual is not None:
             # what mechanics misses of the rigid motion are impulses, which move a heavier body less; a lighter one
             # leaves the sphere earlier, so that nothing says it misses more
@@ -239,7 +238,17 @@ class ModalModel(Model):
             )
             if self.load is not None:
                 out._flat_on = self._flat_below(out.settled_body.rest)
+        out._measured_body = self._measured_body
+        every = replace(self._measured_body.all, space=out.space)
+        if (settled := out.settled_body) is not None:
+            every = settled.basis(every, PointCloud(settled.rest.points))
+        out.checked_body = replace(self._measured_body, all=every)
         return out
+
+    @cached_property
+    def _measured_body(self) -> CheckedBody:
+        """The body as it was measured, for the checks of motions."""
+        return super().checked_body
 
     def with_contact_parameters(self, contact_parameters: ContactParameters) -> "ModalModel":
         """The same bodies, which meet the floor in another way, and lie on it as before."""
