@@ -26,7 +26,7 @@ PARAMETERS = {
     "beside": "sideways",
     "held_around": "azimuth",
     "held_up": "elevation",
-    "held_width": "patch width",
+    "held_width": "width",
     "other_turn": "other's turn",
 }
 CONSTANTS = {

@@ -127,9 +127,9 @@ def test_a_patch_of_nothing_is_refused_on_the_page_in_words(serve: Any, column: 
     rest, given = get_object("donut").rest_mesh(), app.request().parameters | {"held_width": 4.7}
     around = next(float(a) for a in range(-180, 180, 5) if _refused(rest, {**given, "held_around": float(a)}))
     client.set("patch azimuth (°)", around)
-    client.set("patch width (%)", 4.7)
+    client.set("width (%)", 4.7)
     assert client.until(lambda: "which holds" in client.text())
-    client.set("patch width (%)", 25.0)
+    client.set("width (%)", 25.0)
     assert client.until(lambda: _shows(app, "object-hold"))
     assert app.presenter.frame.columns[0].motion.parameters["held_width"] == 25.0
 
