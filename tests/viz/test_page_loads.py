@@ -126,7 +126,7 @@ def test_a_patch_of_nothing_is_refused_on_the_page_in_words(serve: Any, column: 
     client.set("object", "donut")
     rest, given = get_object("donut").rest_mesh(), app.request().parameters | {"held_width": 4.7}
     around = next(float(a) for a in range(-180, 180, 5) if _refused(rest, {**given, "held_around": float(a)}))
-    client.set("patch azimuth (°)", around)
+    client.set("azimuth (°)", around)
     client.set("width (%)", 4.7)
     assert client.until(lambda: "which holds" in client.text())
     client.set("width (%)", 25.0)
