@@ -1,0 +1,71 @@
+"""The check of the floor finds the lowest vertex of a body that is deformed, or of another mass and stiffness."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+import odeform
+from odeform.models.modal.model import ModalModel
+from odeform.models.per_object import PerObject
+
+LIMIT, SPARE = 5e-3, 5e-5  # m that a body may be shown below the floor, and what rounding adds
+TIMES = np.linspace(0.01, 0.6, 60)
+# found by stress: a leg of a heavy and soft dog, a corner of a pillow, the tail of a cat, a strap that is pushed down
+PUSHES = (
+    {
+        "object": "dog",
+        "contact": (0.1982, -0.0246, 0.2096),
+        "force": (-3.82, 22.942, -2.4478),
+        "mass": 2.6583,
+        "young": 56.2465,
+    },
+    {
+        "object": "pillow",
+        "contact": (0.1709, -0.1338, 0.069),
+        "force": (-0.398, 0.4379, -3.315),
+        "mass": 0.4476,
+        "young": 7.7197,
+    },
+    {
+        "object": "cat",
+        "contact": (0.0037, -0.0094, 0.1819),
+        "force": (7.9128, 4.4488, 1.9172),
+        "mass": 0.6113,
+        "young": 108.799,
+    },
+    {
+        "object": "flip-flop",
+        "contact": (0.0184, -0.0304, 0.0696),
+        "force": (3.4421, -0.3134, -4.7077),
+        "mass": 0.1931,
+        "young": 172.9946,
+    },
+)
+
+
+@pytest.fixture(scope="module")
+def predictor() -> PerObject:
+    found = odeform.load("contact-force")
+    assert isinstance(found, PerObject)
+    return found
+
+
+@pytest.mark.parametrize("push", PUSHES, ids=[str(push["object"]) for push in PUSHES])
+def test_no_vertex_is_shown_deeper_than_the_limit(predictor: PerObject, push: Mapping[str, object]) -> None:
+    vectors = {f"{name}_{axis}": x for name in ("contact", "force") for axis, x in zip("xyz", push[name], strict=True)}  # pyright: ignore[reportArgumentType]
+    parameters = {key: value for key, value in push.items() if key not in ("contact", "force")} | vectors
+    lowest = predictor.solve(parameters=parameters).vertices(TIMES)[:, :, 2].min()
+    assert lowest > -LIMIT - SPARE
+
+
+def test_few_points_are_nearly_as_low_as_all(predictor: PerObject) -> None:
+    for name in predictor.schema.objects:
+        part = predictor.parts[name]
+        assert isinstance(part, ModalModel)
+        body = part.checked_body
+        directions = np.random.default_rng(3).normal(size=(400, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        every, few = ((each.rest.astype(float) @ directions.T).min(axis=0) for each in (body.all, body.few))
+        assert (few - every).max() < 3e-3, name
+        assert len(body.few.rest) < 0.5 * len(body.all.rest)
