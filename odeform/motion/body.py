@@ -85,7 +85,7 @@ class CheckedBody:
 
     @cached_property
     def _centre(self) -> Floats:
-        return self.few.rest.mean(axis=0, dtype=float)
+        return self.all.rest.mean(axis=0, dtype=float)
 
 
 def _lowest(evaluated: EvaluatedBasis, y: Floats, rotation: Rotations, shift: Vectors) -> Times:

@@ -130,6 +130,8 @@ def _rival(predictor: Predictor, dataset: Dataset, split: str) -> dict[str, Any]
 
 
 def errors_of(model: ModalModel, impacts: Sequence[Impact]) -> dict[str, Any]:
+    """Mean errors of a model, and of a body that does not deform, on impacts: relative to the displacement, in mm and
+    degrees; and what a motion takes, in ms."""
     evaluated = model.evaluate_basis(model.rest, 0.0)
     stiff = replace(model.contact_parameters, stiffness=RIGID)
     models = {"model": model, "rigid": model.with_contact_parameters(stiff)}
