@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from odeform.dataset.index import Dataset
+from odeform.geometry.directions import even_directions
 from odeform.models.base import Predictor
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.scenes.registry import find_scene
@@ -19,9 +20,7 @@ def _round(points: int, predictor: Predictor) -> tuple[Points, Points]:
     """`points` points on a sphere where the body of the predictor rests, in m, and their unit normals; (N, 3) each."""
     rest = np.asarray(predictor.rest.points, dtype=float)
     centre, radius = 0.5 * (rest.min(axis=0) + rest.max(axis=0)), 0.5 * np.ptp(rest, axis=0).max()
-    index = np.arange(points) + 0.5
-    polar, turn = np.arccos(1.0 - 2.0 * index / points), np.pi * (1.0 + 5.0**0.5) * index
-    unit = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1)
+    unit = even_directions(points)
     return (centre + radius * unit).astype(np.float32), unit
 
 

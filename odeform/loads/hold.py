@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from odeform.errors import InputError
+from odeform.geometry.directions import even_directions
 from odeform.loads.arrow import Arrow
 from odeform.loads.drop import PARAMETERS, WINDOW, height_of, turn_of
 from odeform.loads.load import Load
@@ -80,7 +81,7 @@ def held_towards(rest: Mesh, place: Vector) -> dict[str, float]:
     """The angles under which the held vertex of a resting body is nearest to a place (3,) m on it. Some places, such as
     the inside of a ring, are behind others under all angles."""
     points = np.asarray(rest.points, dtype=float)
-    directions = _directions()
+    directions = even_directions(DIRECTIONS)
     low, high = points.min(axis=0), points.max(axis=0)
     far = 0.5 * (low + high) + float((high - low).max()) * directions
     vertices = KDTree(points).query(far)[1]
@@ -90,14 +91,6 @@ def held_towards(rest: Mesh, place: Vector) -> dict[str, float]:
     x, y, z = directions[np.where(away <= away.min(), directions @ mean, -np.inf).argmax()]
     up, around = np.degrees([np.arcsin(z), np.arctan2(y, x)])
     return {"held_around": round(float(around), 1), "held_up": round(float(up), 1)}
-
-
-def _directions() -> Points:
-    """(D, 3) unit vectors, spread evenly."""
-    index = np.arange(DIRECTIONS) + 0.5
-    z, turn = 1.0 - 2.0 * index / DIRECTIONS, np.pi * (1.0 + np.sqrt(5.0)) * index
-    across = np.sqrt(1.0 - z**2)
-    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
 
 
 def arrows(start: Mesh, parameters: Parameters) -> tuple[Arrow, ...]:

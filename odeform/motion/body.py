@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from odeform.geometry.directions import even_directions
 from odeform.loads.obstacle import Obstacle
 from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.plausibility import Sample
@@ -109,7 +110,7 @@ def _outermost(every: EvaluatedBasis) -> Ints:
     """A few points such that none is farther in any direction, at rest or deformed, by more than `CLOSE`, as far as
     draws tell."""
     rest, modes, largest = every.rest - every.rest.mean(axis=0), every.values, every.space.largest[1]
-    directions, random = _directions(DRAWS).astype(np.float32), np.random.default_rng(0)
+    directions, random = even_directions(DRAWS).astype(np.float32), np.random.default_rng(0)
     # softer modes have larger amplitudes, in some draws more so than in others: stiff ones move thin parts
     softer = (1.0 + np.arange(len(modes))) ** random.uniform(0.0, 0.5, (DRAWS, 1))
     amplitudes = random.normal(size=softer.shape) / softer
@@ -123,11 +124,3 @@ def _outermost(every: EvaluatedBasis) -> Ints:
         missing = away.max(axis=1) - away[:, chosen].max(axis=1, initial=-np.inf) > CLOSE
         chosen = np.unique(np.concatenate([chosen, away[missing].argmax(axis=1)]))
     return chosen
-
-
-def _directions(count: int) -> Points:
-    """(count, 3) unit vectors, spread evenly (a Fibonacci lattice)."""
-    index = np.arange(count) + 0.5
-    height, turn = 1.0 - 2.0 * index / count, np.pi * (1.0 + 5.0**0.5) * index
-    radius = np.sqrt(1.0 - height**2)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from odeform.geometry.directions import even_directions
 from odeform.geometry.harmonics import harmonic_basis
 from odeform.types import GaussianSplats, Points, Vector, Vectors
 
@@ -16,7 +17,7 @@ DIRECTIONS, BLOCK = 256, 4096
 
 def glossy(splats: GaussianSplats, normals: Vectors, toward_light: Vector, strength: float) -> GaussianSplats:
     """Adds a white highlight to splats with unit `normals` (N, 3), by Phong's model: it moves with the view."""
-    directions = _sphere(DIRECTIONS)
+    directions = even_directions(DIRECTIONS)
     basis = harmonic_basis(directions, DEGREE) * (4.0 * np.pi / DIRECTIONS)
     added = np.concatenate(
         [_lobe(directions, normals[at : at + BLOCK], toward_light) @ basis for at in range(0, len(normals), BLOCK)]
@@ -31,11 +32,3 @@ def _lobe(directions: Vectors, normals: Points, toward_light: Vector) -> np.ndar
     facing = normals @ directions.T
     mirrored = (directions @ toward_light) - 2.0 * facing * (normals @ toward_light)[:, None]
     return np.where(facing < 0.0, np.maximum(mirrored, 0.0) ** SHARP, 0.0)
-
-
-def _sphere(count: int) -> Vectors:
-    """(D, 3) evenly spread directions: a Fibonacci spiral."""
-    index = np.arange(count) + 0.5
-    z, angle = 1.0 - 2.0 * index / count, index * np.pi * (3.0 - np.sqrt(5.0))
-    flat = np.sqrt(1.0 - z**2)
-    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)
