@@ -12,7 +12,7 @@ from odeform.motion.evaluated_basis import EvaluatedBasis, evaluate_basis
 from odeform.motion.plausibility import Sample
 from odeform.motion.recent import Recent
 from odeform.motion.reduced_space import POSE, ReducedSpace, rotation_of
-from odeform.types import Floats, Ints, Mesh, PointCloud, Points, Rotations, Times, Vectors
+from odeform.types import Floats, Ints, Mesh, PointCloud, Rotations, Times, Vectors
 
 __all__ = ["CheckedBody", "checked_body"]
 
