@@ -76,10 +76,10 @@ class _Expert:
     regression: KernelRegression
     mean: Floats
 
-    def predict(self, inputs: ContactInputs, turned: bool, scaled: Floats | None = None) -> Floats:
-        """(R, M) outputs; with `turned`, three-vectors, carried from the expert's frame to the axes of the body.
-        `scaled` are the inputs by its scaling, where they are known."""
-        values = self.regression(self.scaling(inputs) if scaled is None else scaled) + self.mean
+    def predict(self, scaled: Floats, inputs: ContactInputs, turned: bool) -> Floats:
+        """(R, M) outputs at inputs, by its scaling and as they are; with `turned`, three-vectors, carried from the
+        expert's frame to the axes of the body."""
+        values = self.regression(scaled) + self.mean
         return _turned_back(values, inputs.frames(self.scaling.frame)) if turned else values
 
 
@@ -141,7 +141,7 @@ class ContactRegression:
             # all weights may be zero
             values = np.zeros((len(inputs.contact), 3 * self._frames if turned else len(self._modes)))
             for weight, expert in experts:
-                values += weight * expert.predict(inputs, turned, scaled[expert.scaling.frame])
+                values += weight * expert.predict(scaled[expert.scaling.frame], inputs, turned)
             flat = values if turned else (values.astype(np.float32) @ self._modes).astype(float)
             parts.append(flat.reshape(len(values), self._frames, -1))
         return np.concatenate(parts, axis=2)
@@ -174,7 +174,7 @@ def fit_contact_regression(
         turned = part != "deformation"
         fitted = [_fitted(known, flat["train"][part], frame, linear, turned) for frame, linear in EXPERTS]
         truth = np.concatenate([flat["train"][part], flat["val"][part]])
-        predicted = [np.concatenate([others, e.predict(asked, turned)]) for e, others in fitted]
+        predicted = [np.concatenate([others, e.predict(e.scaling(asked), asked, turned)]) for e, others in fitted]
         errors = [float(np.sqrt(((p - truth)[len(flat["train"][part]) :] ** 2).mean())) for p in predicted]
         blend[part] = _blend(predicted, truth, errors)
         residual = np.tensordot(blend[part], predicted, axes=1) - truth
