@@ -7,7 +7,7 @@ import viser.transforms as vtf
 from odeform.loads.registry import first_body
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
-from odeform.types import Floats, GaussianSplats, Mesh, Points, Pose
+from odeform.types import Floats, GaussianSplats, Mesh, Perpoint, Points, Pose
 from odeform_viz.colors import Color
 from odeform_viz.columns import Column
 from odeform_viz.pushing import ShownPush, push_shown
@@ -135,6 +135,10 @@ class ColumnView:
             points = self._refined.points(points)
         self._shape.show(points, frame.covariances, look)
         self._show_ghost(options.ghost)
+
+    def drawn(self, values: Perpoint) -> Perpoint:
+        """(M,) values at the vertices that are drawn, for those (N,) of the column's body."""
+        return values if self._refined is None else self._refined.values(values)
 
     def _deformed(self, frame: ColumnFrame, exaggeration: float) -> Points | None:
         """The body before its pose, (N, 3) m; None at rest."""

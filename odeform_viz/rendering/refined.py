@@ -7,7 +7,7 @@ import trimesh
 from scipy import sparse
 from scipy.spatial import KDTree
 
-from odeform.types import Faces, Ints, Mesh, Points
+from odeform.types import Faces, Ints, Mesh, Perpoint, Points
 
 __all__ = ["Refined", "refined"]
 
@@ -26,6 +26,10 @@ class Refined:
     def points(self, coarse: Points) -> Points:
         """The finer vertices (M, 3) m for the coarser ones (N, 3) m."""
         return (self.mesh.points + self.weights @ (coarse - self.rest)).astype(np.float32)
+
+    def values(self, coarse: Perpoint) -> Perpoint:
+        """(M,) values at the finer vertices for (N,) values at the coarser ones."""
+        return self.weights @ coarse
 
 
 def refined(coarse: Mesh, fine: Mesh) -> Refined | None:

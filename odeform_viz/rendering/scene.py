@@ -94,7 +94,7 @@ class SceneView:
                 view, index = self._views[shown.column.key][1], row.index(shown.column.key)
                 view.stand(framing.offsets[index], framing.stage if discs else None, options.follow, shown)
                 values = coloring.values.get(shown.column.key) if coloring else None
-                colors = colors_of(values, coloring.scale) if coloring and values is not None else None
+                colors = colors_of(view.drawn(values), coloring.scale) if coloring and values is not None else None
                 view.show(shown, options, self._look(shown, options, shown is first, colors))
                 if shown.column.fit and shown.column.fit.static is not None:
                     self._stage.place_background(shown.column.fit.static, framing.offsets[index])
