@@ -18,9 +18,8 @@ class Check:
     @property
     def holds(self) -> bool:
         """Whether the figure keeps its bound."""
-        return math.isfinite(self.figure) and (
-            self.figure >= self.bound if self.at_least else self.figure <= self.bound
-        )
+        kept = self.figure >= self.bound if self.at_least else self.figure <= self.bound
+        return math.isfinite(self.figure) and bool(kept)  # no boolean of NumPy, which JSON has no word for
 
     def to_json(self) -> dict[str, Any]:
         """Returns `holds`, `figure` (None: not finite) and `bound`."""

@@ -28,7 +28,7 @@ from odeform.schema import OBJECT
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.types import Arrays
 
-__all__ = ["fit", "print_line", "scored", "train"]
+__all__ = ["fit", "print_line", "provenance_of", "scored", "train"]
 
 
 def print_line(line: str) -> None:
@@ -113,7 +113,7 @@ def fit(
     trained = train_model(Run(dataset, request, body_arrays(dataset), part, report, loss, device))
     # the processor time of all sittings of a resumed training
     seconds = trained.config.get("val", {}).get("seconds", time.process_time() - begin)
-    provenance = {**_provenance(dataset, request, seconds), **trained.provenance}
+    provenance = {**provenance_of(dataset, request, seconds), **trained.provenance}
     checkpoint = scored(replace(trained, provenance=provenance), dataset, parts)
     beyond = "" if window is None else f", with frames outside of {window[0]}:{window[1]}"
     report(f"test: pooled RMSE {checkpoint.scores['rmse_pooled_mm']:.3f} mm{beyond}")
@@ -204,7 +204,8 @@ def _calibration(predictor: Predictor, dataset: Dataset) -> Arrays:
     return calibrate(predictor, dataset).arrays()
 
 
-def _provenance(dataset: Dataset, request: TrainRequest, seconds: float) -> dict[str, Any]:
+def provenance_of(dataset: Dataset, request: TrainRequest, seconds: float) -> dict[str, Any]:
+    """What a checkpoint tells of its training, which took `seconds` of processor time: commands, data, versions."""
     return {
         "command": [_data_command(dataset.provenance), request.command],
         "dataset": dataset.provenance,

@@ -25,8 +25,8 @@ class PointBatch:
     """(F, B) times in windows."""
     begin: Any
     """(B, 3) displacements at the first time, in units of the data's scale."""
-    finer: float
-    """Scale of displacements less their mean over the body, in units of the data's scale."""
+    finer: Any
+    """Scale of displacements less their mean over the body, in units of the data's scale: one number."""
 
 
 @dataclass(frozen=True)

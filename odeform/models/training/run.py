@@ -21,7 +21,7 @@ from odeform.types import Arrays
 if TYPE_CHECKING:
     from odeform.models.training.loss import Loss
 
-__all__ = ["Run", "train_model"]
+__all__ = ["Run", "train_model", "with_ranges_of_data"]
 
 NARROW = 1e-3  # of a scene's range, by which that of an object is wider than its data
 
@@ -93,7 +93,7 @@ def _train_each(run: Run) -> Checkpoint:
     request = replace(request, minutes=request.minutes / len(objects), steps=steps)
     parts = {}
     for name in objects:
-        dataset = _with_ranges_of_data(run.dataset.of(name))
+        dataset = with_ranges_of_data(run.dataset.of(name))
 
         def report(line: str, name: str = name) -> None:
             run.report(f"{name}: {line}")
@@ -103,7 +103,7 @@ def _train_each(run: Run) -> Checkpoint:
     return joined(run.dataset.schema, parts)
 
 
-def _with_ranges_of_data(dataset: Dataset) -> Dataset:
+def with_ranges_of_data(dataset: Dataset) -> Dataset:
     """Data whose schema has the ranges of its training sequences: contacts differ with the body, and so do forces."""
     rows = [entry.parameters for entry in dataset.select("train")]
     if not rows:

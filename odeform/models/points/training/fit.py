@@ -21,7 +21,7 @@ from odeform.models.points.arithmetic import Net
 from odeform.models.points.point_model import PointModel, point_checkpoint
 from odeform.models.points.point_network import PointNet, Trial, sum_of
 from odeform.models.points.training.point_data import PointData, prepare_points
-from odeform.models.points.training.samplers import SAMPLERS
+from odeform.models.points.training.samplers import SAMPLERS, Sample, Sampler
 from odeform.models.points.training.torch_arithmetic import Torch
 from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.loss import Loss, torch_device
@@ -29,7 +29,18 @@ from odeform.models.training.part import read_part, write_part
 from odeform.models.training.run import Run
 from odeform.types import Arrays
 
-__all__ = ["fit_points", "initial_weights", "train_points"]
+__all__ = [
+    "BETWEEN",
+    "CLIP",
+    "FRACTION",
+    "WARM",
+    "all_validated",
+    "fit_points",
+    "initial_weights",
+    "network_checkpoint",
+    "parts_loss",
+    "train_points",
+]
 
 FRACTION = 0.2  # length of a trial, relative to the final training
 WARM = 0.03  # fraction of the length in which the learning rate rises
@@ -49,6 +60,30 @@ def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dic
     return out
 
 
+def parts_loss(
+    parts: list[torch.Tensor], truth: torch.Tensor, centre: torch.Tensor, weights: torch.Tensor, finer: Any
+) -> torch.Tensor:
+    """The sum over parts (F, B, 3) of their mean squared error, weighted (F, B, 1), in units of each part's scale.
+
+    Of several parts the first is the motion of the whole body, `centre` (F, B, 3), and the second what is left of the
+    `truth`, whose scale is `finer` times that of the data.
+    """
+    targets = [truth] if len(parts) == 1 else [centre, truth - centre]
+    sizes = [1.0] if len(parts) == 1 else [1.0, finer]
+    squares = [
+        weights * ((part - target) / size) ** 2 for part, target, size in zip(parts, targets, sizes, strict=True)
+    ]
+    return torch.stack([part.mean() for part in squares]).sum()
+
+
+def all_validated(split: Sampler) -> Sample:
+    """Every frame of validation sequences in turn, each of one point: the same in every trial."""
+    sequences, _, points, _ = split.moved.shape
+    generator = torch.Generator().manual_seed(0)
+    drawn = torch.randint(0, points, (VALIDATED,), generator=generator)
+    return split.all_frames(torch.arange(VALIDATED) % sequences, drawn)
+
+
 class _Learner:
     """One training of one network."""
 
@@ -63,18 +98,12 @@ class _Learner:
         self.net = Net(self.weights, Torch())
         self.optimiser = torch.optim.Adam(self.weights.values(), lr=trial.rate)
         self.generator = torch.Generator().manual_seed(seed + 1)
-        self.validated_on = self._draw_validated()
+        self.validated_on = all_validated(self.val_split)
         self.best = (math.inf, self._snapshot())
         self.done, self.elapsed = 0, 0.0
 
     def _snapshot(self) -> Arrays:
         return {name: weight.detach().cpu().numpy().copy() for name, weight in self.weights.items()}
-
-    def _draw_validated(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """Validation sequences in turn, and a point of each: the same in every trial."""
-        sequences, _, points, _ = self.val_split.moved.shape
-        generator = torch.Generator().manual_seed(0)
-        return torch.arange(VALIDATED) % sequences, torch.randint(0, points, (VALIDATED,), generator=generator)
 
     def _loss(self, fraction: float) -> torch.Tensor:
         train = self.train_split
@@ -85,13 +114,7 @@ class _Learner:
         if self.given_loss is not None:
             guessed, known = (1e-3 * self.scale_mm * y for y in (sum_of(parts), truth))
             return self.given_loss(guessed, known, weights.expand_as(truth)[..., 0])
-        # of several parts the first is the motion of the whole body: each has a target of its own
-        targets = [truth] if len(parts) == 1 else [centre, truth - centre]
-        sizes = [1.0] if len(parts) == 1 else [1.0, train.finer]
-        squares = [
-            weights * ((part - target) / size) ** 2 for part, target, size in zip(parts, targets, sizes, strict=True)
-        ]
-        return torch.stack([part.mean() for part in squares]).sum()
+        return parts_loss(parts, truth, centre, weights, train.finer)
 
     def advance(self, fraction: float) -> float:
         """One step of descent at this fraction of the length; returns its loss."""
@@ -109,7 +132,7 @@ class _Learner:
     @torch.no_grad()
     def validate(self) -> float:
         """Pooled RMSE in mm on validation; keeps the weights if they are the best so far."""
-        sample = self.val_split.all_frames(*self.validated_on)
+        sample = self.validated_on
         batch, truth, _ = self.val_split.batch(sample)
         squares = (sum_of(self.network.predict(self.net, batch)) - truth).square()
         error = self.scale_mm * float((self.val_split.weights(sample) * squares).mean().sqrt())
@@ -174,11 +197,18 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
     error, weights = learner.best
     val = {"val_rmse_mm": error, "steps": learner.done, "seconds": time.process_time() - begin}
     config = {**asdict(best), "every": data.given, "trials": trials, "val": val}
+    return network_checkpoint(request.model, network, data, weights, config)
+
+
+def network_checkpoint(
+    model: str, network: PointNet, data: PointData, weights: Arrays, config: dict[str, Any]
+) -> Checkpoint:
+    """The checkpoint of weights that were trained on `data`, without the body that viewers show."""
     schema = data.schema
     if network.sampling != "between":
         # networks of the time, or of the last frame, continue beyond the window
         schema = replace(schema, window=replace(schema.window, reach=AHEAD))
-    return point_checkpoint(request.model, schema, data.frame, data.mean, weights, config)
+    return point_checkpoint(model, schema, data.frame, data.mean, weights, config)
 
 
 def train_points(model: type[PointModel], run: Run) -> Checkpoint:
