@@ -15,13 +15,13 @@ from odeform.types import Mesh
 
 __all__ = ["LOAD"]
 
-DEEP, WIDE, BELOW = 0.5, 0.5, 0.1  # m: along x, to each side, and what of it is below the floor
+DEEP, WIDE = 0.5, 0.5  # m: along x, and to each side
 HEIGHT = Parameter("height", "m", 0.18, 0.4, 0.25, description="of the body's lowest point above the floor")
 
 
 def step(distance: float, rise: float) -> Obstacle:
-    """A box on the floor that begins at x = distance m."""
-    low, high = np.array([0.0, -WIDE, -BELOW]), np.array([DEEP, WIDE, rise])
+    """A box on the floor that begins at x = distance m. It has no lower side, through which nothing could leave it."""
+    low, high = np.array([0.0, -WIDE, -np.inf]), np.array([DEEP, WIDE, rise])
     shown = np.array([0.0, -WIDE, 0.0]), high
     return Obstacle(np.array([distance, 0.0, 0.0]), low, high, shown, name="step")
 

@@ -10,6 +10,8 @@ from odeform.types import Floats
 
 __all__ = ["obstacle_xml"]
 
+BELOW = 0.1  # m of a box that reaches down without an end, below what is drawn of it
+
 
 def obstacle_xml(obstacles: Sequence[Obstacle], contact: Contact) -> str:
     """The XML of geoms that bodies meet as they meet the floor: the skin of their contacts outside the obstacles.
@@ -21,7 +23,8 @@ def obstacle_xml(obstacles: Sequence[Obstacle], contact: Contact) -> str:
 
 def _shape(obstacle: Obstacle) -> str:
     low, high = obstacle.low + CONTACT_RADIUS, obstacle.high - CONTACT_RADIUS
-    if np.isfinite([low, high]).all():
+    if np.isfinite([*low[:2], *high]).all():
+        low[2] = max(low[2], obstacle.shown[0][2] - BELOW + CONTACT_RADIUS)
         middle = obstacle.place + obstacle.turn @ (0.5 * (low + high))
         axes = f'xyaxes="{_text(obstacle.turn[:, 0])} {_text(obstacle.turn[:, 1])}"'
         return f'type="box" size="{_text(0.5 * (high - low))}" pos="{_text(middle)}" {axes}'

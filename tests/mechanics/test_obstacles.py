@@ -56,6 +56,12 @@ def test_distances_and_normals_of_a_box() -> None:
     np.testing.assert_array_equal(kept[:3], points[:3])
 
 
+def test_what_is_deep_in_a_step_does_not_leave_it_through_the_floor() -> None:
+    deep = np.array([[0.75, 0.0, 0.01]])  # 0.19 m below the top, 0.25 m from the sides
+    step(0.5, 0.2).keep_out(deep)
+    np.testing.assert_allclose(deep, [[0.75, 0.0, 0.2]], atol=1e-12)
+
+
 @pytest.mark.parametrize("obstacle", [wall(0.3), step(0.3, 0.1), slope(0.3, 0.5)], ids=["wall", "step", "slope"])
 def test_normals_are_the_slopes_of_distances(obstacle: Obstacle) -> None:
     points, small = np.random.default_rng(0).uniform(-0.6, 0.6, (200, 3)), 1e-6
