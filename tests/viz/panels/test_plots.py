@@ -71,11 +71,16 @@ def test_the_trained_window_sets_the_axis_and_the_rest_is_cut_off(line: Line, dr
 def test_a_truth_that_is_over_has_no_curves(drop: Predictor) -> None:
     truth = truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}")
     assert truth.truth is not None
-    session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest), truth]).all
-    request = ViewRequest(drop.schema.complete(truth.truth.parameters), 0.3, "balanced", columns)
+    assert truth.truth.rests, "the drop ends because the ball lies still"
+    falling = replace(truth.truth, sequence=truth.truth.sequence.until(0.5))
+    columns = Columns.of([Column("odeform", drop, drop.rest), replace(truth, source=falling)]).all
+    session, request = (
+        Session(drop.schema),
+        ViewRequest(drop.schema.complete(falling.parameters), 0.3, "balanced", columns),
+    )
     frame = session.frame(request)
     curves = session.curves(frame.columns[1], request)
-    over = curves.times > truth.truth.end
+    over = curves.times > falling.end
     assert over.any()
     for values in (curves.height, curves.rotation, curves.deformation):
         assert np.isnan(values[over]).all()

@@ -107,7 +107,8 @@ def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(
     stub, coarse = StubPredictor(), trimesh.creation.icosphere(1, 0.1)
     sequence = recorded(stub, {"mass": 0.5})
     points = coarse.vertices + np.array([0.0, 0.0, 0.1])
-    frames = np.stack([points] * len(sequence.times)).astype(np.float32)
+    rising = sequence.times[:, None, None] * [0.0, 0.0, 0.1]
+    frames = np.add(points, rising).astype(np.float32)
     weights = np.full(len(points), 1.0 / len(points), np.float32)
     faces = np.asarray(coarse.faces, np.int32)
     record = RecordedMotion(SCHEMA, replace(sequence, vertices=frames, faces=faces, weights=weights))
@@ -121,6 +122,12 @@ def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(
     assert truth.opacity is None
     view.publish(session.frame(replace(request, time=record.end + 0.1)), DisplayOptions(), None)
     assert truth.opacity is not None
+    lies = RecordedMotion(SCHEMA, replace(record.sequence, vertices=np.repeat(frames[:1], len(frames), axis=0)))
+    resting = Columns.of([Column("stub", stub, stub.rest), Column("truth", lies, lies.geometry)]).all
+    view.publish(session.frame(replace(request, columns=resting, time=lies.end + 0.1)), DisplayOptions(), None)
+    truth = server.scene.get_handle_by_name(f"/world/column_{resting[1].key}/body/part_0")
+    assert isinstance(truth, viser.MeshHandle)
+    assert truth.opacity is None
 
 
 def cancelled() -> Box:
