@@ -95,8 +95,8 @@ def _track(window: Window, slider: str, marks: Marks | None, known: str) -> str:
             f'<rect class="acting" x="{at(a):.1f}" width="{max(at(b) - at(a), 3.0):.1f}" y="{HEIGHT - 4}" height="4"/>'
             for a, b in marks.acting
         ]
-        if marks.truth_end is not None:
-            x = at(min(marks.truth_end, end))
+        if marks.truth_end is not None and marks.truth_end < end - 1e-6:
+            x = at(marks.truth_end)
             parts.append(f'<path class="mark" d="M{x:.1f} 0V{HEIGHT}"/>')
             if x > WIDTH - ROOM:  # both would stand in one place
                 last = f"truth until {marks.truth_end:.3g} s"

@@ -97,6 +97,14 @@ def test_an_axis_reaches_below_zero_where_a_curve_does(line: Line, drop: Predict
     assert ">-0.3</text>" in plots_html([(*line[:2], sunk)], drop.schema.window, rotates=False)
 
 
+def test_a_dashed_line_is_named_where_there_is_one(line: Line) -> None:
+    name, color, curves = line
+    known = replace(curves, error=curves.height)
+    for band, title in ((None, "error"), (curves.height, "error (dashed: expected)")):
+        quantities = quantities_of([(name, color, replace(known, error_band=band))], False)
+        assert quantities[-1].title == title
+
+
 def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:
     assert 'class="curve"' not in plots_html([], drop.schema.window, rotates=False)
     assert "<i " not in legend_html([], large=False)
