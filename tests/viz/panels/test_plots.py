@@ -95,6 +95,11 @@ def test_a_truth_that_is_over_has_no_curves(drop: Predictor) -> None:
 def test_an_axis_reaches_below_zero_where_a_curve_does(line: Line, drop: Predictor) -> None:
     sunk = replace(line[2], height=-0.3 * np.ones_like(line[2].times))
     assert ">-0.3</text>" in plots_html([(*line[:2], sunk)], drop.schema.window, rotates=False)
+    times = line[2].times
+    for dip, shown in ((0.001, False), (0.02, True)):
+        dips = replace(line[2], height=np.where(times > times.mean(), 0.3, -dip))
+        html = plots_html([(*line[:2], dips)], drop.schema.window, rotates=False)
+        assert (f">-{dip:g}</text>" in html) == shown
 
 
 def test_a_dashed_line_is_named_where_there_is_one(line: Line) -> None:
