@@ -127,8 +127,8 @@ def _trained(times: Floats, window: Window) -> int:
 
 
 def _axis(values: list[Floats]) -> tuple[float, float]:
-    """Round ends of an axis that holds all values and zero; 0 and 1 if there are none. What dips below zero by less than
-    a line's width has no end of its own."""
+    """Round ends of an axis that holds all values and zero; 0 and 1 if there are none. What dips below zero by less
+    than the width of a line has no end of its own."""
     high = _round_up(max((float(np.nanmax(v, initial=0.0)) for v in values), default=0.0))
     lowest = max((float(np.nanmax(-v, initial=0.0)) for v in values), default=0.0)
     low = 0.0 - _round_up(lowest if lowest > high / HIGH else 0.0)
