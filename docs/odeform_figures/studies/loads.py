@@ -21,7 +21,7 @@ from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import best_rigid, vector_from_rotation
 from odeform.geometry.solids.overlap import overlap
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import PUSH, load_of_scene
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.training.impact_fit import FRAMES, Impact, impact_fit, impacts_of, predicted
@@ -208,20 +208,20 @@ def _vector(turn: Floats) -> Floats:
 
 
 def timed(checkpoint: str, objects: Sequence[str], draws: int, loads: Sequence[str] = TIMED) -> dict[str, Any]:
-    """How much processor time a new motion under each load takes with a frame at its end, in medians over draws of its
-    data, relative to that of a throw, if it is among them; one load after the other for each draw, so that all see the
-    same machine. `of_objects` has the median of each object."""
+    """Processor time of a new motion under each load (or push) with a frame at its end, in ms and medians over draws
+    of its data; relative to that of a throw, if it is among them. One load after the other for each draw, so that all
+    see the same machine. `of_objects` has the median of each object."""
     predictor = load(checkpoint)
-    models = {name: predictor.under(name) for name in loads}
+    models = {name: predictor if name == PUSH else predictor.under(name) for name in loads}
     taken: dict[str, dict[str, list[float]]] = {name: {item: [] for item in objects} for name in loads}
     with as_viewed():
-        for name, model in models.items():
-            for parameters in get_scene(f"object-{name}").sample(1, 1, objects):
+        for model in models.values():
+            for parameters in get_scene(model.schema.scene).sample(1, 1, objects):
                 _milliseconds(model, parameters)  # compiles, and computes what is kept
         for index in range(draws):
             for item in objects:
                 for name, model in models.items():
-                    parameters = get_scene(f"object-{name}").sample(draws, 2, [item])[index]
+                    parameters = get_scene(model.schema.scene).sample(draws, 2, [item])[index]
                     taken[name][item].append(_milliseconds(model, parameters))
     medians = {name: float(np.median([*times.values()])) for name, times in taken.items()}
     return {
