@@ -14,7 +14,7 @@ from odeform.errors import InputError
 from odeform.surroundings import Surroundings
 from odeform.types import Floats
 
-__all__ = ["LATER", "OBJECT", "REACH", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
+__all__ = ["LATER", "OBJECT", "REACH", "SHOWN", "Parameter", "Parameters", "Schema", "Window", "soft_clip"]
 
 Parameters = Mapping[str, Any]
 """Name -> value in the unit of its parameter, and "object" -> the name of a body, in a scene with several."""
@@ -29,6 +29,8 @@ LATER = 0.05
 """How far a model's clock may exceed the trained window and its reach, in windows. A ball at rest then stays so; at
 twice that, some motions of the bundled models deform several times as much as ever before, at ten times that, all."""
 MOST_FRAMES = 1_000_000
+SHOWN = 5e-3
+"""How far, relative to it, a number of three digits may be from what it stands for."""
 REACH = 3.0
 """Windows beyond the trained one over which models with a continuation keep their clock running."""
 
@@ -116,8 +118,9 @@ class Parameter:
         return self.low + (self.high - self.low) * (unit + 1.0) / 2.0
 
     def inside(self, value: float) -> bool:
-        """Whether a value lies in the trained range, up to rounding."""
-        slack = 1e-6 * (self.high - self.low)
+        """Whether a value lies in the trained range, up to rounding: of a property of the body to three digits, as
+        sliders show it."""
+        slack = SHOWN * abs(value) if self.role == "body" else 1e-6 * (self.high - self.low)
         return bool(self.low - slack <= value <= self.high + slack)
 
     def check(self, value: Any) -> float:

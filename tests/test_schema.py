@@ -73,6 +73,13 @@ def test_outside_is_told_and_the_edge_is_inside() -> None:
     assert SCHEMA.outside(SCHEMA.complete({**edge, "force": 161.0, "azimuth": 99.0})) == ("force",)
 
 
+def test_a_property_of_the_body_is_inside_to_the_three_digits_that_are_shown() -> None:
+    mass = Parameter("mass", "kg", 0.37265, 1.4906, 0.7453, "log", "body")
+    assert [mass.inside(value) for value in (0.3725, 0.37, 1.491, 1.5)] == [True, False, True, False]
+    other = replace(mass, role="physical")
+    assert not other.inside(1.491)
+
+
 def test_what_is_beyond_fades() -> None:
     inside, beyond = np.linspace(-1.0, 1.0, 41), np.array([1.0, 1.01, 1.1, 2.0, 10.0, np.inf])
     assert np.array_equal(soft_clip(inside, 1.0, 0.25), inside)

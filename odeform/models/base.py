@@ -24,7 +24,7 @@ from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.validity import Validity
-from odeform.schema import OBJECT, Parameters
+from odeform.schema import OBJECT, SHOWN, Parameters
 from odeform.simulation.contacts import CONTACT, complete_push
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
@@ -303,8 +303,8 @@ class Predictor(ABC):
         return self._rests.get(parameters.get(OBJECT, ""), self.rest)
 
     def is_changed(self, parameters: Mapping[str, Any]) -> bool:
-        """Whether the body has another mass or stiffness than its own, at which no error was measured."""
-        return any(not np.isclose(parameters.get(name, own), own, rtol=1e-3) for name, own in self.own_values.items())
+        """Whether the body has another mass or stiffness than its own, to three digits; no error is known there."""
+        return any(not np.isclose(parameters.get(name, own), own, rtol=SHOWN) for name, own in self.own_values.items())
 
     def settled(self, parameters: Mapping[str, Any]) -> Mesh:
         """The body where it rests under these parameters: where motions start. Contacts are places on `rest_of`, and

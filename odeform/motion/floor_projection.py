@@ -25,11 +25,11 @@ class FloorProjection:
         self,
         inner: Moving,
         lowest: Callable[[Floats], Floats],
-        limit: float,
+        limit: Callable[[Times], Times],
         grid: Float[np.ndarray, " grid"] | None = None,
     ) -> None:
         """`lowest` maps coordinates (R, 6 + K) of `inner` to the height of the lowest point (R,) in m, which may be
-        `limit`.
+        `limit` (T,) m at (T,) s.
 
         With `grid`, in s, the change is linear between these times; after them, each moment has its own.
         """
@@ -38,7 +38,7 @@ class FloorProjection:
     def __call__(self, times: Times, y: Floats) -> Float[np.ndarray, "*batch times y"]:
         """Maps coordinates (T, 6 + K) of `inner` at (T,) s to (T, 6 + K); of many motions, (B, T, 6 + K)."""
         if self._grid is None or times.min() > self._grid[-1]:
-            return raised(y, self._lowest, self._limit)
+            return raised(y, self._lowest, self._limit(times))
         return _moved_up(y, self._between(times, y, self._grid))
 
     def _between(self, times: Times, y: Floats, grid: Float[np.ndarray, " grid"]) -> Float[np.ndarray, "*batch times"]:
@@ -46,21 +46,22 @@ class FloorProjection:
         by = np.stack([np.interp(times, grid, each) for each in self._on_grid.reshape(-1, len(grid))])
         by = by.reshape(y.shape[:-1])
         if len(later := np.flatnonzero(times > grid[-1])):
-            by[..., later] = self._missing(y[..., later, :])
+            by[..., later] = self._missing(times[later], y[..., later, :])
         return by
 
     @cached_property
     def _on_grid(self) -> Floats:
         """(G,) m at the times of the grid, or (B, G)."""
         assert self._grid is not None
-        return self._missing(self._inner.reduced(self._grid))
+        return self._missing(self._grid, self._inner.reduced(self._grid))
 
-    def _missing(self, y: Floats) -> Floats:
-        return _missing(y, self._lowest, self._limit)
+    def _missing(self, times: Times, y: Floats) -> Floats:
+        return _missing(y, self._lowest, self._limit(times))
 
 
-def raised(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Float[np.ndarray, "*batch times y"]:
-    """Returns coordinates (..., T, 6 + K), each moment raised by itself; the others as of `FloorProjection`."""
+def raised(y: Floats, lowest: Callable[[Floats], Floats], limit: float | Times) -> Float[np.ndarray, "*batch times y"]:
+    """Returns coordinates (..., T, 6 + K), each moment raised by itself: its lowest point is not below `limit`, a
+    number or (T,) in m. The others are as of `FloorProjection`."""
     return _moved_up(y, _missing(y, lowest, limit))
 
 
@@ -71,7 +72,7 @@ def _moved_up(y: Floats, by: Floats) -> Floats:
     return y
 
 
-def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float) -> Floats:
+def _missing(y: Floats, lowest: Callable[[Floats], Floats], limit: float | Times) -> Floats:
     """(..., T) m by which coordinates (..., T, 6 + K) are raised."""
     deeper = limit - lowest(y.reshape(-1, y.shape[-1])).reshape(y.shape[:-1])
     return np.where((deeper > 0.0) & (deeper <= MOST), deeper, 0.0)  # false for what is not finite

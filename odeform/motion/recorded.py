@@ -16,10 +16,13 @@ from odeform.types import Floats, Frames, Mesh, MotionSequence, Perpoint, Points
 
 __all__ = ["RecordedMotion"]
 
+STILL = 2e-3  # m/s, RMS over the surface: twice the speed, over the mass, at which simulations end
+STILL_FOR = 0.05  # s
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """A sequence at any time: cubic between its frames, held after the last one."""
+    """A sequence at any time: cubic between its frames, held after the last one: rightly, if the body rests."""
 
     schema: Schema
     sequence: MotionSequence
@@ -66,9 +69,20 @@ class RecordedMotion:
         """Empty: a recording has no trained range."""
         return ()
 
+    @cached_property
+    def rests(self) -> bool:
+        """Whether the body lies still at the end: then the last frame is right at all later times, too."""
+        times, frames = self.sequence.times, self.sequence.vertices
+        first = int(np.searchsorted(times, self.end - STILL_FOR + 1e-9, side="right")) - 1
+        if first < 0:
+            return False
+        square = ((frames[first:].astype(float) - frames[-1]) ** 2).sum(axis=2) @ self.sequence.weights
+        moved = np.sqrt(square.max() / self.sequence.weights.sum())
+        return bool(moved < STILL * (self.end - times[first]))
+
     def extrapolates(self, time: float) -> bool:
-        """Whether the recording ended before `time`."""
-        return time > self.end + 1e-9
+        """Whether the recording ended before `time`, while the body still moved."""
+        return time > self.end + 1e-9 and not self.rests
 
     def vertices(self, t: float | Times) -> Points | Frames:
         """Computes (N, 3) float32 metres at time `t` in seconds; (T, N, 3) for (T,) times."""

@@ -184,11 +184,16 @@ class ParameterPanel(Panel):
     def _show_body(self) -> None:
         """Let the sliders of the body be those of the chosen object, as it is by itself."""
         assert self._body is not None
-        self._presets = {name: {**preset, **self._body.own} for name, preset in self._presets.items()}
+        own = self._own()
+        self._presets = {name: {**preset, **own} for name, preset in self._presets.items()}
         for parameter in self._body.parameters:
             slider = self._sliders[parameter.name]
             slider.min, slider.max = _rounded(parameter.low), _rounded(parameter.high)
-            slider.step, slider.value = _rounded(parameter.low / 50.0), _rounded(parameter.default)
+            slider.step, slider.value = _rounded(parameter.low / 50.0), own[parameter.name]
+
+    def _own(self) -> dict[str, float]:
+        """The properties of the body as it is by itself, to the digits that sliders show."""
+        return {} if self._body is None else {name: _rounded(value) for name, value in self._body.own.items()}
 
     def _follow_body(self) -> None:
         """After another shape was loaded, mass and stiffness are its own."""
@@ -215,8 +220,7 @@ class ParameterPanel(Panel):
 
     async def _reset(self, event: viser.GuiEvent) -> None:
         # likewise
-        own = {} if self._body is None else self._body.own
-        self.set({**{p.name: p.default for p in self._schema.parameters}, **own})
+        self.set({**{p.name: p.default for p in self._schema.parameters}, **self._own()})
 
     def _refresh(self) -> None:
         """Let the preset and the marks below the sliders follow the sliders."""

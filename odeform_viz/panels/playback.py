@@ -181,7 +181,8 @@ def _marks_of(description: Description) -> Marks | None:
     if not description.frame.columns:
         return None
     shown, truth = description.frame.columns[0], description.frame.truth
-    end = truth.column.truth.end if truth and truth.column.truth else None
+    record = truth.column.truth if truth else None
+    end = record.end if record and not record.rests else None  # a body that rests stays where it is
     return Marks(description.curves[0], acting_times(shown), end)
 
 

@@ -16,7 +16,7 @@ STYLE = "padding:0 0.8em 0.3em;font:11px/1.5 sans-serif;color:var(--mantine-colo
 QUIET = "opacity:0.65"
 CUT = (
     "Axes fit the time before the orange part; ↑ is the largest value after it. Deformation and errors are RMS "
-    "distances; nine of ten errors are below the dashed line."
+    "distances; nine of ten errors are below the dashed line, where there is one."
 )
 
 

@@ -1,7 +1,7 @@
 """Curves of all columns over time as SVG, in the colors of the page's theme."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,8 +35,9 @@ QUANTITIES = (
     Quantity("height", "height of the centre", "m", 3),
     Quantity("rotation", "rotation", "°", 1),
     Quantity("deformation", "deformation, RMS", "mm", 2),
-    Quantity("error", "error (dashed: expected)", "mm", 2),
+    Quantity("error", "error", "mm", 2),
 )
+DASHED = " (dashed: expected)"
 
 STYLE = """<style>
 .odeform-plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(96px,1fr));padding:0 0.4em}
@@ -56,10 +57,12 @@ STYLE = """<style>
 
 
 def quantities_of(lines: Sequence[Line], rotates: bool) -> list[Quantity]:
-    """The quantities to plot: rotation only if a body `rotates`, the error only if it is known."""
-    known = any(c.error is not None or c.error_band is not None for _, _, c in lines)
+    """The quantities to plot: rotation only if a body `rotates`, the error only if it or its band is known."""
+    expected = any(c.error_band is not None for _, _, c in lines)
+    known = expected or any(c.error is not None for _, _, c in lines)
     hidden = {"rotation": not rotates, "error": not known}
-    return [q for q in QUANTITIES if not hidden.get(q.name, False)]
+    shown = [q for q in QUANTITIES if not hidden.get(q.name, False)]
+    return [replace(q, title=f"{q.title}{DASHED}") if q.name == "error" and expected else q for q in shown]
 
 
 def plots_html(lines: Sequence[Line], window: Window, rotates: bool, slider: str = "", large: bool = False) -> str:
@@ -124,9 +127,11 @@ def _trained(times: Floats, window: Window) -> int:
 
 
 def _axis(values: list[Floats]) -> tuple[float, float]:
-    """Round ends of an axis that holds all values and zero; 0 and 1 if there are none."""
+    """Round ends of an axis that holds all values and zero; 0 and 1 if there are none. What dips below zero by less
+    than the width of a line has no end of its own."""
     high = _round_up(max((float(np.nanmax(v, initial=0.0)) for v in values), default=0.0))
-    low = 0.0 - _round_up(max((float(np.nanmax(-v, initial=0.0)) for v in values), default=0.0))
+    lowest = max((float(np.nanmax(-v, initial=0.0)) for v in values), default=0.0)
+    low = 0.0 - _round_up(lowest if lowest > high / HIGH else 0.0)
     return low, high or (1.0 if low == 0.0 else 0.0)
 
 

@@ -19,7 +19,8 @@ __all__ = ["Badge", "SummaryPanel", "badge_of", "summarize"]
 
 OFF_TRUTH = "The truth was simulated with other parameters, so no errors are shown."
 INSIDE, EXTRAPOLATED, UNTRAINED = "inside the trained range", "extrapolated", "shape not trained"
-UNKNOWN_ERROR, UNTESTED, REFUSED = "no error estimate", "not tested", "not modelled"
+UNKNOWN_ERROR, REFUSED = "no error estimate", "not modelled"
+UNTESTED, HARDLY_TESTED = "not tested", "hardly tested"
 UNRELIABLE, LIMITED, UNLEARNED = "not reliable", "too much deformation", "nothing learned"
 LARGE = 0.2  # of the body's size: an error from which on nothing is told of where the body is
 WHY = {
@@ -28,7 +29,9 @@ WHY = {
     UNTRAINED: "The model has learned from simulations of other shapes.",
     UNKNOWN_ERROR: "The body moves by the laws of elasticity and contact. At most its contacts were fitted to motions "
     "like this one, so that no error is known for it. The documentation of loads says how far others were off.",
-    UNTESTED: "No simulation with this mass or stiffness was compared with the model.",
+    UNTESTED: "No simulation with a mass or stiffness like this one was compared with the model.",
+    HARDLY_TESTED: "A few simulations with half and twice the mass or stiffness were compared with the model. The "
+    "documentation of results says how far they were off.",
     UNRELIABLE: "The error that is expected is more than a fifth of the body's size.",
     LIMITED: "The body deforms more than the model can follow: its way is computed, its shape is a guess.",
     UNLEARNED: "The elasticity of the body moves it. Nothing of it was learned from motions.",
@@ -79,10 +82,18 @@ def badge_of(frame: Frame) -> Badge:
     if models[0].motion.schema.scene == CLAMPED:
         return Badge("outside", UNLEARNED, outside, expected)
     if any(c.changed for c in models):
-        return Badge("unknown", UNTESTED, "; ".join(filter(None, ("mass or stiffness", outside))), expected)
+        return _changed(models, outside, expected)
     if outside and any(_useless(c) for c in models):
         return Badge("unknown", UNRELIABLE, outside, expected)
     return Badge("outside", EXTRAPOLATED, outside, expected) if outside else Badge("inside", INSIDE, "", expected)
+
+
+def _changed(models: Sequence[ColumnFrame], outside: str, expected: str) -> Badge:
+    """That of a body of another mass or stiffness than its own: some were simulated in the range of the sliders."""
+    motions = [c.motion for c in models]
+    far = any(p.role == "body" and p.name in motion.outside for motion in motions for p in motion.schema.parameters)
+    level, text = ("unknown", UNTESTED) if far else ("outside", HARDLY_TESTED)
+    return Badge(level, text, "; ".join(filter(None, ("mass or stiffness", outside))), expected)
 
 
 def _outside(frame: Frame, models: Sequence[ColumnFrame]) -> str:

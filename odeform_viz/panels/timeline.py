@@ -11,7 +11,7 @@ from odeform_viz.view import Curves, shown_until
 __all__ = ["Marks", "moment_css", "playing_css", "timeline_html"]
 
 WIDTH, HEIGHT = 1000, 32  # units of the drawing
-ROOM = 0.2 * WIDTH  # of two labels at the end
+ROOM = 0.2 * WIDTH  # of two labels
 ICONS = {
     "0": "M6 5h2v14H6zM20 5v14L9 12z",
     "J": "M17 5v14L6 12zM18 5h2v14h-2z",
@@ -95,12 +95,12 @@ def _track(window: Window, slider: str, marks: Marks | None, known: str) -> str:
             f'<rect class="acting" x="{at(a):.1f}" width="{max(at(b) - at(a), 3.0):.1f}" y="{HEIGHT - 4}" height="4"/>'
             for a, b in marks.acting
         ]
-        if marks.truth_end is not None:
-            x = at(min(marks.truth_end, end))
+        if marks.truth_end is not None and marks.truth_end < end - 1e-6:
+            x = at(marks.truth_end)
             parts.append(f'<path class="mark" d="M{x:.1f} 0V{HEIGHT}"/>')
             if x > WIDTH - ROOM:  # both would stand in one place
                 last = f"truth until {marks.truth_end:.3g} s"
-            elif abs(x - at(window.stop)) > 0.12 * WIDTH:
+            elif abs(x - at(window.stop)) > ROOM:
                 labels.append((x, f"truth until {marks.truth_end:.3g} s", "truth"))
     labels.append((WIDTH, last, "last"))
     texts = "".join(

@@ -25,6 +25,8 @@ from odeform_viz.view import INVISIBLE, ColumnFrame, DisplayOptions
 
 __all__ = ["ColumnView"]
 
+LEFT = 0.35  # of the radius of its floor: a body that has moved farther has left where it was pushed
+
 
 class ColumnView:
     """A frame that carries the rigid pose, and in it a shape whose points carry the deformation.
@@ -178,7 +180,9 @@ class ColumnView:
         with self._server.atomic():
             self._obstacles.show(motion)
             if self._push is not None:
-                self._push_view.show(self._push, time, self.points(frame, options), frame.pose)
+                # beside others, what stands on a floor that passes by would come to lie over the next body
+                left = self._disc is not None and float(np.hypot(*self._shift[:2])) > LEFT * self._disc.radius
+                self._push_view.show(self._push, time, self.points(frame, options), frame.pose, left)
             elif isinstance(motion, Motion):
                 alone = self._disc is None  # beside others a label would lie over the next body
                 points, scene = self.points(frame, options), motion.schema.scene

@@ -31,8 +31,9 @@ class PushView:
         self._acting: bool | None = None
         self._grabbed: tuple[ShownPush, Floats] | None = None
 
-    def show(self, push: ShownPush, time: float, points: Points, pose: Pose) -> None:
-        """Show a push at `time` s, when the shape is drawn with points (N, 3) m that `pose` (4, 4) moves."""
+    def show(self, push: ShownPush, time: float, points: Points, pose: Pose, left: bool = False) -> None:
+        """Show a push at `time` s, when the shape is drawn with points (N, 3) m that `pose` (4, 4) moves. Once a body
+        has `left` the place, nothing is drawn there after the push."""
         if self._nodes is None:
             self._nodes = _Nodes(self._scene, self._ground, self._body, push)
             if self._pull is not None:
@@ -40,6 +41,7 @@ class PushView:
             self._nodes.handle.visible = self._pull is not None
         contact, acting = push.contact(points), push.acts(time)
         self._nodes.marker.position = contact
+        self._nodes.place.visible = acting or not left
         self._nodes.place.position = push.shift(pose[:3, :3] @ contact + pose[:3, 3]) if acting else np.zeros(3)
         if push is not self._push or acting != self._acting:
             self._push, self._acting = push, acting

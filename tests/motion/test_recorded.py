@@ -85,3 +85,18 @@ def test_deformation_is_weighed_by_the_surface() -> None:
     motion = RecordedMotion(still.schema, replace(still.sequence, vertices=vertices))
     assert motion.deformation_rms(np.array([1.0]))[0] == pytest.approx(0.005, rel=1e-3)  # either half by 5 mm
     assert motion.deformation_bound(1.0) == pytest.approx(0.005, rel=1e-3)
+
+
+def test_a_record_that_ends_at_rest_is_right_afterwards() -> None:
+    moving, lying = rigid(0.0, 0.01), rigid(0.0, 0.0)
+    assert not moving.rests
+    assert moving.extrapolates(moving.end + 1.0)
+    assert lying.rests
+    assert not lying.extrapolates(lying.end + 1.0)
+
+    def slower(motion: RecordedMotion, factor: float) -> RecordedMotion:
+        return RecordedMotion(motion.schema, replace(motion.sequence, times=factor * motion.sequence.times))
+
+    assert slower(moving, 10.0).rests, "1 mm/s, with a frame in half a second"
+    assert not slower(moving, 2.0).rests, "5 mm/s"
+    assert not slower(lying, 0.01).rests, "10 ms are too short to tell"

@@ -72,6 +72,7 @@ def test_sliders_of_the_body_follow_the_object(serve: Any, column: Column, pushe
     assert client.until(lambda: app.request().parameters[OBJECT] == "donut")
     assert app.request().parameters["mass"] == pytest.approx(own["mass"], rel=5e-3)
     assert client.until(lambda: client.controls["mass (kg)"].value == pytest.approx(own["mass"], rel=5e-3))
+    assert client.until(lambda: client.controls["preset"].value == "as it stands"), "also with three digits of a mass"
     client.set("preset", "on its side")
     assert client.until(lambda: app.request().parameters["turn_x"] == 90.0)
     assert app.request().parameters[OBJECT] == "donut", "a preset is not of one object"

@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from odeform.benchmark.timing import as_viewed
 from odeform.checkpoint import read_checkpoint, write_checkpoint
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
 from odeform.geometry.rigid import best_rigid, vector_from_rotation
 from odeform.geometry.solids.overlap import overlap
-from odeform.loads.registry import load_of_scene
+from odeform.loads.registry import PUSH, load_of_scene
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
 from odeform.models.modal.training.impact_fit import FRAMES, Impact, impact_fit, impacts_of, predicted
@@ -206,26 +207,37 @@ def _vector(turn: Floats) -> Floats:
     return vector_from_rotation(turn[None])[0]
 
 
-def timed(checkpoint: str, objects: Sequence[str], draws: int) -> dict[str, Any]:
-    """How long a new motion under each load takes with a frame at its end, in medians over draws of its data, relative
-    to that of a throw; one load after the other for each draw, so that all see the same machine."""
-    predictor, taken = load(checkpoint), {name: [] for name in TIMED}
-    models = {name: predictor.under(name) for name in TIMED}
-    for name, model in models.items():
-        for parameters in get_scene(f"object-{name}").sample(1, 1, objects):
-            model.solve(parameters=parameters).vertices(0.8)  # compiles, and computes what is kept
-    for index in range(draws):
-        for item in objects:
-            for name in TIMED:
-                parameters = get_scene(f"object-{name}").sample(draws, 2, [item])[index]
-                begin = time.perf_counter()
-                models[name].solve(parameters=parameters).vertices(0.8)
-                taken[name].append(time.perf_counter() - begin)
-    medians = {name: float(np.median(times)) for name, times in taken.items()}
+def timed(checkpoint: str, objects: Sequence[str], draws: int, loads: Sequence[str] = TIMED) -> dict[str, Any]:
+    """Processor time of a new motion under each load (or push) with a frame at its end, in ms and medians over draws
+    of its data; relative to that of a throw, if it is among them. One load after the other for each draw, so that all
+    see the same machine. `of_objects` has the median of each object."""
+    predictor = load(checkpoint)
+    models = {name: predictor if name == PUSH else predictor.under(name) for name in loads}
+    taken: dict[str, dict[str, list[float]]] = {name: {item: [] for item in objects} for name in loads}
+    with as_viewed():
+        for model in models.values():
+            for parameters in get_scene(model.schema.scene).sample(1, 1, objects):
+                _milliseconds(model, parameters)  # compiles, and computes what is kept
+        for index in range(draws):
+            for item in objects:
+                for name, model in models.items():
+                    parameters = get_scene(model.schema.scene).sample(draws, 2, [item])[index]
+                    taken[name][item].append(_milliseconds(model, parameters))
+    medians = {name: float(np.median([*times.values()])) for name, times in taken.items()}
     return {
-        name: {"ms": round(1e3 * value, 1), "of_a_throw": round(value / medians["throw"], 2)}
+        name: {
+            "ms": round(value, 1),
+            **({"of_a_throw": round(value / medians["throw"], 2)} if "throw" in medians else {}),
+            "of_objects": {item: round(float(np.median(times)), 1) for item, times in taken[name].items()},
+        }
         for name, value in medians.items()
     }
+
+
+def _milliseconds(model: Predictor, parameters: Mapping[str, Any]) -> float:
+    begin = time.process_time()
+    model.solve(parameters=parameters).vertices(model.schema.window.stop)
+    return 1e3 * (time.process_time() - begin)
 
 
 def main() -> None:
@@ -247,6 +259,7 @@ def main() -> None:
     timing = commands.add_parser("time")
     timing.add_argument("--checkpoint", default="contact-force")
     timing.add_argument("--object", nargs="+", default=["donut", "pillow", "dog"])
+    timing.add_argument("--load", nargs="+", default=TIMED, help=f"loads (default: {' '.join(TIMED)})")
     timing.add_argument("--draws", type=int, default=8)
     timing.add_argument("--out")
     args = parser.parse_args()
@@ -255,7 +268,7 @@ def main() -> None:
     elif args.command == "choose":
         choose(args.data, args.checkpoint)
     elif args.command == "time":
-        write_or_print(timed(args.checkpoint, args.object, args.draws), args.out)
+        write_or_print(timed(args.checkpoint, args.object, args.draws, args.load), args.out)
     else:
         write_or_print({Path(d).name: measured(d, args.checkpoint, args.split) for d in args.data}, args.out)
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from odeform.geometry.rigid import best_rigid, vector_from_rotation
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.schema import Parameters
@@ -18,7 +19,7 @@ from odeform.simulation.contacts import MASS, YOUNG
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.objects.catalog import OBJECTS, get_object
 from odeform.simulation.scenes.contact_force import sample, simulate_object
-from odeform.types import Floats, Frames, Perpoint
+from odeform.types import Floats, Frames, Perpoint, Points
 from odeform_figures.output import write_or_print
 
 __all__ = ["Push", "compare", "simulate"]
@@ -29,6 +30,7 @@ RATIOS = ((1, 1), (0.5, 1), (2, 1), (1, 0.5), (1, 2))
 """Of mass and of Young's modulus."""
 AT = (0.05, 0.1, 0.19, 0.3, 0.5, 0.8)
 """s, of which errors are shown."""
+PLACED = (0.01, 10.0)  # m and degrees
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,7 @@ def simulate(name: str, index: int, ratios: tuple[float, float], keep: Path | No
     changed = {MASS: ratios[0] * item.mass, YOUNG: 1e-3 * ratios[1] * item.material.young}
     given = {"object": name, **sample(name, index + 1, SEED)[index], **changed}
     try:
-        found = simulate_object(item, given, until=UNTIL if ratios == (1, 1) else CHANGED_UNTIL)
+        found = simulate_object(item, given, until=_until(ratios))
     except SimulationError:
         return None
     if path is not None:
@@ -64,34 +66,48 @@ def simulate(name: str, index: int, ratios: tuple[float, float], keep: Path | No
     return Push(given, found.times, found.vertices, found.weights)
 
 
+def _until(ratios: tuple[float, float]) -> float:
+    return UNTIL if ratios == (1, 1) else CHANGED_UNTIL
+
+
 def _rms(off: Float[np.ndarray, "times points 3"], weights: Perpoint) -> Floats:
     """(T,) mm per coordinate."""
     return 1e3 * np.sqrt((off.astype(float) ** 2).sum(axis=2) @ weights / 3.0)
 
 
-def compare(model: Predictor, pushes: list[Push]) -> dict[str, Any]:
-    """RMS error and RMS displacement in mm at `AT`, and their pooled ratio, over pushes of all objects."""
-    rows = []
+def _placed(truth: Points, predicted: Points, weights: Perpoint) -> bool:
+    """Whether place and orientation of points (N, 3) m are within `PLACED`."""
+    turn, shift = best_rigid(truth, predicted, weights / weights.sum())
+    angle = np.degrees(np.linalg.norm(vector_from_rotation(turn[None])[0]))
+    return bool(np.linalg.norm(shift) < PLACED[0] and angle < PLACED[1])
+
+
+def compare(model: Predictor, pushes: list[Push], until: float) -> dict[str, Any]:
+    """RMS error and RMS displacement in mm at `AT` up to `until` s, and their median ratio, over pushes of all objects;
+    at the last of these times, how many are better than standing still, and have place and orientation within `PLACED`.
+    A simulation that ended before had come to rest: its last frame holds."""
+    at, rows = np.array([time for time in AT if time <= until + 1e-6]), []
     for push in pushes:
-        at = np.array([time for time in AT if time <= push.times[-1] + 1e-6])
-        frames = push.vertices[np.searchsorted(push.times, at - 1e-6)]
+        frames = push.vertices[np.minimum(np.searchsorted(push.times, at - 1e-6), len(push.times) - 1)]
         predicted = model.solve(parameters=push.parameters, until=float(at[-1])).vertices(at)
         moved = _rms(frames - push.vertices[0], push.weights)
-        rows.append((push.parameters["object"], _rms(predicted - frames, push.weights), moved))
+        placed = _placed(frames[-1], predicted[-1], push.weights)
+        rows.append((push.parameters["object"], _rms(predicted - frames, push.weights), moved, placed))
     out: dict[str, Any] = {}
     for name in (*OBJECTS, "all"):
         some = [row for row in rows if name in (row[0], "all")]
         if some:
-            count = min(len(row[1]) for row in some)
-            errors, moved = (np.array([row[part][:count] for row in some]) for part in (1, 2))
+            errors, moved = (np.array([row[part] for row in some]) for part in (1, 2))
             pooled = [np.sqrt((values**2).mean(axis=0)) for values in (errors, moved)]
             out[name] = {
                 "pushes": len(some),
-                "times_s": list(AT[:count]),
+                "times_s": at.tolist(),
                 "rmse_mm": pooled[0].round(3).tolist(),
                 "median_mm": np.median(errors, axis=0).round(3).tolist(),
                 "displacement_mm": pooled[1].round(3).tolist(),
                 "median_relative": np.median(errors / np.maximum(moved, 1e-9), axis=0).round(3).tolist(),
+                "better_than_standing_still": int((errors[:, -1] < moved[:, -1]).sum()),
+                "placed_at_the_end": sum(row[3] for row in some),
             }
     return out
 
@@ -109,7 +125,7 @@ def main() -> None:
         count = given.count if ratios == (1, 1) else given.changed
         found = [simulate(name, index, ratios, given.keep) for index in range(count) for name in OBJECTS]
         pushes = [push for push in found if push is not None]
-        out[f"mass x {ratios[0]}, stiffness x {ratios[1]}"] = compare(model, pushes)
+        out[f"mass x {ratios[0]}, stiffness x {ratios[1]}"] = compare(model, pushes, _until(ratios))
     write_or_print(out, given.json)
 
 

@@ -64,7 +64,8 @@ SAME = 1e-3  # relative difference of mass or stiffness from which on they count
 SETTLED = 4  # bodies of another mass and stiffness that are kept
 SKIN = 1e-3  # m below the floor, where what lies on it is flat: bodies at rest are up to that deep in it
 FLATTENED = 0.5  # of its smallest extent, by which a body that lands may be deeper than the floor on which it is flat
-SPARE = 1e-3  # m above the depth from which on a motion counts as lost
+SPARE = 1e-3  # m above the depth from which on a motion counts as lost, and below that of a body at rest
+CALMS = 0.2  # s after the window, in which what presses a body into the floor dies away
 
 QUALITIES = {
     "draft": SolverSettings("limex", tolerance=5e-4, dtype="float64"),
@@ -468,4 +469,12 @@ class ModalModel(Model):
     def _projection(self, motion: Moving) -> FloorProjection:
         body, window = self.checked_body, self.schema.window
         grid = np.linspace(window.start, window.stop, HEIGHTS * round(window.stop * window.rate) + 1)
-        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, body.limit + SPARE, grid)
+        return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, self._least_height, grid)
+
+    def _least_height(self, times: Times) -> Times:
+        """(T,) m of the lowest point at (T,) s: in the window above what counts as lost, and some time after it nearly
+        as the body lies at rest. One that has fallen over would lie deeper, on a few springs that are linear."""
+        body, stop = self.checked_body, self.schema.window.stop
+        pushed = body.limit + SPARE
+        lies = float(body.all.rest[:, 2].min() + body.all.space.anchor[2]) - SPARE
+        return np.interp(times, [stop, stop + CALMS], [pushed, max(pushed, lies)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import odeform
+from odeform.dataset.store import open_dataset
 from odeform.models.modal.model import ModalModel
 from odeform.models.per_object import PerObject
 
@@ -57,6 +58,16 @@ def test_no_vertex_is_shown_deeper_than_the_limit(predictor: PerObject, push: Ma
     parameters = {key: value for key, value in push.items() if key not in ("contact", "force")} | vectors
     lowest = predictor.solve(parameters=parameters).vertices(TIMES)[:, :, 2].min()
     assert lowest > -LIMIT - SPARE
+
+
+def test_a_body_rests_nearly_as_deep_as_it_stands_also_where_it_has_fallen_over(predictor: PerObject) -> None:
+    stands = float(predictor.rest_of({"object": "dog"}).points[:, 2].min())
+    times, deepest = np.array([0.19, 0.4, 0.8, 1.5]), []
+    for truth in open_dataset("contact-force").sequences("test", "dog"):
+        deepest.append(predictor.solve(parameters=truth.parameters).vertices(times)[:, :, 2].min(axis=1))
+    in_window, *later = np.min(deepest, axis=0)
+    assert in_window < -3.5e-3, "a leg under load sinks"
+    assert min(later) > stands - 1e-3 - SPARE
 
 
 def test_few_points_are_nearly_as_low_as_all(predictor: PerObject) -> None:

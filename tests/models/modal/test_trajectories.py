@@ -45,7 +45,7 @@ def corrected() -> Adjusted:
 
 def projected(lowest: Callable[[Floats], Floats], limit: float, grid: Floats | None) -> Adjusted:
     own = Steady()
-    return Adjusted(own, FloorProjection(own, lowest, limit, grid))
+    return Adjusted(own, FloorProjection(own, lowest, lambda times: np.full(len(times), limit), grid))
 
 
 def test_a_part_has_its_weight_of_the_mechanics_and_each_coefficient_its_scale() -> None:

@@ -71,11 +71,16 @@ def test_the_trained_window_sets_the_axis_and_the_rest_is_cut_off(line: Line, dr
 def test_a_truth_that_is_over_has_no_curves(drop: Predictor) -> None:
     truth = truth_column(f"mass-elastic/{open_dataset('mass-elastic').select('test')[0].name}")
     assert truth.truth is not None
-    session, columns = Session(drop.schema), Columns.of([Column("odeform", drop, drop.rest), truth]).all
-    request = ViewRequest(drop.schema.complete(truth.truth.parameters), 0.3, "balanced", columns)
+    assert truth.truth.rests, "the drop ends because the ball lies still"
+    falling = replace(truth.truth, sequence=truth.truth.sequence.until(0.5))
+    columns = Columns.of([Column("odeform", drop, drop.rest), replace(truth, source=falling)]).all
+    session, request = (
+        Session(drop.schema),
+        ViewRequest(drop.schema.complete(falling.parameters), 0.3, "balanced", columns),
+    )
     frame = session.frame(request)
     curves = session.curves(frame.columns[1], request)
-    over = curves.times > truth.truth.end
+    over = curves.times > falling.end
     assert over.any()
     for values in (curves.height, curves.rotation, curves.deformation):
         assert np.isnan(values[over]).all()
@@ -90,6 +95,19 @@ def test_a_truth_that_is_over_has_no_curves(drop: Predictor) -> None:
 def test_an_axis_reaches_below_zero_where_a_curve_does(line: Line, drop: Predictor) -> None:
     sunk = replace(line[2], height=-0.3 * np.ones_like(line[2].times))
     assert ">-0.3</text>" in plots_html([(*line[:2], sunk)], drop.schema.window, rotates=False)
+    times = line[2].times
+    for dip, shown in ((0.001, False), (0.02, True)):
+        dips = replace(line[2], height=np.where(times > 0.2, 0.3, -dip))
+        html = plots_html([(*line[:2], dips)], drop.schema.window, rotates=False)
+        assert (f">-{dip:g}</text>" in html) == shown
+
+
+def test_a_dashed_line_is_named_where_there_is_one(line: Line) -> None:
+    name, color, curves = line
+    known = replace(curves, error=curves.height)
+    for band, title in ((None, "error"), (curves.height, "error (dashed: expected)")):
+        quantities = quantities_of([(name, color, replace(known, error_band=band))], False)
+        assert quantities[-1].title == title
 
 
 def test_nothing_shown_is_nothing_drawn(drop: Predictor) -> None:

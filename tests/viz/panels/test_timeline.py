@@ -16,7 +16,7 @@ WINDOW = Window(0.0, 0.2, 100.0, reach=4.0)
 
 @pytest.mark.parametrize(
     ("share", "ends"),
-    [(1.0, ["truth until 1 s"]), (0.9, ["truth until 0.9 s"]), (0.6, ["truth until 0.6 s", "1 s"])],
+    [(2.0, ["1 s"]), (1.0, ["1 s"]), (0.9, ["truth until 0.9 s"]), (0.6, ["truth until 0.6 s", "1 s"])],
 )
 def test_the_end_of_the_truth_and_that_of_the_time_are_not_written_over_each_other(
     share: float, ends: list[str]

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 import viser
+from pushed import PushedPredictor
 from stubs import SCHEMA, StubPredictor, recorded
 
 import odeform
 from odeform.cancellation import Cancelled
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
+from odeform.simulation.contacts import vector_of
+from odeform.simulation.scenes.contact_force import PULSE
 from odeform.types import GaussianSplats
 from odeform_viz.colors import CLAY, color_of
 from odeform_viz.columns import Column, Columns
@@ -107,7 +110,8 @@ def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(
     stub, coarse = StubPredictor(), trimesh.creation.icosphere(1, 0.1)
     sequence = recorded(stub, {"mass": 0.5})
     points = coarse.vertices + np.array([0.0, 0.0, 0.1])
-    frames = np.stack([points] * len(sequence.times)).astype(np.float32)
+    rising = sequence.times[:, None, None] * [0.0, 0.0, 0.1]
+    frames = np.add(points, rising).astype(np.float32)
     weights = np.full(len(points), 1.0 / len(points), np.float32)
     faces = np.asarray(coarse.faces, np.int32)
     record = RecordedMotion(SCHEMA, replace(sequence, vertices=frames, faces=faces, weights=weights))
@@ -121,6 +125,35 @@ def test_a_truth_is_drawn_as_finely_as_the_prediction_and_pales_when_it_is_over(
     assert truth.opacity is None
     view.publish(session.frame(replace(request, time=record.end + 0.1)), DisplayOptions(), None)
     assert truth.opacity is not None
+    lies = RecordedMotion(SCHEMA, replace(record.sequence, vertices=np.repeat(frames[:1], len(frames), axis=0)))
+    resting = Columns.of([Column("stub", stub, stub.rest), Column("truth", lies, lies.geometry)]).all
+    view.publish(session.frame(replace(request, columns=resting, time=lies.end + 0.1)), DisplayOptions(), None)
+    truth = server.scene.get_handle_by_name(f"/world/column_{resting[1].key}/body/part_0")
+    assert isinstance(truth, viser.MeshHandle)
+    assert truth.opacity is None
+
+
+def test_beside_others_the_arrow_of_a_push_goes_once_the_body_has_left(server: viser.ViserServer) -> None:
+    predictor = PushedPredictor()
+    session, view = Session(predictor.schema), SceneView(server, 0.2, lambda: None)
+    usual = predictor.complete({"object": "donut"})
+    forces = {
+        name: value / np.linalg.norm(vector_of(usual, "force")) for name, value in usual.items() if "force" in name
+    }
+    weak, strong = ({**usual, **{name: of * value for name, value in forces.items()}} for of in (1.0, 30.0))
+    columns = Columns.of(
+        [Column(name, predictor, predictor.rest, pinned=p) for name, p in (("weak", weak), ("strong", strong))]
+    ).all
+    request = ViewRequest(weak, 0.5 * PULSE, "balanced", columns)
+
+    def drawn(columns: tuple[Column, ...], time: float) -> list[bool]:
+        view.publish(session.frame(replace(request, columns=columns, time=time)), DisplayOptions(), None)
+        places = [server.scene.get_handle_by_name(f"/world/column_{c.key}/ground/push") for c in columns]
+        return [place.visible for place in places if place is not None]
+
+    assert drawn(columns, 0.5 * PULSE) == [True, True]
+    assert drawn(columns, 2.0 * PULSE) == [True, False]
+    assert drawn(columns[1:], 2.0 * PULSE) == [True], "alone, it lies over nothing"
 
 
 def cancelled() -> Box:
