@@ -472,9 +472,10 @@ class ModalModel(Model):
         return FloorProjection(motion, lambda y: body.sample(y, np.ones(len(y))).lowest, self._least_height, grid)
 
     def _least_height(self, times: Times) -> Times:
-        """(T,) m of the lowest point at (T,) s: in the window above what counts as lost, and some time after it nearly
-        as the body lies at rest. One that has fallen over would lie deeper, on a few springs that are linear."""
+        """(T,) m of the lowest point at (T,) s: in the window above what counts as lost, or where the body begins if
+        that is lower, and some time after it nearly as it lies at rest. One that has fallen over would lie deeper, on
+        a few springs that are linear."""
         body, stop = self.checked_body, self.schema.window.stop
-        pushed = body.limit + SPARE
-        lies = float(body.all.rest[:, 2].min() + body.all.space.anchor[2]) - SPARE
-        return np.interp(times, [stop, stop + CALMS], [pushed, max(pushed, lies)])
+        begins = float(body.all.rest[:, 2].min() + body.all.space.anchor[2])
+        pushed = min(body.limit + SPARE, begins)
+        return np.interp(times, [stop, stop + CALMS], [pushed, max(pushed, begins - SPARE)])

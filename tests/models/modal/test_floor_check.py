@@ -70,6 +70,14 @@ def test_a_body_rests_nearly_as_deep_as_it_stands_also_where_it_has_fallen_over(
     assert min(later) > stands - 1e-3 - SPARE
 
 
+def test_a_heavy_soft_body_begins_where_it_rests_however_deep_that_is(predictor: PerObject) -> None:
+    body = {"mass": 2.6246, "young": 51.788}  # a dog of twice its mass and half its stiffness
+    push = predictor.complete({"object": "dog", **body})
+    first, settled = predictor.solve(parameters=push).vertices(0.0), predictor.settled(push).points
+    assert settled[:, 2].min() < 1e-3 - LIMIT, "deeper than pushed bodies are shown"
+    np.testing.assert_array_equal(first, settled)
+
+
 def test_few_points_are_nearly_as_low_as_all(predictor: PerObject) -> None:
     for name in predictor.schema.objects:
         part = predictor.parts[name]
