@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import sync_playwright
 
 from odeform.errors import InputError
 from odeform.geometry.split_colors import split_colors
@@ -34,7 +33,7 @@ TAUGHT, LEARNING = "Taught in", "Learning from"  # in the text of a lesson
 
 def drag_while_teaching(model: Predictor, origin: str, file: Path, motions: int, browser: bool) -> dict[str, float]:
     """Loads the mesh in a file, and drags the slider of the force: before a lesson, while its motions are simulated,
-    and while the model learns.
+    while the model learns, and (`ending`) while the refined model comes to stand beside the first guess.
 
     `first_motion_s` is from the upload to the first frame of the shape. With `browser`, Chromium shows the page.
     `InputError` for a shape that is refused or cannot be taught.
@@ -42,19 +41,22 @@ def drag_while_teaching(model: Predictor, origin: str, file: Path, motions: int,
     with _page(Column(model.model, model, model.rest, origin=origin), browser) as (app, client):
         found = {"first_motion_s": _load(app, client, file)}
         drag = _dragging(app, client)
-        waits: dict[str, list[Floats]] = {"before": [drag()], "simulating": [], "learning": []}
+        waits: dict[str, list[Floats]] = {"before": [drag()], "simulating": [], "learning": [], "ending": []}
         begin = time.perf_counter()
         client.set("motions", str(motions))
         client.click("Teach this shape")
         while TAUGHT not in client.text():
             if client.notifications or time.perf_counter() > begin + PATIENCE:
                 raise InputError(f"{file}: not taught: {client.notifications}")
-            waits["learning" if LEARNING in client.text() else "simulating"].append(drag())
+            phase = "learning" if LEARNING in client.text() else "simulating"
+            taken = drag()
+            waits["ending" if TAUGHT in client.text() else phase].append(taken)
         found["taught_s"] = time.perf_counter() - begin
+        waits["ending"].append(drag())
     for phase, parts in waits.items():
-        together = np.concatenate(parts or [np.full(1, np.nan)])
+        together = np.nan_to_num(np.concatenate(parts or [np.zeros(0)]), nan=np.inf)  # of what was never answered
         found[f"{phase}_messages"] = len(together)
-        for percent in (50, 95, 100):
+        for percent in (50, 95, 100) if len(together) else ():
             found[f"{phase}_p{percent}_ms"] = 1e3 * float(np.percentile(together, percent))
     return found
 
@@ -63,6 +65,8 @@ def drag_while_teaching(model: Predictor, origin: str, file: Path, motions: int,
 def _page(column: Column, browser: bool) -> Iterator[tuple[App, LoopbackClient]]:
     """The page and a client of it; with `browser`, Chromium shows it too."""
     if browser:
+        from playwright.sync_api import sync_playwright  # of the development dependencies
+
         with sync_playwright() as playwright:
             chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
             with opened(chromium, [column], SIZE) as view:
