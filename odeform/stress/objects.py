@@ -19,7 +19,9 @@ from odeform.motion.base import Motion
 from odeform.motion.rest import rests_from
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameters, Schema
+from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.scenes.registry import find_scene
+from odeform.simulation.scenes.user_object import scene_with
 from odeform.stress.check import Check
 from odeform.stress.energy import energy_gained
 from odeform.types import Frames, Points, Times
@@ -53,10 +55,10 @@ class Watched:
     """Fraction of the energy that a body in the air begins with by which it later has more."""
 
 
-def draws_of(schema: Schema, count: int, seed: int) -> list[dict[str, Any]]:
+def draws_of(schema: Schema, count: int, seed: int, item: SoftObject | None = None) -> list[dict[str, Any]]:
     """`count` pushes of all objects in turn, drawn as their data are, with up to `BEYOND` times the force, and with
-    masses and stiffnesses from all of their ranges."""
-    scene = find_scene(schema.scene)
+    masses and stiffnesses from all of their ranges. An `item` is the only object, a shape of the user's own."""
+    scene = find_scene(schema.scene) if item is None else scene_with(schema.scene, item)
     assert scene is not None
     rng, each = np.random.default_rng(seed), -(-count // len(schema.objects))
     drawn = scene.sample(each, seed, schema.objects)
@@ -123,7 +125,9 @@ def _start_off(model: PerObject, parameters: Parameters, frame: Points) -> float
 def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]:
     """`draws` pushes and the checks over them, as JSON; the seed fixes everything but times."""
     model = _opened(checkpoint)
-    rows = list(enumerate(draws_of(model.schema, draws, seed)))
+    first = next(iter(model.parts.values()))
+    item = first.solid if isinstance(first, ModalModel) else None
+    rows = list(enumerate(draws_of(model.schema, draws, seed, item)))
     found = parallel_map("motions", partial(_watched_from, checkpoint), rows, batch_size=BATCH)
     load = load_of_scene(model.schema.scene)
     depth = FLAT if load else max(part.validity.limits.depth for part in model.parts.values())

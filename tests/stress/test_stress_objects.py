@@ -7,7 +7,9 @@ import pytest
 import odeform
 from odeform.cli import main
 from odeform.models.per_object import PerObject
+from odeform.simulation.scenes.user_object import scene_with
 from odeform.stress.objects import BEYOND, draws_of, watch
+from tests.soft_block import block_object
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +28,14 @@ def test_draws_are_pushes_of_all_objects_and_past_the_trained_forces(model: PerO
     ratios = [row["force_x"] / one["force_x"] for row, one in zip(rows, _trained(model), strict=True)]
     assert max(ratios) > 1.1
     assert 0.0 <= min(ratios) <= max(ratios) <= BEYOND
+
+
+def test_a_taught_shape_is_drawn_as_its_own_data_are() -> None:
+    item = block_object()
+    rows = draws_of(scene_with("contact-force", item).schema, 12, 3, item)
+    assert {row["object"] for row in rows} == {"block"}
+    forces = [sum(row[f"force_{axis}"] ** 2 for axis in "xyz") ** 0.5 for row in rows]
+    assert 0.0 < max(forces) <= BEYOND * item.forces[1]
 
 
 def _trained(model: PerObject) -> list[dict[str, float]]:

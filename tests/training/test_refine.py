@@ -227,3 +227,24 @@ def test_a_simulation_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> Non
     found = simulate_item("contact-force", item, "pillow", out, report=lambda done, _: told.append(done), **options)
     assert len(found.select("all")) == 4
     assert told[0] >= 1, "at most the motion in progress is lost, and one that was not listed yet"
+
+
+def test_a_full_disk_while_motions_are_simulated_keeps_those_that_are_done(tmp_path: Path) -> None:
+    script = (
+        "import resource, sys; from odeform.simulation.user_data import simulate_item;"
+        "from tests.soft_block import block_object;"
+        "full = lambda done, _: done < 2 or resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100));"
+        "simulate_item('contact-force', block_object(), 'pillow', sys.argv[1], count=4, rate=50.0, step=1e-3,"
+        "report=full)"
+    )
+    out = tmp_path / "block"
+    command = [sys.executable, "-c", script, str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], check=False)
+    assert done.returncode == 1
+    assert "OSError" in done.stderr
+    before = {entry.name: entry.sha256 for entry in open_dataset(out).entries}
+    assert len(before) >= 1, "at most the motion in progress is lost, and one that was not listed yet"
+    found = simulate_item("contact-force", block_object(), "pillow", out, count=4, rate=50.0, step=1e-3)
+    assert len(found.select("all")) == 4
+    assert before.items() <= {entry.name: entry.sha256 for entry in found.entries}.items()
+    assert not list(out.glob("*.tmp*"))

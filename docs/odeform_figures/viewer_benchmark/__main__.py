@@ -6,6 +6,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import odeform
@@ -17,6 +18,7 @@ from odeform.models.reduced_model import ReducedModel
 from odeform_figures.viewer_benchmark.clicks import click
 from odeform_figures.viewer_benchmark.fits import drag_while_fitting
 from odeform_figures.viewer_benchmark.latency import drag, play_free_flight, scrub_splats
+from odeform_figures.viewer_benchmark.lessons import drag_while_teaching
 from odeform_figures.viewer_benchmark.recording import record_playback
 from odeform_figures.viewer_benchmark.soak import soak
 from odeform_figures.viewer_benchmark.stages import stages
@@ -65,6 +67,16 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--fit", action="store_true", help="instead, drag a slider while a test sequence is fitted again and again"
     )
+    parser.add_argument(
+        "--teach",
+        type=Path,
+        metavar="FILE",
+        help="instead, load the mesh in FILE, teach it to the model, and drag the slider of the force meanwhile",
+    )
+    parser.add_argument(
+        "--motions", type=int, choices=(10, 20, 40), default=10, help="with --teach: simulated motions (default: 10)"
+    )
+    parser.add_argument("--browser", action="store_true", help="with --teach: Chromium shows the page meanwhile")
     return parser
 
 
@@ -146,6 +158,10 @@ def main() -> int:
         model = odeform.load(args.checkpoint)
         if args.recording:
             _print_recording(model, args.checkpoint, args.recording)
+            return
+        if args.teach:
+            taught = partial(drag_while_teaching, model, args.checkpoint, args.teach, args.motions, args.browser)
+            _print_runs({f"{args.teach.name}, taught by {args.motions} motions": taught})
             return
         if args.columns:
             _print_runs(_columns(model, args.columns, args.messages))

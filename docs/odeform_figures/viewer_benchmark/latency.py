@@ -19,6 +19,7 @@ __all__ = [
     "SPLATS",
     "drag",
     "largest_deformation_times",
+    "latencies",
     "measure",
     "play_free_flight",
     "scrub_splats",
@@ -108,10 +109,29 @@ def served(columns: list[Column], moment: float) -> Iterator[LoopbackClient]:
 def measure(
     values: Floats, send: Callable[[float], None], wait: Callable[[float], int | None], rate: float
 ) -> dict[str, float]:
+    """Send `values` (N,) at `rate` Hz, see `latencies`.
+
+    `out_of_order` counts answers to older messages than the answer before; `stale_last` is 1 if the last answer is not
+    to the last message.
+    """
+    latency, order = latencies(values, send, wait, rate)
+    return {
+        "messages": len(values),
+        "answers": len(order),
+        "p50_ms": 1e3 * float(np.percentile(latency, 50)),
+        "p95_ms": 1e3 * float(np.percentile(latency, 95)),
+        "out_of_order": int((np.diff(order) < 0).sum()),
+        "stale_last": int(order[-1] != len(values) - 1),
+    }
+
+
+def latencies(
+    values: Floats, send: Callable[[float], None], wait: Callable[[float], int | None], rate: float
+) -> tuple[Floats, list[int]]:
     """Send `values` (N,) at `rate` Hz; `wait` returns the index of the message that the next answer serves.
 
-    The latency of a message ends with the first answer to it or to a newer one. `out_of_order` counts answers to older
-    messages than the answer before; `stale_last` is 1 if the last answer is not to the last message.
+    Returns (N,) seconds, each until the first answer to the message or to a newer one, and the indices of the messages
+    that were answered, in the order of the answers.
     """
     sent, latency, order = np.zeros(len(values)), np.full(len(values), np.nan), []
 
@@ -128,11 +148,4 @@ def measure(
         send(float(value))
         listen(sent[index] + 1.0 / rate)
     listen(time.perf_counter() + 1.0)
-    return {
-        "messages": len(values),
-        "answers": len(order),
-        "p50_ms": 1e3 * float(np.percentile(latency, 50)),
-        "p95_ms": 1e3 * float(np.percentile(latency, 95)),
-        "out_of_order": int((np.diff(order) < 0).sum()),
-        "stale_last": int(order[-1] != len(values) - 1),
-    }
+    return latency, order

@@ -1,5 +1,7 @@
 """*Teach this shape*: the panel of a shape of the user's own."""
 
+import os
+import signal
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from odeform.dataset.store import open_dataset
 from odeform.geometry.shape import FittedShape
 from odeform.geometry.similarity import Similarity
 from odeform.models.modal.elastic_body import elastic_body
@@ -16,6 +19,7 @@ from odeform_viz.app import App
 from odeform_viz.columns import Column, Columns
 from odeform_viz.panels import teach
 from odeform_viz.panels.teach import describe_lesson, describe_result, lesson_folder
+from odeform_viz.panels.user_body import UserBodyPanel
 from odeform_viz.runtime.jobs import Lesson, Report
 from odeform_viz.state import capture, state_from_json, state_to_json
 from odeform_viz.user_bodies import (
@@ -108,6 +112,29 @@ def test_a_cancelled_lesson_and_one_that_fails_can_be_begun_again(view: View, mo
     client.click("Teach this shape")
     assert client.until(lambda: "No space left on device" in client.text(), PATIENCE)
     assert client.until(lambda: client.controls["Teach this shape"].visible)
+
+
+@pytest.mark.slow
+def test_a_lesson_that_is_cancelled_and_one_that_is_killed_go_on_where_they_were(view: View, tmp_path: Path) -> None:
+    app, client = view
+    client.set("motions", "10")
+    client.click("Teach this shape")
+    assert client.until(lambda: "Simulated 2 of 10" in client.text(), PATIENCE)
+    client.click("Cancel teaching")
+    assert client.until(lambda: "Cancelled" in client.text())
+    (folder,) = (tmp_path / "taught").iterdir()
+    before = {entry.name: entry.sha256 for entry in open_dataset(folder).entries}
+    assert before, "a motion that is simulated is kept"
+    client.click("Teach this shape")
+    assert client.until(lambda: "Learning from 10 motions" in client.text(), PATIENCE)
+    assert before.items() <= {entry.name: entry.sha256 for entry in open_dataset(folder).entries}.items()
+    job = app.panel(UserBodyPanel)._teaching._job
+    assert job is not None
+    assert job._process.pid is not None
+    os.kill(job._process.pid, signal.SIGKILL)
+    assert client.until(lambda: "ended by SIGKILL" in client.text() and "is kept" in client.text())
+    client.click("Teach this shape")
+    assert client.until(lambda: "Taught in" in client.text(), PATIENCE), client.text()
 
 
 @pytest.mark.slow
