@@ -52,7 +52,6 @@ class ColumnView:
         points = np.asarray(column.geometry.points, dtype=float)
         first = points[first_body(column.source.schema.scene, len(points))]
         self._rest, self._centre = points.astype(np.float32), first.mean(axis=0)
-        self._pair = len(first) < len(points)
         self._extent = float(np.ptp(points, axis=0).max())
         self._place = server.scene.add_frame(self.root, show_axes=False)
         # what lies on the floor moves with it, past a body that is followed
@@ -85,9 +84,7 @@ class ColumnView:
         return np.asarray(self._place.position)
 
     def centre(self, frame: ColumnFrame) -> Floats:
-        """(3,) m: where the pose takes the centre of the body; of two bodies, the middle between them."""
-        if self._pair:  # their points are where they are
-            return (self._rest if frame.points is None else frame.points).mean(axis=0, dtype=float)
+        """(3,) m: where the pose takes the centre of the body."""
         return frame.pose[:3, :3] @ self._centre + frame.pose[:3, 3]
 
     def displacement(self, frame: ColumnFrame) -> Floats:

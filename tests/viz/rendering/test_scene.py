@@ -156,21 +156,5 @@ def test_beside_others_the_arrow_of_a_push_goes_once_the_body_has_left(server: v
     assert drawn(columns[1:], 2.0 * PULSE) == [True], "alone, it lies over nothing"
 
 
-def test_beside_others_two_bodies_are_around_the_middle_of_their_floor(server: viser.ViserServer) -> None:
-    pair = odeform.load("contact-force:meet")
-    session, view = Session(pair.schema), SceneView(server, 0.2, lambda: None)
-    parameters = pair.complete({"object": "donut", "distance": 0.5})
-    shape = pair.shown(pair.rest_of(parameters))
-    columns = Columns.of([Column(name, pair, shape, pinned=parameters) for name in ("one", "other")]).all
-    request = ViewRequest(parameters, 0.0, "balanced", columns)
-    for time in (0.0, 0.3):
-        frame = session.frame(replace(request, time=time))
-        view.publish(frame, DisplayOptions(), None)
-        middle = frame.columns[0].motion.vertices(time).mean(axis=0)
-        body = server.scene.get_handle_by_name(f"/world/column_{columns[0].key}/body")
-        assert body is not None
-        np.testing.assert_allclose(body.position[:2] + middle[:2], 0.0, atol=1e-3)
-
-
 def cancelled() -> Box:
     raise Cancelled
