@@ -66,10 +66,12 @@ def badge_of(frame: Frame) -> Badge:
     if not models:
         return Badge("unknown", "no model in view", "only the truth" if frame.columns else "")
     for shown in models:
+        of, motion = f"{shown.column.label}: " if len(models) > 1 else "", shown.motion
+        if isinstance(motion, Motion) and frame.request.time > motion.last_good:
+            return Badge("unknown", REFUSED, f"{of}{motion.stats.status} after t = {motion.last_good:.3f} s")
         if stop := shown.stop_at(frame.request.time):
-            of = f"{shown.column.label}: " if len(models) > 1 else ""
             return Badge("unknown", LIMITED if stop.limited else REFUSED, f"{of}{stop}")
-        only = shown.motion.only_at if isinstance(shown.motion, Motion) else None
+        only = motion.only_at if isinstance(motion, Motion) else None
         if only is not None and abs(frame.request.time - only) > 1e-6:
             return Badge("unknown", REFUSED, f"only t = {only:.3g} s is predicted, and shown")
     expected, outside = _expected(models), _outside(frame, models)

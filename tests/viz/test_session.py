@@ -196,6 +196,21 @@ def test_an_error_above_the_expected_one_is_remarked_and_a_large_one_is_not_reli
     assert (badge_of(late).level, badge_of(late).text) == ("unknown", "not reliable")
 
 
+def test_a_motion_that_has_ended_is_not_modelled_any_more() -> None:
+    session, view_request = _alone(odeform.load("contact-force").under("throw"))
+    # a cat of half its stiffness, whose law ends when it has collapsed
+    turns = {"turn_x": -136.5826, "turn_y": 87.32333, "turn_z": 159.57345}
+    thrown = {"height": 0.298001, "velocity_x": 0.893359, "velocity_y": 1.142126, "velocity_z": 1.39857}
+    spin = {"spin_x": 4.123697, "spin_y": -3.243752, "spin_z": 7.568278}
+    soft = {"object": "cat", **turns, **thrown, **spin, "mass": 1.325951, "young": 36.915316}
+    parameters = {**view_request.parameters, **soft}
+    before, after = (session.frame(replace(view_request, parameters=parameters, time=time)) for time in (0.4, 1.5))
+    assert "gains energy" not in badge_of(before).detail
+    assert badge_of(after).level == "unknown"
+    assert badge_of(after).detail.startswith("it gains energy after t = 0.")
+    assert "it gains energy" in describe_column(after.columns[0], 1.5)
+
+
 def test_of_several_models_the_largest_error_is_expected() -> None:
     session, view_request = _alone(odeform.load("kick"))
     (model,) = view_request.columns

@@ -15,6 +15,7 @@ from odeform.geometry.contact import checked_contact
 from odeform.loads.load import Load
 from odeform.loads.registry import load_of_scene
 from odeform.loads.situation import Situation
+from odeform.mechanics.body import Solid
 from odeform.mechanics.contact_parameters import ContactParameters
 from odeform.mechanics.flat import body_motion
 from odeform.mechanics.inside import Inside, inside_of
@@ -28,6 +29,7 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.modal.elastic_body import ElasticBody
+from odeform.models.modal.energy_bound import BoundedBatch, BoundedTrajectory
 from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
 from odeform.models.modal.loaded import SUPPORT as SIDES
 from odeform.models.modal.paired import Shapes, pair_motion, pair_problem
@@ -35,7 +37,7 @@ from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
-from odeform.models.solved import Problem
+from odeform.models.solved import Problem, SolvedTrajectory
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
@@ -65,6 +67,7 @@ SETTLED = 4  # bodies of another mass and stiffness that are kept
 SKIN = 1e-3  # m below the floor, where what lies on it is flat: bodies at rest are up to that deep in it
 FLATTENED = 0.5  # of its smallest extent, by which a body that lands may be deeper than the floor on which it is flat
 SPARE = 1e-3  # m above the depth from which on a motion counts as lost, and below that of a body at rest
+LAWFUL = 0.5  # of the largest deformation, up to which no motion was seen to gain energy
 CALMS = 0.2  # s after the window, in which what presses a body into the floor dies away
 
 QUALITIES = {
@@ -414,7 +417,17 @@ class ModalModel(Model):
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
         motion = self._motion(theta, evaluated, settings, until)
-        return Adjusted(motion, self._projection(motion)) if self.load is None else motion
+        if self.load is None:
+            return Adjusted(motion, self._projection(motion))
+        if not self._flies:
+            return motion
+        assert isinstance(motion, SolvedTrajectory)
+        return BoundedTrajectory(motion, *self._bounds)
+
+    @property
+    def _bounds(self) -> tuple[Solid, float, float]:
+        """The body that flies, the RMS deformation in m up to which it does as its law says, and seconds of a frame."""
+        return self._moving.body.solid, LAWFUL * float(self.space.largest[1]), 1.0 / self.schema.window.rate
 
     def _motion(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
@@ -441,7 +454,12 @@ class ModalModel(Model):
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
     ) -> BatchTrajectory:
         motion = self._motions(geometry, sets, settings, until)
-        return AdjustedBatch(motion, self._projection(motion)) if self.load is None else motion
+        if self.load is None:
+            return AdjustedBatch(motion, self._projection(motion))
+        if not self._flies:
+            return motion
+        assert isinstance(motion, SolvedBatch)
+        return BoundedBatch(motion, *self._bounds)
 
     def _motions(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float

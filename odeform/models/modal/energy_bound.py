@@ -1,0 +1,145 @@
+"""Ends motions of bodies that gain energy from nothing: deformed too far, they have left what a linear law can say."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from odeform.locks import Lock
+from odeform.mechanics.body import Solid
+from odeform.mechanics.flat import parts_of
+from odeform.models.solved import SolvedTrajectory
+from odeform.models.solved_batch import SolvedBatch
+from odeform.motion.base import SolveStats
+from odeform.motion.reduced_space import POSE, rotation_of
+from odeform.surroundings import GRAVITY
+from odeform.types import Floats, Times
+
+__all__ = ["BoundedBatch", "BoundedTrajectory", "EnergyBound"]
+
+MOST = 1.02  # times what a motion begins with: sound ones stay below 1.001
+STATUS = "it gains energy"
+
+
+class EnergyBound:
+    """Until when motions that begin in the air have no more energy than they began with; B of them, of one body.
+
+    It is the energy of the rigid motion that is shown, above the floor, from differences on a fixed grid: it does not
+    depend on which times are asked for. What is in vibrations would only add to it. A body that has never deformed by
+    `deformation`, RMS in m, obeys its law, and is not looked at.
+    """
+
+    def __init__(self, moving: SolvedTrajectory | SolvedBatch, solid: Solid, deformation: float, step: float) -> None:
+        """`step` s is the grid's."""
+        self._moving, self._solid, self._step = moving, solid, step
+        self._largest = deformation * np.sqrt(solid.mass)  # of amplitudes, root kg m
+        self._looked, self._lock = 0, Lock()
+        start = self._states(np.zeros(1))[:, 0]
+        self._most = MOST * _energy(start, solid)
+        self._deformed = np.zeros(len(start), dtype=bool)  # so far
+        self.ends: Float[np.ndarray, " batch"] = np.full(len(start), np.inf)
+        """(B,) s: the last moment that is valid; infinite where none is known not to be."""
+
+    def look(self, until: float) -> Float[np.ndarray, " batch"]:
+        """Look as far as `until` s; returns `ends`."""
+        with self._lock:
+            count = math.ceil(until / self._step - 1e-9)
+            if count > self._looked:
+                self._look_on(count)
+            return self.ends
+
+    def _look_on(self, count: int) -> None:
+        """Look at the grid's next times, up to that of number `count`."""
+        states = self._states(self._step * np.arange(self._looked + 1, count + 1))
+        far = np.linalg.norm(states[..., parts_of(states[0])[2]], axis=2) > self._largest
+        far = np.logical_or.accumulate(far, axis=1) | self._deformed[:, None]
+        if far.any():
+            wrong = far & (self._energies(self._looked, count + 1) > self._most[:, None])
+            first = self._step * (self._looked + wrong.argmax(axis=1))
+            self.ends = np.minimum(self.ends, np.where(wrong.any(axis=1), first, np.inf))
+        self._deformed, self._looked = far[:, -1], count
+
+    def _states(self, times: Times) -> Float[np.ndarray, "batch times state"]:
+        states = self._moving.states(times)
+        return states.reshape(-1, *states.shape[-2:])
+
+    def _energies(self, before: int, after: int) -> Float[np.ndarray, "batch times"]:
+        """(B, T) m^2/s^2, per mass, at the grid's times between these two."""
+        y = self._moving.reduced(self._step * np.arange(before, after + 1))
+        y = y.reshape(-1, *y.shape[-2:])
+        rotation, shift = (
+            part.reshape(*y.shape[:2], *part.shape[1:])
+            for part in rotation_of(y.reshape(-1, y.shape[2])[:, :POSE], 0.0)
+        )
+        speed = (shift[:, 2:] - shift[:, :-2]) / (2.0 * self._step)
+        turned = rotation[:, :-2].swapaxes(2, 3) @ rotation[:, 2:]
+        sines = np.stack(
+            [
+                turned[..., 2, 1] - turned[..., 1, 2],
+                turned[..., 0, 2] - turned[..., 2, 0],
+                turned[..., 1, 0] - turned[..., 0, 1],
+            ],
+            axis=-1,
+        )
+        spin = sines / (4.0 * self._step)
+        return _sum(speed, spin, shift[:, 1:-1, 2], self._solid)
+
+
+def _energy(states: Float[np.ndarray, "batch state"], solid: Solid) -> Float[np.ndarray, " batch"]:
+    shift, turn, *_, velocity = (states[:, part] for part in parts_of(states))
+    spin = np.einsum("bij,bi->bj", turn.reshape(-1, 3, 3), velocity[:, 3:6])
+    return _sum(velocity[:, :3], spin, shift[:, 2], solid)
+
+
+def _sum(speed: Floats, spin: Floats, raised: Floats, solid: Solid) -> Floats:
+    """(...) m^2/s^2 of speeds (..., 3) m/s, spins (..., 3) rad/s in axes of the body, and (...) m above its rest."""
+    turning = np.einsum("...i,ij,...j->...", spin, solid.inertia / solid.mass, spin)
+    return 0.5 * ((speed**2).sum(axis=-1) + turning) + GRAVITY * (solid.height + raised)
+
+
+class BoundedTrajectory:
+    """A solved motion up to the last moment that is valid; later ones show that one."""
+
+    def __init__(self, inner: SolvedTrajectory, solid: Solid, deformation: float, step: float) -> None:
+        """See `EnergyBound`."""
+        self._inner, self._bound = inner, EnergyBound(inner, solid, deformation, step)
+
+    @property
+    def stats(self) -> SolveStats:
+        """As of the solution; the status says where energy was gained, as far as is known."""
+        stats = self._inner.stats
+        return stats if np.isinf(self._bound.ends[0]) else replace(stats, status=STATUS)
+
+    @property
+    def last_good(self) -> float:
+        """Seconds up to which it is valid, as far as is known."""
+        return min(self._inner.last_good, float(self._bound.ends[0]))
+
+    def reduced(self, times: Times) -> Floats:
+        """Maps (T,) s to (T, 6 + K)."""
+        times = np.asarray(times, dtype=float)
+        return self._inner.reduced(np.minimum(times, self._bound.look(float(times.max()))[0]))
+
+
+class BoundedBatch:
+    """Many solved motions, of which those that gain energy are not `ok`: each of them is solved by itself."""
+
+    def __init__(self, inner: SolvedBatch, solid: Solid, deformation: float, step: float) -> None:
+        """See `EnergyBound`."""
+        self._inner, self._bound = inner, EnergyBound(inner, solid, deformation, step)
+
+    @property
+    def ok(self) -> Bool[np.ndarray, " batch"]:
+        """(B,) whether motions are solved and valid as far as they were asked for."""
+        return self._inner.ok & np.isinf(self._bound.ends)
+
+    @property
+    def stats(self) -> list[SolveStats]:
+        """(B,) as of the solutions."""
+        return self._inner.stats
+
+    def reduced(self, times: Times) -> Float[np.ndarray, "batch times y"]:
+        """Maps (T,) s to (B, T, 6 + K)."""
+        self._bound.look(float(times.max()))
+        return self._inner.reduced(times)
