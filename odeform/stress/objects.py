@@ -13,6 +13,7 @@ from odeform.loads.registry import first_body, load_of_scene
 from odeform.loads.situation import Flight
 from odeform.models import registry
 from odeform.models.base import Predictor
+from odeform.models.modal import energy_bound
 from odeform.models.modal.model import ModalModel
 from odeform.models.per_object import PerObject
 from odeform.motion.base import Motion
@@ -137,6 +138,7 @@ def stress_objects(checkpoint: str, draws: int, seed: int = 0) -> dict[str, Any]
         "start_off_m": Check(max(one.start_off for one in found), START if load and load.flies else 0.0),
         "shown_below_floor_mm": Check(1e3 * max(one.depth for one in found), 1e3 * depth),
         "energy_gained": Check(max(one.gained for one in found), GAINED),
+        "ended_by_energy": Check(sum(one.status == energy_bound.STATUS for one in found), 0),
         "held_frames": Check(float(np.mean([one.held for one in found])), 0.05),
         "slowest_case_s": Check(max(one.seconds for one in found), PATIENCE),
     }
