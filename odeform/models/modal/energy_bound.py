@@ -36,7 +36,7 @@ class EnergyBound:
         self._largest = deformation * np.sqrt(solid.mass)  # of amplitudes, root kg m
         self._looked, self._lock = 0, Lock()
         start = self._states(np.zeros(1))[:, 0]
-        self._most = MOST * _energy(start, solid)
+        self._most = MOST * _of_states(start, solid)
         self._deformed = np.zeros(len(start), dtype=bool)  # so far
         self.ends: Float[np.ndarray, " batch"] = np.full(len(start), np.inf)
         """(B,) s: the last moment that is valid; infinite where none is known not to be."""
@@ -83,16 +83,16 @@ class EnergyBound:
             axis=-1,
         )
         spin = sines / (4.0 * self._step)
-        return _sum(speed, spin, shift[:, 1:-1, 2], self._solid)
+        return _of_rigid(speed, spin, shift[:, 1:-1, 2], self._solid)
 
 
-def _energy(states: Float[np.ndarray, "batch state"], solid: Solid) -> Float[np.ndarray, " batch"]:
+def _of_states(states: Float[np.ndarray, "batch state"], solid: Solid) -> Float[np.ndarray, " batch"]:
     shift, turn, *_, velocity = (states[:, part] for part in parts_of(states))
     spin = np.einsum("bij,bi->bj", turn.reshape(-1, 3, 3), velocity[:, 3:6])
-    return _sum(velocity[:, :3], spin, shift[:, 2], solid)
+    return _of_rigid(velocity[:, :3], spin, shift[:, 2], solid)
 
 
-def _sum(speed: Floats, spin: Floats, raised: Floats, solid: Solid) -> Floats:
+def _of_rigid(speed: Floats, spin: Floats, raised: Floats, solid: Solid) -> Floats:
     """(...) m^2/s^2 of speeds (..., 3) m/s, spins (..., 3) rad/s in axes of the body, and (...) m above its rest."""
     turning = np.einsum("...i,ij,...j->...", spin, solid.inertia / solid.mass, spin)
     return 0.5 * ((speed**2).sum(axis=-1) + turning) + GRAVITY * (solid.height + raised)
