@@ -16,7 +16,9 @@ from odeform.motion.reduced_space import POSE, rotation_of
 from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Times
 
-__all__ = ["BoundedBatch", "BoundedTrajectory", "EnergyBound"]
+__all__ = ["LOOKED_AHEAD", "BoundedBatch", "BoundedTrajectory", "EnergyBound"]
+
+LOOKED_AHEAD = 2  # times of the grid beyond what is asked for: up to the next one, and to the one after that
 
 MOST = 1.02  # times what a motion begins with: sound ones stay below 1.001
 STATUS = "it gains energy"

@@ -29,7 +29,7 @@ from odeform.models.contact.inputs import ContactInputs
 from odeform.models.modal.contact_residual import contact_residual
 from odeform.models.modal.coordinates import Coordinates, coordinates_of, space_of
 from odeform.models.modal.elastic_body import ElasticBody
-from odeform.models.modal.energy_bound import BoundedBatch, BoundedTrajectory
+from odeform.models.modal.energy_bound import LOOKED_AHEAD, BoundedBatch, BoundedTrajectory
 from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
 from odeform.models.modal.loaded import SUPPORT as SIDES
 from odeform.models.modal.paired import Shapes, pair_motion, pair_problem
@@ -453,6 +453,8 @@ class ModalModel(Model):
     def batch_trajectory(
         self, geometry: Geometry, sets: Sequence[Parameters], settings: SolverSettings, until: float
     ) -> BatchTrajectory:
+        if self._flies:  # energies are looked up a little ahead, for which all would be solved again
+            until += LOOKED_AHEAD / self.schema.window.rate
         motion = self._motions(geometry, sets, settings, until)
         if self.load is None:
             return AdjustedBatch(motion, self._projection(motion))
