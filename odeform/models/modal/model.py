@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from odeform.checkpoint import Checkpoint
 from odeform.geometry.contact import checked_contact
+from odeform.geometry.shape import surface_weights
 from odeform.loads.load import Load
 from odeform.loads.registry import load_of_scene
 from odeform.loads.situation import Situation
@@ -223,12 +224,13 @@ class ModalModel(Model):
 
     def _with(self, mass: float, stiffness: float) -> "ModalModel":
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
+        # a softer body deforms more before it is lost
+        largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
+        measured = self._measured_body  # and the coordinates that the space is made with: they stay for all such bodies
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
         for name in ("_loaded", "_pair"):
             vars(out).pop(name, None)
-        # a softer body deforms more before it is lost
-        largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
         out.space = replace(self.space, largest=largest)
         if self.residual is not None:
             # what mechanics misses of the rigid motion are impulses, which move a heavier body less; a lighter one
@@ -242,11 +244,10 @@ class ModalModel(Model):
             )
             if self.load is not None:
                 out._flat_on = self._flat_below(out.settled_body.rest)
-        out._measured_body = self._measured_body
-        every = replace(self._measured_body.all, space=out.space)
+        every = replace(measured.all, space=out.space)
         if (settled := out.settled_body) is not None:
             every = settled.basis(every, PointCloud(settled.rest.points))
-        out.checked_body = replace(self._measured_body, all=every)
+        out.checked_body = replace(measured, all=every)
         return out
 
     @cached_property
@@ -316,8 +317,11 @@ class ModalModel(Model):
         settled = self.settled_body
         if settled is None or not np.array_equal(geometry.points, settled.rest.points):
             return super().evaluate_basis(geometry, azimuth)
-        measured = super().evaluate_basis(self.rest, 0.0)
-        return self._evaluated.get((geometry_key(geometry), azimuth), lambda: settled.basis(measured, geometry))
+
+        def laid() -> EvaluatedBasis:
+            return replace(self.checked_body.all, geometry=geometry, areas=surface_weights(self.rest))
+
+        return self._evaluated.get((geometry_key(geometry), azimuth), laid)
 
     def _pushed(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[ContactInputs, Vectors]:
         """Returns what pushes at theta (B, P), relative to the mass centre of the body as it was measured, and the
