@@ -32,13 +32,16 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
     pushed.add_argument("--drawn", type=int, metavar="N", help="identify N drawn bodies of each object")
     pushed.add_argument("--object", nargs="+", metavar="NAME", help="these objects only (default: all)")
     pushed.add_argument("--simulated", action="store_true", help="the simulator moves them (default: the model itself)")
+    pushed.add_argument("--simulations", type=int, default=0, metavar="N",
+                        help="correct the model by N simulations of each body, each of the last estimate")  # fmt: skip
     pushed.add_argument("--cloud", action="store_true", help="observe --points of half of the surface in each frame, "
                         "without correspondence, from an unknown place (default: 200 points)")  # fmt: skip
     pushed.add_argument(
         "--next", action="store_true", help="count the pushes that halve the widest interval, the best against random"
     )
-    pushed.add_argument("--known", nargs="+", default=[], choices=("mass", "young", "friction"), metavar="NAME",
-                        help="what is known of the body: mass, young or friction")  # fmt: skip
+    choices = ("mass", "young", "friction", "push")
+    pushed.add_argument("--known", nargs="+", default=[], choices=choices, metavar="NAME",
+                        help="what is known: mass, young, friction, push (contact and force)")  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> None:
@@ -64,7 +67,17 @@ def run(args: argparse.Namespace) -> None:
             write_json(halved, args.json)
             print(report_halved(halved))
             return
-        result = identify_drawn(predictor, objects, args.drawn, view, args.noise, args.seed, args.simulated, args.known)
+        result = identify_drawn(
+            predictor,
+            objects,
+            args.drawn,
+            view,
+            args.noise,
+            args.seed,
+            args.simulated,
+            args.known,
+            args.simulations,
+        )
         write_json(result, args.json)
         print(report_drawn(result))
         return

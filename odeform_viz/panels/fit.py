@@ -9,6 +9,7 @@ from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
 from odeform.identification.pushed.identify import identifies_pushes, recorded_points
+from odeform.identification.pushed.simulator import can_simulate
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Parameters, Schema
@@ -20,10 +21,17 @@ from odeform_viz.words import parameter_title, plain
 __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
+CORRECTIONS = 3  # simulations; more of them tell little
 NEXT = "the push that would tell most of what is least known of the body"
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
-CALIBRATED = "Intervals are as wide as 20 simulated bodies took for nine in ten to lie within."
+CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
+ALONE = "the model"
+CORRECTED = f"the model, corrected by {CORRECTIONS} simulations"
+HOW = (
+    "what the model misses looks like another body; simulations of the estimate say what it misses, and take some ten "
+    "seconds each"
+)
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "After the best next push, the widest interval of the body is expected to be {:.0%} as wide."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
@@ -68,6 +76,7 @@ class FitPanel(Panel):
         gui = page.server.gui
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
+            self._how = gui.add_dropdown("by", [ALONE, CORRECTED], hint=HOW) if _corrects(page) else None
             self._start = gui.add_button(
                 "Fit to the truth", hint="find the parameters that reproduce the visible truth"
             )
@@ -149,7 +158,9 @@ class FitPanel(Panel):
             return
         search = _Search(self._page, model, truth.setting, named, self._show, CALIBRATED)
         self._show("starting", working=True)
-        self._job = Job(fit_push, (predictor, seen, named), search.done, search.failed, search.progress)
+        simulations = CORRECTIONS if self._how is not None and self._how.value == CORRECTED else 0
+        arguments = predictor, seen, named, simulations
+        self._job = Job(fit_push, arguments, search.done, search.failed, search.progress)
         self._job.start()
 
     def _use_proposed(self) -> None:
@@ -159,6 +170,12 @@ class FitPanel(Panel):
     def _use_estimate(self) -> None:
         self._page.controls.set_parameters(self._found)
         self._page.wake()
+
+
+def _corrects(page: Page) -> bool:
+    """Whether simulations can correct the model."""
+    predictor = page.model.predictor
+    return predictor is not None and identifies_pushes(predictor) and can_simulate(predictor)
 
 
 @dataclass
@@ -174,12 +191,17 @@ class _Search:
     note: str = ""
     """Says what has to be known of the estimates."""
     misfits: list[str] = field(default_factory=list)
+    last: str = ""
+    """The last step in words."""
     key: int | None = None
     hidden: str = ""
     """Why there is no column for it; the search goes on without one."""
 
-    def progress(self, report: float | tuple[dict[str, float], float]) -> None:
-        """Show a step, or how far a calibration is."""
+    def progress(self, report: float | str | tuple[dict[str, float], float]) -> None:
+        """Show a step, how far a calibration is, or what is simulated."""
+        if isinstance(report, str):
+            self.show("\n\n".join(filter(None, (report, self.last))), working=True)
+            return
         if not isinstance(report, tuple):
             self.show(f"Measuring the model's own error first: {100.0 * report:.0f} %", working=True)
             return
@@ -188,8 +210,8 @@ class _Search:
         body = {name: value for name, value in parameters.items() if "_" not in name}  # places are shown
         values = plain(body, self.page.schema)
         steps = " → ".join(self.misfits[-6:])
-        text = f"step {len(self.misfits)}: {values}  \ndifference, of what is expected: {steps}"
-        self.show(text, working=True)
+        self.last = f"step {len(self.misfits)}: {values}  \ndifference, of what is expected: {steps}"
+        self.show(self.last, working=True)
         self._place(parameters)
 
     def done(self, found: Identification) -> None:

@@ -272,11 +272,17 @@ def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoin
     return identify(predictor, seen, discrepancy, lambda theta: report((theta, misfits[-1])), misfits.append)
 
 
-def fit_push(report: Report, predictor: Predictor, seen: "Evidence", known: dict[str, Any]) -> Identification:
-    """Estimates how a pushed body is made and how it was pushed; reports the parameters and misfit of each step."""
+def fit_push(
+    report: Report, predictor: Predictor, seen: "Evidence", known: dict[str, Any], simulations: int
+) -> Identification:
+    """Estimates how a pushed body is made and how it was pushed; reports the parameters and misfit of each step, and
+    before each of up to `simulations` a sentence."""
     from odeform.identification.pushed.identify import identify_push
 
-    return identify_push(predictor, seen, known, progress=lambda *step: report(step), propose=True)
+    def step(parameters: dict[str, float], misfit: float) -> None:
+        report((parameters, misfit))
+
+    return identify_push(predictor, seen, known, None, step, propose=True, simulations=simulations, note=report)
 
 
 def map_stability(report: Report, checkpoint: str) -> "StabilityMap":

@@ -8,14 +8,14 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.pushed.evidence import Evidence
 from odeform.identification.pushed.forward import Forward, pushed_model
-from odeform.identification.pushed.state import BODY, FRICTION, PushState
-from odeform.identification.pushed.views import CloudView, cloud_of, points_of, window_of
+from odeform.identification.pushed.state import BODY, PushState
+from odeform.identification.pushed.views import CloudView, cloud_of, points_of
 from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform.simulation.contact_draws import contact_draws
 from odeform.types import Frames
 
-__all__ = ["drawn_states", "forward_of", "seen", "simulated"]
+__all__ = ["drawn_states", "forward_of", "seen"]
 
 
 def forward_of(predictor: Predictor, name: str) -> Forward:
@@ -33,19 +33,6 @@ def drawn_states(predictor: Predictor, name: str, count: int, seed: int) -> list
     rng = np.random.default_rng(key)
     pushes = contact_draws(forward.model.rest, forces, count, key)
     return [forward.state(*push, body=rng.uniform(-1.0, 1.0, len(BODY)), strongest=forces[1]) for push in pushes]
-
-
-def simulated(predictor: Predictor, name: str, state: PushState) -> Frames:
-    """(T, S, 3) m: the surface in the simulator, at the frames of the window. Takes about half a minute."""
-    from odeform.simulation.objects.catalog import get_object
-    from odeform.simulation.scenes.contact_force import simulate_object
-
-    forward, item = forward_of(predictor, name), get_object(name)
-    ratio = state.value(FRICTION) / forward.friction
-    rougher = replace(item, material=replace(item.material, friction=ratio * item.material.friction))
-    sequence = simulate_object(rougher, state.parameters())
-    window = forward.model.schema.window
-    return window_of(sequence, window.stop, window.rate)[1]
 
 
 def seen(forward: Forward, surface: Frames, view: CloudView | None, noise_mm: float, seed: int) -> Evidence:

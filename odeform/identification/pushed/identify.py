@@ -9,23 +9,29 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.identify import Identification, Identified
+from odeform.identification.pushed.corrected import corrected_search
 from odeform.identification.pushed.evidence import Evidence, Known
 from odeform.identification.pushed.experiment import candidates, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
+from odeform.identification.pushed.simulator import simulator_of
 from odeform.identification.pushed.state import BODY, PUSH, PushState
 from odeform.identification.pushed.views import points_of, window_of
 from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform.types import Floats, MotionSequence, Times
 
-__all__ = ["WIDENED", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
+__all__ = ["PUSHED", "WIDENED", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
 
+PUSHED = "push"
+"""Contact and force, in lists of what is known."""
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
 WIDENED = 7.8
 """Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 20 drawn bodies that the
 simulator moved (docs/identification.md). What a model misses looks like another body, from frame to frame alike."""
+CORRECTED = 1.0
+"""The same where simulations have corrected the model."""
 
 
 def identify_push(
@@ -35,6 +41,8 @@ def identify_push(
     errors_mm: Times | None = None,
     progress: Callable[[dict[str, float], float], None] = lambda *_: None,
     propose: bool = False,
+    simulations: int = 0,
+    note: Callable[[str], None] = lambda _: None,
 ) -> Identification:
     """Estimate how a pushed body is made and how it was pushed, all jointly, each with a 90 % interval.
 
@@ -47,19 +55,29 @@ def identify_push(
             to frame; by default as its error band says, and intervals are widened by what bodies in the simulator took.
         progress: Called with the parameters and the misfit before each step; an exception that it raises ends it.
         propose: Whether to look for the push that would tell most next.
+        simulations: How often at most to simulate the estimate, to correct the model by what it misses there, and to
+            estimate again: some ten seconds each.
+        note: Called with what is done before each simulation.
 
     Returns:
         Estimates of `mass`, `young`, `friction`, and of the push where it is not known. A parameter whose interval
         is as wide as its range is not identifiable.
 
     Raises:
-        InputError: A model of another kind, or only a part of a push.
+        InputError: A model of another kind, only a part of a push, or a body that cannot be simulated but should be.
     """
     begin = time.perf_counter()
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
-    found = search(problem, start, lambda state, misfit: progress(_values(state), misfit))
-    widened = WIDENED if errors_mm is None else 1.0
+
+    def report(state: PushState, misfit: float) -> None:
+        progress(_values(state), misfit)
+
+    simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
+    found, corrected = search(problem, start, report), 0
+    if simulate is not None:
+        problem, found, corrected = corrected_search(problem, found, simulate, simulations, report, note)
+    widened = CORRECTED if corrected else WIDENED if errors_mm is None else 1.0
     estimates, seconds = _identified(problem, found, widened), time.perf_counter() - begin
     if not propose or not set(problem.free) & set(range(len(BODY))):
         return Identification(estimates, found.misfit, seconds)

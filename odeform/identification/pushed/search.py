@@ -14,9 +14,9 @@ from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.registration import cameras_of
 from odeform.identification.pushed.state import BODY, POSE, PUSH, Camera, PushState
 from odeform.simulation.contact_draws import contact_draws
-from odeform.types import Floats, Ints
+from odeform.types import Floats, Frames, Ints
 
-__all__ = ["PRIOR", "Found", "Problem", "information_of", "search"]
+__all__ = ["PRIOR", "Found", "Problem", "information_of", "misfit_of", "refined", "search"]
 
 PRIOR = 0.58
 """Standard deviation of each of `BODY` before anything is seen: that of a uniform draw from [-1, 1]."""
@@ -95,16 +95,16 @@ def _weighted(problem: Problem, frame: int, causes: Floats, columns: Floats) -> 
     return (columns - causes @ np.linalg.solve(inner, causes.T @ columns)) / alone
 
 
-def _equations(problem: Problem, state: PushState, sloped: bool = True) -> _Equations:
-    forward, free = problem.forward, problem.free
-    if sloped:
-        surface, slopes = forward.jet(state, free)
-    else:
-        surface = forward.motions([state])[0]
-        slopes = np.zeros((len(free), *surface.shape))
-    compared = problem.evidence.compared(surface, slopes, state.camera)
+def _equations(problem: Problem, state: PushState) -> _Equations:
+    compared = problem.evidence.compared(*problem.forward.jet(state, problem.free), state.camera)
     count = sum(len(values) for values in compared.values)
     return _Equations(*information_of(problem, compared), count)
+
+
+def misfit_of(problem: Problem, state: PushState, surface: Frames) -> float:
+    """Returns the weighted sum of squares of a surface (T, S, 3) m, seen by the camera of a state, with the prior."""
+    compared = problem.evidence.compared(surface, np.zeros((1, *surface.shape)), state.camera)
+    return information_of(problem, compared)[2] + _prior_cost(problem, state)
 
 
 def information_of(problem: Problem, compared: Residuals) -> tuple[Floats, Floats, float]:
@@ -134,7 +134,7 @@ def _moved(problem: Problem, state: PushState, step: Floats) -> PushState:
     return out
 
 
-def _refined(
+def refined(
     problem: Problem, state: PushState, progress: Callable[[PushState, float], None], rounds: int = ROUNDS
 ) -> Found:
     """Levenberg-Marquardt with the prior, from one start."""
@@ -171,7 +171,7 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
             problem.forward.check(moved)
         except InputError:
             continue
-        return moved, _equations(problem, moved, sloped=False).cost + _prior_cost(problem, moved)
+        return moved, misfit_of(problem, moved, problem.forward.motions([moved])[0])
     return None, np.inf
 
 
@@ -183,10 +183,10 @@ def search(problem: Problem, start: PushState, progress: Callable[[PushState, fl
         starts = _apart(_starts(problem, start))[:TRIED]
         if len(starts) > REFINED:
             push = tuple(index for index in problem.free if index >= len(BODY))
-            brief = [_refined(replace(problem, free=push), state, progress, BRIEF) for state in starts]
+            brief = [refined(replace(problem, free=push), state, progress, BRIEF) for state in starts]
             starts = [one.state for one in sorted(brief, key=lambda one: one.misfit)]
         for state in starts[:REFINED]:
-            found.append(_refined(problem, state, progress))
+            found.append(refined(problem, state, progress))
             # under noise, places that are wrong explain a cloud nearly as well
             if found[-1].misfit < EXPLAINED and len(found) >= (2 if problem.camera_free else 1):
                 break

@@ -86,6 +86,11 @@ class PushState:
         push = {f"{key}_{axis}": float(x) for key, vector in pairs for axis, x in zip("xyz", vector, strict=True)}
         return {**push, "mass": self.value("mass"), "young": self.value("young")}
 
+    @property
+    def vector(self) -> Float[np.ndarray, " 9"]:
+        """`body`, the place of the contact in `size` m, and the force in `strongest` N: how far states are apart."""
+        return np.concatenate([self.body, self.contact / self.size, self.force / self.strongest])
+
     def stepped(self, step: Floats) -> "PushState":
         """Returns the state after a step (8,), `BODY` kept in its ranges. `InputError` where no sphere can push."""
         body = np.clip(self.body + step[: len(BODY)], -1.0, 1.0)

@@ -7,8 +7,9 @@ import numpy as np
 
 from odeform.errors import InputError
 from odeform.identification.identify import Identification
-from odeform.identification.pushed.drawn import drawn_states, forward_of, seen, simulated
-from odeform.identification.pushed.identify import identify_push
+from odeform.identification.pushed.drawn import drawn_states, forward_of, seen
+from odeform.identification.pushed.identify import PUSHED, identify_push
+from odeform.identification.pushed.simulator import simulator_of
 from odeform.identification.pushed.state import BODY, PushState
 from odeform.identification.pushed.views import CloudView
 from odeform.models.base import Predictor
@@ -32,41 +33,52 @@ def identify_drawn(
     seed: int = 0,
     from_simulator: bool = False,
     known: Sequence[str] = (),
+    simulations: int = 0,
 ) -> dict[str, Any]:
     """Scores, and a row for each of `count` drawn bodies of each object.
 
     Their motion is that of the model itself, whose error is then zero, or that of the simulator. `known` are those of
-    mass, young and friction that the search is told.
+    mass, young, friction and push that the search is told. With `simulations`, the model is corrected by so many of
+    each body.
     """
+    if simulations and not from_simulator:
+        raise InputError("identify: simulations correct the model for bodies that the simulator moves, not the model")
     rows: list[dict[str, Any]] = []
     progress = Progress("identify", count * len(objects))
     for name in objects:
         forward = forward_of(predictor, name)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
             try:
-                surface = simulated(predictor, name, state) if from_simulator else forward.motions([state])[0]
+                surface = simulator_of(forward, name)(state) if from_simulator else forward.motions([state])[0]
             except SimulationError as error:  # too strong a push of too soft a body; the others count
                 progress.advance(1, f"{name}: {error}")
                 continue
             evidence = seen(forward, surface, view, noise_mm, seed + index)
-            given = {OBJECT: name, **{key: state.value(key) for key in known}}
             errors = None if from_simulator else np.zeros(len(forward.times))
-            rows.append(_row(name, state, identify_push(predictor, evidence, given, errors)))
+            given = _given(name, state, known)
+            rows.append(_row(name, state, identify_push(predictor, evidence, given, errors, simulations=simulations)))
             progress.advance(1, _note(rows[-1]))
     progress.close()
     if not rows:
         raise InputError("identify: expected a body that can be simulated; none of those drawn could")
-    names = [name for name in (*BODY, "contact", "force") if name not in known]
+    names = [name for name in (*BODY, "contact", "force") if name in rows[0]["parameters"]]
     return {
         "truth": "simulator" if from_simulator else "model",
         "view": "all points" if view is None else f"{view.points} points a frame of half of the surface",
         "noise_mm": noise_mm,
+        "simulations": simulations,
         "seconds": float(np.median([row["seconds"] for row in rows])),
         "bodies": len(rows),
         "parameters": {name: _scores(name, rows) for name in names},
         "factor_90": _factor(rows),
         "rows": rows,
     }
+
+
+def _given(name: str, state: PushState, known: Sequence[str]) -> dict[str, Any]:
+    """What the search is told: the object, and those `known` of the body and the push."""
+    push = {key: value for key, value in state.parameters().items() if key not in BODY} if PUSHED in known else {}
+    return {OBJECT: name, **push, **{key: state.value(key) for key in known if key in BODY}}
 
 
 def _note(row: dict[str, Any]) -> str:
@@ -89,6 +101,8 @@ def _row(name: str, state: PushState, found: Identification) -> dict[str, Any]:
                 "identifiable": each.identifiable,
             }
     for kind, vector, factor in (("contact", state.contact, 1e3), ("force", state.force, 1.0)):
+        if f"{kind}_x" not in found.parameters:
+            continue
         parts = [found.parameters[f"{kind}_{axis}"] for axis in "xyz"]
         off = np.array([part.value for part in parts]) - vector
         halves = np.array([part.half_width for part in parts]) * (state.size if kind == "contact" else state.strongest)
@@ -123,7 +137,7 @@ def report_drawn(result: dict[str, Any]) -> str:
     """Returns the result as a text table."""
     lines = [
         f"{result['bodies']} bodies moved by the {result['truth']}, {result['view']}, "
-        f"{result['noise_mm']:g} mm of noise; "
+        f"{result['noise_mm']:g} mm of noise, {result['simulations']} simulations; "
         f"{result['seconds']:.1f} s each (median)",
         f"{'':<12}{'MAE':>10}{'median':>10}{'in 90 %':>10}{'identifiable':>14}   of",
     ]

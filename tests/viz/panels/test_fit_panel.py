@@ -3,6 +3,7 @@
 import io
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.identification.identify import Identification, Identified
+from odeform.identification.pushed.evidence import Known
+from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
 from odeform_figures.viewer_benchmark.client import LoopbackClient
@@ -170,3 +173,35 @@ def test_a_slider_out_of_range_is_said(dropped: View) -> None:
     client.set("mass (kg)", 1e9)
     client.click(START)
     assert client.until(lambda: "The fit failed" in client.text() and "got 1e+09" in client.text())
+
+
+def telling(report: Report, predictor: Predictor, seen: Known, known: dict[str, Any], simulations: int) -> None:
+    """What a fit of a push says on its way."""
+    numbers = {name: value for name, value in predictor.complete(known).items() if not isinstance(value, str)}
+    report(({**numbers, "friction": 0.5}, 3.0))
+    report(f"{simulations} simulations of {len(seen.times)} frames")
+    time.sleep(60.0)
+
+
+def test_a_fit_of_a_push_can_be_corrected_by_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit, "fit_push", telling)
+    model = load("contact-force")
+    app = App([Column("odeform", model, model.rest)], port=0)
+    try:
+        with LoopbackClient(app.server.get_port()) as client:
+            entry = open_dataset("contact-force").select("test")[0]
+            client.set("test sequence", entry_label(entry, app.session.schema))
+            assert client.until(lambda: not client.controls[START].props["disabled"])
+            client.set("by", fit.CORRECTED)
+            client.click(START)
+            # the last step stays while the estimate is simulated
+            assert client.until(lambda: f"{fit.CORRECTIONS} simulations of 20 frames" in client.text())
+            assert "step 1:" in client.text()
+            client.click(CANCEL)
+            assert client.until(lambda: client.controls[START].visible)
+    finally:
+        app.close()
+
+
+def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
+    assert "by" not in dropped[1].controls

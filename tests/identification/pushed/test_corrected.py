@@ -1,0 +1,108 @@
+"""A model that is wrong, corrected by what it stands for."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.errors import InputError
+from odeform.identification.pushed.corrected import Corrected, corrected_search
+from odeform.identification.pushed.drawn import drawn_states, forward_of
+from odeform.identification.pushed.forward import Forward
+from odeform.identification.pushed.identify import identify_push
+from odeform.identification.pushed.search import Problem, search
+from odeform.identification.pushed.simulator import can_simulate, simulator_of
+from odeform.identification.pushed.state import PushState
+from odeform.identification.pushed.table import identify_drawn, report_drawn
+from odeform.identification.pushed.views import points_of
+from odeform.models.registry import load
+from odeform.simulation.errors import SimulationError
+from odeform.types import Frames
+
+
+class _Straight(Forward):
+    """Motions that are linear in the state."""
+
+    def motions(self, states: Sequence[PushState]) -> Frames:
+        steps = np.arange(9.0) + 1.0
+        return np.stack([np.full((2, 4, 3), steps @ state.vector) for state in states])
+
+
+def _forward(kind: type[Forward]) -> tuple[Forward, PushState]:
+    predictor = load("contact-force")
+    known = forward_of(predictor, "dog")
+    out = kind.__new__(kind)
+    vars(out).update(vars(known))
+    return out, drawn_states(predictor, "dog", 1, seed=0)[0]
+
+
+def test_the_corrected_model_is_exact_where_it_was_simulated_and_along_the_way() -> None:
+    forward, state = _forward(_Straight)
+    slope = np.array([0.5, -2.0, 1.0])
+
+    def truth(one: PushState) -> Frames:
+        return forward.motions([one])[0] + 3.0 + slope @ one.body
+
+    first = Corrected(forward).with_simulated(state, truth(state))
+    np.testing.assert_allclose(first.motions([state])[0], truth(state))
+    other = replace(state, body=state.body + 2.0 * np.eye(3)[1])
+    np.testing.assert_allclose(first.motions([other])[0], truth(other) - slope[1] * 2.0)
+    both = first.with_simulated(other, truth(other))
+    np.testing.assert_allclose(both.motions([other])[0], truth(other))
+    # of what was not looked at before, nothing is said; of the way between both, nearly all
+    between = replace(state, body=state.body + np.eye(3)[1])
+    np.testing.assert_allclose(both.motions([between])[0], truth(between), atol=6e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
+    predictor = load("contact-force")
+    forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=0)[0]
+    # in the world that is observed, bodies lie and rebound on another floor
+    law = forward.model.contact_parameters
+    floor = replace(law, stiffness=0.6 * law.stiffness, damping=0.5 * law.damping)
+    world = Forward(forward.model.with_contact_parameters(floor), forward.times)
+    seen = points_of(forward.times, world.motions([state])[0], forward.model.rest.faces)
+    problem = Problem(forward, seen, np.full(len(forward.times), 2.0), (0, 1, 2))
+    found = search(problem, replace(state, body=np.zeros(3)))
+    told: list[str] = []
+    _, better, count = corrected_search(problem, found, lambda one: world.motions([one])[0], 4, note=told.append)
+    off, left = (np.abs(one.state.body - state.body) for one in (found, better))
+    assert count == len(told) == 4 or count < 4
+    assert off.max() > 0.1
+    assert left.max() < 0.25 * off.max()
+
+    def broken(_: PushState) -> Frames:
+        raise SimulationError("it is inside out")
+
+    assert corrected_search(problem, found, broken, 4) == (problem, found, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_a_simulated_body_is_found_nearer_with_a_simulation() -> None:
+    predictor = load("contact-force")
+    found = identify_drawn(predictor, ["pillow"], 1, from_simulator=True, known=("push",), simulations=1)
+    alone = identify_drawn(predictor, ["pillow"], 1, from_simulator=True, known=("push",))
+    errors = [np.mean([p["error"] for p in one["rows"][0]["parameters"].values()]) for one in (found, alone)]
+    assert errors[0] < errors[1]
+    assert set(found["parameters"]) == {"mass", "young", "friction"}
+    assert "1 simulations" in report_drawn(found)
+    with pytest.raises(InputError, match="not the model"):
+        identify_drawn(predictor, ["pillow"], 1, simulations=1)
+
+
+def test_what_cannot_be_simulated_is_not() -> None:
+    predictor = load("contact-force")
+    assert can_simulate(predictor)
+    forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=0)[0]
+    with pytest.raises(InputError, match="no solid"):
+        simulator_of(forward, "a boot")
+    assert not can_simulate(forward.model)
+    seen = points_of(
+        forward.times, np.zeros((len(forward.times), len(forward.model.rest.points), 3)), forward.model.rest.faces
+    )
+    with pytest.raises(InputError, match="mechanical"):
+        identify_push(load("mass-elastic"), seen, state.parameters(), simulations=1)
