@@ -76,12 +76,12 @@ def corrected_search(
     progress: Callable[[PushState, float], None] = lambda *_: None,
     note: Callable[[str], None] = lambda _: None,
 ) -> tuple[Problem, Found, int]:
-    """Estimates again with up to `most` simulations (T, S, 3) m, each at the estimate before it.
+    """Estimates again with up to `most` simulations (T, S, 3) m, each at the estimate before it, and mechanics alone.
 
     Returns the problem with the corrected model, whose errors are what it missed of the last simulation, what was found
     with it, and how many simulations succeeded. A body that cannot be simulated ends it.
     """
-    model, tried = Corrected(problem.forward), list[tuple[PushState, Frames]]()
+    model, tried = Corrected(problem.forward.without_residual()), list[tuple[PushState, Frames]]()
     for count in range(most):
         note(f"Simulating the estimate ({count + 1} of at most {most})")
         try:

@@ -50,6 +50,10 @@ class Forward:
         )
         self.until = float(times.max())
 
+    def without_residual(self) -> "Forward":
+        """Motions by mechanics alone: what is regressed does not change with the body, and weighs down what does."""
+        return Forward(self.model.without_residual(), self.times, self.named)
+
     def state(self, contact: Floats, force: Floats, body: Floats | None = None, strongest: float = 1.0) -> PushState:
         """The state of a push at `contact` (3,) m by `force` (3,) N on the body as it was measured, or on another."""
         unit = np.zeros(len(BODY)) if body is None else np.asarray(body, dtype=float)

@@ -265,6 +265,12 @@ class ModalModel(Model):
             vars(out).pop(name, None)
         return out
 
+    def without_residual(self) -> "ModalModel":
+        """The same bodies moved by mechanics alone, without what was regressed on its own body's motions."""
+        out = copy(self)
+        out.residual, out._changed, out._recent = None, Recent(SETTLED), Recent(1)
+        return out
+
     def to_body_frame(self, geometry: Geometry, parameters: Mapping[str, Any]) -> Geometry:
         # a motion that begins in the air is that of the body where it would rest
         rest = self.settled(parameters)
