@@ -46,15 +46,22 @@ class ElasticBody:
 
     def reduced(self, support: int = SUPPORT) -> ReducedBody:
         """Converts it to the body that the mechanics takes, of which about `support` points may touch the floor."""
-        return reduce_body(
-            self.points - self.anchor,
-            self.faces,
-            self.modes,
-            self.modal_rotations,
-            self.eigenvalues,
-            self.solid,
-            support,
-        )
+        if support not in self._reduced:
+            self._reduced[support] = reduce_body(
+                self.points - self.anchor,
+                self.faces,
+                self.modes,
+                self.modal_rotations,
+                self.eigenvalues,
+                self.solid,
+                support,
+            )
+        return self._reduced[support]
+
+    @cached_property
+    def _reduced(self) -> dict[int, ReducedBody]:
+        """What was converted: bodies of other masses are made of it."""
+        return {}
 
     @cached_property
     def modal_rotations(self) -> Float[np.ndarray, "points 3 modes"]:

@@ -70,9 +70,10 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
     told: list[str] = []
     _, better, count = corrected_search(problem, found, lambda one: world.motions([one])[0], 4, note=told.append)
     off, left = (np.abs(one.state.body - state.body) for one in (found, better))
-    assert count == len(told) == 4 or count < 4
-    assert off.max() > 0.1
-    assert left.max() < 0.25 * off.max()
+    assert count == len(told) > 0
+    assert off.max() > 0.5
+    assert left[:2].max() < 0.1, "mass and stiffness"
+    assert left[2] < 0.5 * off[2], "friction, of which the push hardly tells"
 
     def broken(_: PushState) -> Frames:
         raise SimulationError("it is inside out")
