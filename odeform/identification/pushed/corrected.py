@@ -19,7 +19,7 @@ from odeform.identification.pushed.state import PushState
 from odeform.simulation.errors import SimulationError
 from odeform.types import Floats, Frames, Times
 
-__all__ = ["Corrected", "corrected_search"]
+__all__ = ["Corrected", "Correction", "corrected_search"]
 
 UNSURE = 0.01
 """Squared distance between estimates, in units of `PushState.vector`, below which they say little of how what the model
@@ -68,6 +68,19 @@ class Corrected(Forward):
         return last.missed + sum(share * (one.missed - last.missed) for share, one in zip(shares, before, strict=True))
 
 
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What a search with simulations came to."""
+
+    problem: Problem
+    """With the corrected model, whose errors are what it missed of the last simulation."""
+    found: Found
+    last: Floats
+    """(9,) the last step of the estimate, in units of `PushState.vector`: how far it may be from where it would end."""
+    simulations: int
+    """How many succeeded."""
+
+
 def corrected_search(
     problem: Problem,
     found: Found,
@@ -75,19 +88,19 @@ def corrected_search(
     most: int,
     progress: Callable[[PushState, float], None] = lambda *_: None,
     note: Callable[[str], None] = lambda _: None,
-) -> tuple[Problem, Found, int]:
+) -> Correction:
     """Estimates again with up to `most` simulations (T, S, 3) m, each at the estimate before it, and mechanics alone.
 
-    Returns the problem with the corrected model, whose errors are what it missed of the last simulation, what was found
-    with it, and how many simulations succeeded. A body that cannot be simulated ends it.
+    A body that cannot be simulated ends it.
     """
     model, tried = Corrected(problem.forward.without_residual()), list[tuple[PushState, Frames]]()
+    last = np.zeros(len(found.state.vector))
     for count in range(most):
         note(f"Simulating the estimate ({count + 1} of at most {most})")
         try:
             surface = simulate(found.state)
         except SimulationError:
-            return problem, found, count
+            return Correction(problem, found, last, count)
         missed = _rms_mm(surface - model.motions([found.state])[0])
         model = model.with_simulated(found.state, surface)
         # at first, what the model itself is expected to miss bounds it
@@ -95,10 +108,11 @@ def corrected_search(
         problem = replace(problem, forward=model, errors_mm=errors)
         tried.append((found.state, surface))
         misfits = [misfit_of(problem, *one) for one in tried]
-        found = refined(problem, tried[int(np.argmin(misfits))][0], progress)
+        before, found = found, refined(problem, tried[int(np.argmin(misfits))][0], progress)
+        last = found.state.vector - before.state.vector
         if float(np.sqrt((missed**2).mean())) < ENOUGH_MM:
-            return problem, found, count + 1
-    return problem, found, most
+            return Correction(problem, found, last, count + 1)
+    return Correction(problem, found, last, most)
 
 
 def _rms_mm(away: Frames) -> Times:

@@ -74,11 +74,13 @@ def identify_push(
         progress(_values(state), misfit)
 
     simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
-    found, corrected = search(problem, start, report), 0
+    found, widened, last = search(problem, start, report), WIDENED if errors_mm is None else 1.0, None
     if simulate is not None:
-        problem, found, corrected = corrected_search(problem, found, simulate, simulations, report, note)
-    widened = CORRECTED if corrected else WIDENED if errors_mm is None else 1.0
-    estimates, seconds = _identified(problem, found, widened), time.perf_counter() - begin
+        correction = corrected_search(problem, found, simulate, simulations, report, note)
+        problem, found = correction.problem, correction.found
+        if correction.simulations:
+            widened, last = CORRECTED, correction.last
+    estimates, seconds = _identified(problem, found, widened, last), time.perf_counter() - begin
     if not propose or not set(problem.free) & set(range(len(BODY))):
         return Identification(estimates, found.misfit, seconds)
     proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
@@ -161,10 +163,14 @@ def posterior_of(problem: Problem, found: Found) -> tuple[Floats, Floats]:
     return with_prior[:size, :size], alone[:size, :size]
 
 
-def _identified(problem: Problem, found: Found, widened: float) -> dict[str, Identified]:
-    """Estimates, with intervals that are `widened` times as wide as those of the posterior."""
+def _identified(problem: Problem, found: Found, widened: float, last: Floats | None) -> dict[str, Identified]:
+    """Estimates, with intervals that are `widened` times as wide as those of the posterior, to which the `last` step of
+    the estimate (9,) adds, if simulations corrected it."""
     state, free = found.state, list(problem.free)
-    posterior, alone = (widened**2 * covariance for covariance in posterior_of(problem, found))
+    step = np.zeros(len(free)) if last is None else _in_steps(state, last)[free]
+    posterior, alone = (
+        widened**2 * (covariance + np.outer(step, step) / TWO_SIDED**2) for covariance in posterior_of(problem, found)
+    )
     out: dict[str, Identified] = {}
     for index, name in enumerate(BODY):
         if index in free:
@@ -184,6 +190,12 @@ def _identified(problem: Problem, found: Found, widened: float) -> dict[str, Ide
             wide, narrow = (span.T @ covariance[rows, rows] @ span for covariance in (alone, posterior))
             out |= _vector(kind, vector, narrow, wide, scale)
     return out
+
+
+def _in_steps(state: PushState, vector: Floats) -> Floats:
+    """(9,) a difference of `PushState.vector` -> (8,) the step of `PushState.stepped` along it."""
+    body, contact, force = np.split(vector, [len(BODY), len(BODY) + 3])
+    return np.concatenate([body, state.tangents @ contact, force])
 
 
 def _vector(kind: str, value: Floats, covariance: Floats, alone: Floats, scale: float) -> dict[str, Identified]:

@@ -68,9 +68,10 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
     problem = Problem(forward, seen, np.full(len(forward.times), 2.0), (0, 1, 2))
     found = search(problem, replace(state, body=np.zeros(3)))
     told: list[str] = []
-    _, better, count = corrected_search(problem, found, lambda one: world.motions([one])[0], 4, note=told.append)
-    off, left = (np.abs(one.state.body - state.body) for one in (found, better))
-    assert count == len(told) > 0
+    better = corrected_search(problem, found, lambda one: world.motions([one])[0], 4, note=told.append)
+    off, left = (np.abs(one.state.body - state.body) for one in (found, better.found))
+    assert better.simulations == len(told) > 0
+    assert 0.0 < np.abs(better.last).max() < off.max(), "steps grow shorter"
     assert off.max() > 0.5
     assert left[:2].max() < 0.1, "mass and stiffness"
     assert left[2] < 0.5 * off[2], "friction, of which the push hardly tells"
@@ -78,7 +79,8 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
     def broken(_: PushState) -> Frames:
         raise SimulationError("it is inside out")
 
-    assert corrected_search(problem, found, broken, 4) == (problem, found, 0)
+    nothing = corrected_search(problem, found, broken, 4)
+    assert (nothing.problem, nothing.found, nothing.simulations) == (problem, found, 0)
 
 
 @pytest.mark.slow
