@@ -57,8 +57,10 @@ class EnergyBound:
         far = np.linalg.norm(states[..., parts_of(states[0])[2]], axis=2) > self._largest
         far = np.logical_or.accumulate(far, axis=1) | self._deformed[:, None]
         if far.any():
-            wrong = far & (self._energies(self._looked, count + 1) > self._most[:, None])
-            first = self._step * (self._looked + wrong.argmax(axis=1))
+            begin = int(far.any(axis=0).argmax())  # nothing is looked at before
+            energies = self._energies(self._looked + begin, count + 1)
+            wrong = far[:, begin:] & (energies > self._most[:, None])
+            first = self._step * (self._looked + begin + wrong.argmax(axis=1))
             self.ends = np.minimum(self.ends, np.where(wrong.any(axis=1), first, np.inf))
         self._deformed, self._looked = far[:, -1], count
 

@@ -225,7 +225,7 @@ class ModalModel(Model):
         """Changes the body to so many times its mass and stiffness. Modes, coordinates and what was learned stay."""
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
-        for name in ("_loaded", "_pair"):
+        for name in ("_loaded", "_pair", "_falling"):
             vars(out).pop(name, None)
         # a softer body deforms more before it is lost
         largest = self.space.largest[0], self.space.largest[1] / min(stiffness / self._ratios[1], 1.0)
@@ -240,8 +240,9 @@ class ModalModel(Model):
             out.settled_body = settled_body(
                 self.body, self.contact_parameters, self.projectile, out._ratios, coordinates, basis
             )
-            if self.load is not None:
-                out._flat_on = self._flat_below(out.settled_body.rest)
+            if self._flat_on is not None and not self._flies:
+                # a heavy and soft body rests deeper than its own self, which it is not shown to
+                out.settled_body = out.settled_body.above(self._flat_on)
         out._measured_body = self._measured_body
         every = replace(self._measured_body.all, space=out.space)
         if (settled := out.settled_body) is not None:
@@ -260,7 +261,7 @@ class ModalModel(Model):
         out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
         if (settled := self.settled_body) is not None:
             out.settled_body = replace(settled, mechanics=replace(settled.mechanics, parameters=contact_parameters))
-        for name in ("_loaded", "_mechanics", "_pair"):
+        for name in ("_loaded", "_mechanics", "_pair", "_falling"):
             vars(out).pop(name, None)
         return out
 
@@ -271,9 +272,11 @@ class ModalModel(Model):
         return rest if self._flies and same else geometry
 
     def _flat_below(self, rest: Mesh) -> float | None:
-        """The height below which a body of this rest shape is flat: what rests there already stays as it is."""
+        """The height below which a body of this rest shape is flat: one that begins there stays as it is."""
         floor = self.surroundings.floor if self.surroundings else None
-        return None if floor is None else min(floor - SKIN, float(rest.points[:, 2].min()))
+        if floor is None:
+            return None
+        return floor - SKIN if self._flies else min(floor - SKIN, float(rest.points[:, 2].min()))
 
     def ground_of(self, parameters: Parameters) -> Ground | None:
         if self.load is None or self._flat_on is None:
@@ -387,11 +390,17 @@ class ModalModel(Model):
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
         if self._pairs:
-            read = self._readout(self._loaded.both.modes[0])
-            return pair_problem(self._loaded, self._pair, self._situation(theta), read)
+            return pair_problem(self._loaded, self._pair, self._situation(theta), self._falling)
         begun = self._begin(theta[None])
         pushed = PushedBody(self._moving, begun.push, begun.pulse)
-        return Problem(pushed, begun.start[0], self._readout(begun.push.modes[0]), at_rest=begun.at_rest)
+        falls = self.load is not None and begun.push.modes is self._loaded.falling.modes
+        read = self._falling if falls else self._readout(begun.push.modes[0])
+        return Problem(pushed, begun.start[0], read, at_rest=begun.at_rest)
+
+    @cached_property
+    def _falling(self) -> _Readout:
+        """Reads out a body that nothing but the floor and obstacles touches."""
+        return self._readout(self._loaded.falling.modes[0])
 
     @property
     def _moving(self) -> Mechanics:

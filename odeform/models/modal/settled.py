@@ -34,6 +34,12 @@ class SettledBody:
     y: Float[np.ndarray, " y"]
     """(6 + K,) how it lies in the coordinates of the body that was measured."""
 
+    def above(self, floor: float) -> "SettledBody":
+        """The same, flat where it would be below `floor` m."""
+        points = self.rest.points.copy()
+        np.maximum(points[:, 2], points.dtype.type(floor), out=points[:, 2])
+        return replace(self, rest=Mesh(points, self.rest.faces))
+
     @property
     def turn(self) -> Rotations:
         """(3, 3) of `y`."""
