@@ -37,7 +37,7 @@ from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
-from odeform.models.solved import Problem, SolvedTrajectory
+from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
@@ -94,6 +94,12 @@ class _Readout:
         shift, rotation, modes = body_motion(states)
         y = self.coordinates.reduced(shift, rotation, self.scale * modes)
         return y if self.settled is None else self.settled.relative(y)
+
+    def poses(self, states: Floats) -> Float[np.ndarray, "times 6"]:
+        """The first (T, 6) coordinates of states (T, 20 + 2 K), without the deformation, which takes longest."""
+        shift, rotation, modes = body_motion(states)
+        y = self.coordinates.pose(shift, rotation, self.scale * modes)
+        return y if self.settled is None else self.settled.relative_pose(y)
 
     def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
         """Releases the body, see `odeform.models.modal.release.released`."""
@@ -425,13 +431,15 @@ class ModalModel(Model):
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
+        if self._flies:
+            assert settings is not None
+            problem = self.problem(theta, evaluated)
+            read = problem.readout
+            assert isinstance(read, _Readout)
+            solved = self._solved(problem, lambda: problem, settings, until)
+            return BoundedTrajectory(solved, read.poses, *self._bounds)
         motion = self._motion(theta, evaluated, settings, until)
-        if self.load is None:
-            return Adjusted(motion, self._projection(motion))
-        if not self._flies:
-            return motion
-        assert isinstance(motion, SolvedTrajectory)
-        return BoundedTrajectory(motion, *self._bounds)
+        return Adjusted(motion, self._projection(motion)) if self.load is None else motion
 
     @property
     def _bounds(self) -> tuple[Solid, float, float]:

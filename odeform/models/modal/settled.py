@@ -47,9 +47,12 @@ class SettledBody:
 
     def relative(self, y: Float[np.ndarray, "times y"]) -> Floats:
         """(T, 6 + K) from its own rest, of coordinates (T, 6 + K) of the body that was measured."""
+        return np.concatenate([self.relative_pose(y), y[:, POSE:] - self.y[POSE:]], axis=1)
+
+    def relative_pose(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times 6"]:
+        """Computes the first (T, 6) of `relative`, which depend on the first six alone."""
         turn = rotation_from_vector(y[:, 3:POSE]) @ self.turn.T
-        shift = y[:, :3] - turn @ self.y[:3]
-        return np.concatenate([shift, vector_from_rotation(turn), y[:, POSE:] - self.y[POSE:]], axis=1)
+        return np.concatenate([y[:, :3] - turn @ self.y[:3], vector_from_rotation(turn)], axis=1)
 
     def absolute(self, pose: Float[np.ndarray, "times 6"]) -> Floats:
         """Computes (T, 6) the inverse of `relative`, of rigid motions."""
