@@ -3,13 +3,15 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
-from odeform.types import Floats, Mesh, Rotations, Vector
+from odeform.types import Floats, Frames, Mesh, Rotations, Vector
 
 __all__ = ["Obstacle", "half_space"]
 
 FAR = np.full(3, np.inf)
+SWEEPS, PARTS = 4, 9  # times that sides are moved off an edge; places along each of them that are looked at
+TOUCHES = 1e-5  # m
 CORNERS = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1)])
 FACES = np.array(
     [
@@ -67,6 +69,44 @@ class Obstacle:
         gap, normal = self.met(points)
         inside = gap < 0.0
         points[inside] -= (gap[inside, None] * normal[inside]).astype(points.dtype)
+
+    def keep_sides_out(self, points: Frames, sides: Int[np.ndarray, "sides 2"]) -> None:
+        """Move points (T, N, 3) m, none of which is inside, so that no edge of the box cuts one of the `sides` between
+        two of them: both ends go with the deepest place of a side to the nearest edge."""
+        if not len(sides):
+            return
+        for _ in range(SWEEPS):
+            local = (points - self.place) @ self.turn
+            # a side is not cut if both of its ends are beyond the same plane
+            beyond = np.concatenate([local <= self.low + TOUCHES, local >= self.high - TOUCHES], axis=-1)
+            planes = np.packbits(beyond, axis=-1)[..., 0]
+            near = np.flatnonzero(np.bitwise_and.reduce(planes, axis=1) == 0)
+            row, which = np.nonzero((planes[near][:, sides[:, 0]] & planes[near][:, sides[:, 1]]) == 0)
+            frame, one, other = near[row], sides[which, 0], sides[which, 1]
+            moves, cut = self._off_edges(local[frame, one], local[frame, other])
+            if not cut.any():
+                return
+            moves, frame, least, most = moves[cut], frame[cut], np.zeros(local.shape), np.zeros(local.shape)
+            for end in (one[cut], other[cut]):
+                np.minimum.at(least, (frame, end), moves)
+                np.maximum.at(most, (frame, end), moves)
+            points += ((least + most) @ self.turn.T).astype(points.dtype)
+
+    def _off_edges(
+        self, one: Float[np.ndarray, "sides 3"], other: Float[np.ndarray, "sides 3"]
+    ) -> tuple[Float[np.ndarray, "sides 3"], Bool[np.ndarray, " sides"]]:
+        """How far to move sides (S, 3) m in its own axes from where they are deepest to the nearest edge, and which of
+        them are cut."""
+        places = one[:, None] + np.linspace(0.0, 1.0, PARTS)[:, None] * (other - one)[:, None]
+        below, above = places - self.low, self.high - places
+        away = np.minimum(below, above)
+        deepest = away.min(axis=2).argmax(axis=1)
+        rows = np.arange(len(one))
+        away = away[rows, deepest]
+        out = np.where((above < below)[rows, deepest], away, -away)
+        # an edge is where two planes meet: along it, the farthest of the three, nothing moves
+        out[rows, away.argmax(axis=1)] = 0.0
+        return out, away.min(axis=1) > TOUCHES
 
     @property
     def mesh(self) -> Mesh:

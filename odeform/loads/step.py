@@ -67,7 +67,7 @@ LOAD = Load(
     situation=situation,
     presets={
         "onto it": {"velocity_x": 2.0, "velocity_z": 1.0, "spin_y": 0.0},
-        "against its edge": {"velocity_x": 1.2, "velocity_z": 0.0, "rise": 0.12, "spin_y": 0.0},
+        "against its edge": {"distance": 0.25, "velocity_x": 1.2, "velocity_z": 0.0, "rise": 0.12, "spin_y": 0.0},
         "a somersault over the edge": {"velocity_x": 1.6, "velocity_z": 1.2, "spin_y": 9.0},
         "it lands before it": {"velocity_x": 1.0, "velocity_z": -0.5, "distance": 0.5},
     },

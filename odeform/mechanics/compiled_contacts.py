@@ -26,9 +26,10 @@ __all__ = [
 
 MARGIN = 1e-3
 PUSH = 64
-SMALL = 1e-18
+SERIES = 0.25
 
 compiled = compiled_with(__file__)
+inlined = compiled_with(__file__, inline=True)
 
 
 class Constants(NamedTuple):
@@ -74,7 +75,7 @@ class Constants(NamedTuple):
     hold_damping: float  # s
 
 
-@compiled
+@inlined
 @no_type_check
 def copy(source, out):
     """Copies in a loop: assignments to slices take seconds to compile."""
@@ -82,7 +83,7 @@ def copy(source, out):
         out[k] = source[k]
 
 
-@compiled
+@inlined
 @no_type_check
 def turn(rows, i, z, size, out):
     """Displacement (3) and rotation (3) of sample i by the amplitudes of a state."""
@@ -93,17 +94,34 @@ def turn(rows, i, z, size, out):
         out[axis] = total
 
 
-@compiled
+@inlined
+@no_type_check
+def _sines(square):
+    """sin(a) / a, (1 - cos(a)) / a^2 and (1 - sin(a) / a) / a^2 of an angle by its square: to rounding, its series
+    take a tenth of the time of sines."""
+    if square < SERIES:
+        s = square
+        rest = 1.0 / 6227020800.0 - s / 1307674368000.0
+        rest = 1.0 / 120.0 - s * (1.0 / 5040.0 - s * (1.0 / 362880.0 - s * (1.0 / 39916800.0 - s * rest)))
+        rest = 1.0 / 6.0 - s * rest
+        twice = 1.0 / 479001600.0 - s / 87178291200.0
+        twice = 1.0 / 24.0 - s * (1.0 / 720.0 - s * (1.0 / 40320.0 - s * (1.0 / 3628800.0 - s * twice)))
+        return 1.0 - s * rest, 0.5 - s * twice, rest
+    angle = np.sqrt(square)
+    half = np.sin(0.5 * angle) / angle
+    once = np.sin(angle) / angle
+    return once, 2.0 * half * half, (1.0 - once) / square
+
+
+@inlined
 @no_type_check
 def bend(points, i, motion, place):
     """Returns where the sample is, and three factors of its rotation: see `odeform.mechanics.warping`."""
     t0, t1, t2 = motion[3], motion[4], motion[5]
-    square = t0 * t0 + t1 * t1 + t2 * t2 + SMALL
-    angle = np.sqrt(square)
-    half = np.sin(0.5 * angle) / angle
-    once, twice = np.sin(angle) / angle, 2.0 * half * half
+    square = t0 * t0 + t1 * t1 + t2 * t2
+    once, twice, rest = _sines(square)
     d0, d1, d2 = motion[0], motion[1], motion[2]
-    along = (t0 * d0 + t1 * d1 + t2 * d2) * ((1.0 - once) / square)
+    along = (t0 * d0 + t1 * d1 + t2 * d2) * rest
     place[0] = points[0, i] + once * d0 + twice * (t1 * d2 - t2 * d1) + along * t0
     place[1] = points[1, i] + once * d1 + twice * (t2 * d0 - t0 * d2) + along * t1
     place[2] = points[2, i] + once * d2 + twice * (t0 * d1 - t1 * d0) + along * t2
@@ -160,7 +178,7 @@ def _met(box, z, place, local, normal):
 
 @compiled
 @no_type_check
-def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what):
+def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what, known):
     """Choose the samples that may touch an obstacle in a step, after those of the floor: how many in all by now."""
     points, rows, v = c.points[b], c.rows[b], 13 + size
     motion, place, local, normal = np.empty(6), np.empty(3), np.empty(3), np.empty(3)
@@ -186,7 +204,8 @@ def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what):
             if _met(box, z, place, local, normal) - most * c.extents[b, i] >= farthest:
                 continue
             turn(rows, i, z, size, motion)
-            bend(points, i, motion, place)
+            square, once, twice = bend(points, i, motion, place)
+            _store(known, i, motion, place, square, once, twice)
             gaps[i] = _met(box, z, place, local, normal)
             towards = min(normal[0] * v0 + normal[1] * v1 + normal[2] * v2 - c.reach * spin, 0.0)
             if gaps[i] < MARGIN - ahead * towards:
@@ -199,24 +218,34 @@ def _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what):
 @compiled
 @no_type_check
 def keep(chosen, first, count, most, gaps, i):
-    """Add sample i to at most `most` chosen from `first` on, or in place of the one with the largest gap."""
+    """Add sample i to at most `most` chosen from `first` on, or in place of the one with the largest gap, which is
+    always the first of them: they are a heap."""
     if count - first < most:
-        chosen[count] = i
+        at = count - first
+        while at > 0 and gaps[chosen[first + (at - 1) // 2]] < gaps[i]:
+            chosen[first + at] = chosen[first + (at - 1) // 2]
+            at = (at - 1) // 2
+        chosen[first + at] = i
         return count + 1
-    worst = first
-    for j in range(first + 1, count):
-        if gaps[chosen[j]] > gaps[chosen[worst]]:
-            worst = j
-    if gaps[i] < gaps[chosen[worst]]:
-        chosen[worst] = i
+    if gaps[i] >= gaps[chosen[first]]:
+        return count
+    at, below = 0, 1
+    while below < most:
+        if below + 1 < most and gaps[chosen[first + below + 1]] > gaps[chosen[first + below]]:
+            below += 1
+        if gaps[chosen[first + below]] <= gaps[i]:
+            break
+        chosen[first + at] = chosen[first + below]
+        at, below = below, 2 * below + 1
+    chosen[first + at] = i
     return count
 
 
 @compiled
 @no_type_check
-def find_near(c, b, z, size, pushed, step, chosen, gaps, what):
+def find_near(c, b, z, size, pushed, step, chosen, gaps, what, known):
     """Choose the samples that may touch something in a step: how many on the floor and obstacles, and how many in
-    all."""
+    all. Where each of them is, is then `known`, (S, 12)."""
     points, rows, v = c.points[b], c.rows[b], 13 + size
     motion, place, centre = np.empty(6), np.empty(3), np.empty(3)
     spin = np.sqrt(z[v + 3] * z[v + 3] + z[v + 4] * z[v + 4] + z[v + 5] * z[v + 5])
@@ -232,14 +261,15 @@ def find_near(c, b, z, size, pushed, step, chosen, gaps, what):
         if height - most * c.extents[b, i] >= margin:
             continue
         turn(rows, i, z, size, motion)
-        bend(points, i, motion, place)
+        square, once, twice = bend(points, i, motion, place)
+        _store(known, i, motion, place, square, once, twice)
         gaps[i] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
         if gaps[i] < margin:
             floor = keep(chosen, 0, floor, c.most, gaps, i)
     for j in range(floor):
         what[j] = -1
     if c.obstacles.shape[1]:
-        floor = _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what)
+        floor = _near_obstacles(c, b, z, size, step, most, floor, chosen, gaps, what, known)
     if not pushed:
         return floor, floor
     _centre(c, b, z, size, centre)
@@ -254,14 +284,26 @@ def find_near(c, b, z, size, pushed, step, chosen, gaps, what):
         if np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) - most * c.extents[b, i] >= margin:
             continue
         turn(rows, i, z, size, motion)
-        bend(points, i, motion, place)
+        square, once, twice = bend(points, i, motion, place)
+        _store(known, i, motion, place, square, once, twice)
         gaps[i] = np.sqrt((place[0] - centre[0]) ** 2 + (place[1] - centre[1]) ** 2 + (place[2] - centre[2]) ** 2)
         if gaps[i] < margin:
             count = keep(chosen, floor, count, PUSH, gaps, i)
     return floor, count
 
 
-@compiled
+@inlined
+@no_type_check
+def _store(known, i, motion, place, square, once, twice):
+    """Keep where a sample is, for as long as the state is the same."""
+    for axis in range(6):
+        known[i, axis] = motion[axis]
+    for axis in range(3):
+        known[i, 6 + axis] = place[axis]
+    known[i, 9], known[i, 10], known[i, 11] = square, once, twice
+
+
+@inlined
 @no_type_check
 def turn_sample(motion, square, once, twice, turned):
     """Sets the rotation of a sample, once it has moved."""
@@ -275,26 +317,29 @@ def turn_sample(motion, square, once, twice, turned):
     turned[2, 2] = rest + twice * t2 * t2
 
 
-@compiled
+@inlined
 @no_type_check
-def move_along(a0, a1, a2, place, turned, rows, i, size, out):
-    """Sets how fast sample i moves along an axis of the body, by the velocities."""
-    out[0], out[1], out[2] = a0, a1, a2
-    out[3] = place[1] * a2 - place[2] * a1
-    out[4] = place[2] * a0 - place[0] * a2
-    out[5] = place[0] * a1 - place[1] * a0
+def move_along(a0, a1, a2, place, turned, rows, i, size, out, j, row, at):
+    """Sets how fast sample i moves along an axis of the body, by the velocities: entries of out[j, row] from `at` on.
+
+    Views of rows are made nowhere here: each counts references, which takes longer than some of the sums.
+    """
+    out[j, row, at], out[j, row, at + 1], out[j, row, at + 2] = a0, a1, a2
+    out[j, row, at + 3] = place[1] * a2 - place[2] * a1
+    out[j, row, at + 4] = place[2] * a0 - place[0] * a2
+    out[j, row, at + 5] = place[0] * a1 - place[1] * a0
     b0 = a0 * turned[0, 0] + a1 * turned[1, 0] + a2 * turned[2, 0]
     b1 = a0 * turned[0, 1] + a1 * turned[1, 1] + a2 * turned[2, 1]
     b2 = a0 * turned[0, 2] + a1 * turned[1, 2] + a2 * turned[2, 2]
-    r0, r1, r2 = rows[0, i], rows[1, i], rows[2, i]
     for k in range(size):
-        out[6 + k] = b0 * r0[k] + b1 * r1[k] + b2 * r2[k]
+        out[j, row, at + 6 + k] = b0 * rows[0, i, k] + b1 * rows[1, i, k] + b2 * rows[2, i, k]
 
 
 @compiled
 @no_type_check
-def linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps):
-    """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`."""
+def linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps, known, same):
+    """Linearise the chosen contacts about a state, in axes of the body; see `odeform.mechanics.touching.Near`. `same`
+    says whether it is the state about which samples are `known`."""
     points, rows = c.points[b], c.rows[b]
     motion, place, centre, axes, turned = np.empty(6), np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     guide, local, normal = np.zeros(3), np.empty(3), np.empty(3)
@@ -304,8 +349,15 @@ def linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
             guide[axis] = z[3 + axis] * c.guides[b, 0] + z[6 + axis] * c.guides[b, 1] + z[9 + axis] * c.guides[b, 2]
     for j in range(count):
         i = chosen[j]
-        turn(rows, i, z, size, motion)
-        square, once, twice = bend(points, i, motion, place)
+        if same:
+            for axis in range(6):
+                motion[axis] = known[i, axis]
+            for axis in range(3):
+                place[axis] = known[i, 6 + axis]
+            square, once, twice = known[i, 9], known[i, 10], known[i, 11]
+        else:
+            turn(rows, i, z, size, motion)
+            square, once, twice = bend(points, i, motion, place)
         if j < floor and what[j] < 0:
             gaps[j] = z[9] * place[0] + z[10] * place[1] + z[11] * place[2] + z[2] + c.level[i]
             for axis in range(3):
@@ -328,18 +380,17 @@ def linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
                     axes[row, axis] = scale * half[row] * half[axis] - (sign if row == axis else 0.0)
         turn_sample(motion, square, once, twice, turned)
         for row in range(3):
-            out = jacobian[j, row]
-            move_along(axes[row, 0], axes[row, 1], axes[row, 2], place, turned, rows, i, size, out)
+            a0, a1, a2 = axes[row, 0], axes[row, 1], axes[row, 2]
+            move_along(a0, a1, a2, place, turned, rows, i, size, jacobian, j, row, 0)
             if pushed:
-                out[6 + size] = (
-                    0.0 if j < floor else -(axes[row, 0] * guide[0] + axes[row, 1] * guide[1] + axes[row, 2] * guide[2])
-                )
+                jacobian[j, row, 6 + size] = 0.0 if j < floor else -(a0 * guide[0] + a1 * guide[1] + a2 * guide[2])
 
 
 @compiled
 @no_type_check
 def linearise_hold(c, b, z, size, jacobian, away):
     """Linearise the springs that hold a patch about a state, in axes of the body; see `odeform.mechanics.holding`."""
+    width = jacobian.shape[2]
     points, rows, places = c.hold_points[b], c.hold_rows[b], c.hold_places[b]
     motion, place, turned = np.empty(6), np.empty(3), np.empty((3, 3))
     for i in range(points.shape[1]):
@@ -348,9 +399,8 @@ def linearise_hold(c, b, z, size, jacobian, away):
         turn_sample(motion, square, once, twice, turned)
         d0, d1, d2 = places[i, 0] - z[0], places[i, 1] - z[1], places[i, 2] - z[2]
         for axis in range(3):
-            row, out = 3 * i + axis, jacobian[3 * i + axis]
-            away[row] = place[axis] - (z[3 + axis] * d0 + z[6 + axis] * d1 + z[9 + axis] * d2)
-            for k in range(len(out)):
-                out[k] = 0.0
+            away[3 * i + axis] = place[axis] - (z[3 + axis] * d0 + z[6 + axis] * d1 + z[9 + axis] * d2)
+            for k in range(6 + size, width):
+                jacobian[i, axis, k] = 0.0
             a0, a1, a2 = (1.0 if axis == 0 else 0.0), (1.0 if axis == 1 else 0.0), (1.0 if axis == 2 else 0.0)
-            move_along(a0, a1, a2, place, turned, rows, i, size, out)
+            move_along(a0, a1, a2, place, turned, rows, i, size, jacobian, i, axis, 0)

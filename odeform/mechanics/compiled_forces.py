@@ -16,7 +16,6 @@ __all__ = [
     "local_velocity",
     "move",
     "press",
-    "relative_velocity",
     "resist",
     "rotate",
     "set_masses",
@@ -24,7 +23,9 @@ __all__ = [
 
 SLIP = 1e-4
 
-compiled = compiled_with(__file__, compiled_algebra.__file__, compiled_contacts.__file__)
+SOURCES = (compiled_algebra.__file__, compiled_contacts.__file__)
+compiled = compiled_with(__file__, *SOURCES)
+inlined = compiled_with(__file__, *SOURCES, inline=True)
 
 
 @compiled
@@ -43,7 +44,7 @@ def rotate(z, vector, at):
         z[9 + column] = r2 + once * c2 + twice * (w0 * c1 - w1 * c0)
 
 
-@compiled
+@inlined
 @no_type_check
 def local_velocity(z, size, v):
     """The velocities of a state, shift and spin in axes of the body."""
@@ -85,7 +86,7 @@ def _patch(c, b, z, size, time, rate):
         rate[6 + k] += b0 * rows[0, k] + b1 * rows[1, k] + b2 * rows[2, k]
 
 
-@compiled
+@inlined
 @no_type_check
 def free_motion(c, b, z, size, pushed, time, v, momentum, rate):
     """Momentum and its rate at a time without contacts and damping, in axes of the body."""
@@ -106,7 +107,7 @@ def free_motion(c, b, z, size, pushed, time, v, momentum, rate):
         _patch(c, b, z, size, time, rate)
 
 
-@compiled
+@inlined
 @no_type_check
 def set_masses(c, b, size, pushed, stiff, matrix):
     """Set the lower half of the matrix to the masses, and those of modes to one and `stiff` times their eigenvalues."""
@@ -123,72 +124,60 @@ def set_masses(c, b, size, pushed, stiff, matrix):
         matrix[6 + size, 6 + size] = c.projectile
 
 
-@compiled
+@inlined
 @no_type_check
-def along(row, v):
-    """A row of the Jacobian times the velocities."""
+def along(rows, j, row, v):
+    """A row of the Jacobian, rows[j, row], times the velocities."""
     total = 0.0
     for k in range(len(v)):
-        total += row[k] * v[k]
+        total += rows[j, row, k] * v[k]
     return total
 
 
-@compiled
+@inlined
 @no_type_check
-def relative_velocity(n, s, t, v):
-    """The three rows of a contact times the velocities."""
-    r0 = r1 = r2 = 0.0
-    for k in range(len(v)):
-        r0 += n[k] * v[k]
-        r1 += s[k] * v[k]
-        r2 += t[k] * v[k]
-    return r0, r1, r2
-
-
-@compiled
-@no_type_check
-def drag_of(c, b, j, i, floor, force, r1, r2):
+def drag_of(friction, grip, force, r1, r2):
     """Friction by the speed of sliding under a normal force, N s/m."""
-    limit = (c.floor_friction if j < floor else c.push_friction) * force
-    return limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / c.grip[b, i]) ** 2 + SLIP * SLIP)
+    limit = friction * force
+    return limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / grip) ** 2 + SLIP * SLIP)
 
 
-@compiled
+@inlined
 @no_type_check
 def resist(c, b, step, v, chosen, floor, count, jacobian, gaps, springs, away, rows, matrix, right):
     """Add the chosen contacts, and the springs that hold it, to the lower half of a matrix and to the momentum, at
     about these velocities."""
     added = len(away)
     for j in range(added):
-        row, active = springs[j], step * c.hold_stiffness[b, j // 3]
+        i, axis = j // 3, j % 3
+        active = step * c.hold_stiffness[b, i]
         rows.weights[j] = active * (step + c.hold_damping)
         for k in range(len(right)):
-            rows.columns[k, j] = row[k]
-            right[k] -= active * away[j] * row[k]
+            rows.columns[k, j] = springs[i, axis, k]
+            right[k] -= active * away[j] * springs[i, axis, k]
     for j in range(count):
-        n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
-        r0, r1, r2 = relative_velocity(n, s, t, v)
-        time = step + (c.floor_damping if j < floor else c.push_damping)
+        i, damping = chosen[j], c.floor_damping if j < floor else c.push_damping
+        r0, time = along(jacobian, j, 0, v), step + damping
         force = c.stiffness[b, i] * (-gaps[j] - time * r0)
         if force <= 0.0 or (j < floor and gaps[j] + (step + c.onset) * r0 > 0.0):
             continue
-        active = step * c.stiffness[b, i]
-        drag = step * drag_of(c, b, j, i, floor, force, r1, r2)
-        added = press(n, s, t, time * active, drag, -active * gaps[j], rows, added, right)
+        active, friction = step * c.stiffness[b, i], c.floor_friction if j < floor else c.push_friction
+        drag = step * drag_of(friction, c.grip[b, i], force, along(jacobian, j, 1, v), along(jacobian, j, 2, v))
+        added = press(jacobian, j, time * active, drag, -active * gaps[j], rows, added, right)
     add_squares(rows, added, matrix)
 
 
-@compiled
+@inlined
 @no_type_check
-def press(n, s, t, normal, drag, impulse, rows, added, right):
+def press(jacobian, j, normal, drag, impulse, rows, added, right):
     """Add the three rows of a contact to those that resist, and what it adds to the momentum; how many rows there
     are then."""
     columns, weights = rows.columns, rows.weights
     weights[added], weights[added + 1], weights[added + 2] = normal, drag, drag
     for k in range(len(right)):
-        column = columns[k]
-        column[added], column[added + 1], column[added + 2] = n[k], s[k], t[k]
-        right[k] += impulse * n[k]
+        columns[k, added], columns[k, added + 1] = jacobian[j, 0, k], jacobian[j, 1, k]
+        columns[k, added + 2] = jacobian[j, 2, k]
+        right[k] += impulse * jacobian[j, 0, k]
     return added + 3
 
 

@@ -24,12 +24,12 @@ from odeform.mechanics.compiled_contacts import (
     turn_sample,
 )
 from odeform.mechanics.compiled_forces import (
-    SLIP,
+    along,
+    drag_of,
     free_motion,
     local_velocity,
     move,
     press,
-    relative_velocity,
     resist,
     set_masses,
 )
@@ -217,19 +217,17 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
             for axis in range(3):
                 axes[row, axis] = scale * half[row] * half[axis] - (sign if row == axis else 0.0)
             a0, a1, a2 = axes[row, 0], axes[row, 1], axes[row, 2]
-            out = jacobian[j, row, b * width : (b + 1) * width]
             move_along(
                 z[3] * a0 + z[6] * a1 + z[9] * a2,
                 z[4] * a0 + z[7] * a1 + z[10] * a2,
                 z[5] * a0 + z[8] * a1 + z[11] * a2,
-                place, own, c.rows[b], i, size, out,
+                place, own, c.rows[b], i, size, jacobian, j, row, b * width,
             )  # fmt: skip
-            out = jacobian[j, row, (1 - b) * width : (2 - b) * width]
             move_along(
                 -(other[3] * a0 + other[6] * a1 + other[9] * a2),
                 -(other[4] * a0 + other[7] * a1 + other[10] * a2),
                 -(other[5] * a0 + other[8] * a1 + other[11] * a2),
-                at, turned, c.rows[1 - b], owner, size, out,
+                at, turned, c.rows[1 - b], owner, size, jacobian, j, row, (1 - b) * width,
             )  # fmt: skip
 
 
@@ -237,7 +235,7 @@ def _between(c, s, states, size, chosen, first, count, jacobian, gaps):
 @no_type_check
 def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
     """The states of both after one step of first order; false where it cannot be solved for."""
-    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _, own, common = work
+    chosen, gaps, _, jacobian, met, distances, rows, _, _, matrix, _, own, common, _ = work
     width = 6 + size
     v, momentum, rate, right = np.empty(2 * width), np.empty(2 * width), np.empty(2 * width), np.empty(2 * width)
     for b in range(2):
@@ -246,7 +244,7 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
         free_motion(c, b, states[b], size, False, end, v[some], momentum[some], rate[some])
     for k in range(2 * width):
         momentum[k] += step * rate[k]
-    time, none = step + c.floor_damping, (np.empty((0, width)), np.empty(0))
+    time, none = step + c.floor_damping, (np.empty((0, 3, width)), np.empty(0))
     for _ in range(2):
         for b in range(2):
             some = slice(b * width, (b + 1) * width)
@@ -263,14 +261,13 @@ def _implicit(c, s, states, size, step, end, work, first, count, floors, out):
             )  # fmt: skip
         pressed = 0
         for j in range(count):
-            n, t0, t1, i = rows[j, 0], rows[j, 1], rows[j, 2], met[j]
-            r0, r1, r2 = relative_velocity(n, t0, t1, v)
+            i, r0 = met[j], along(rows, j, 0, v)
             force = s.stiffness[i] * (-distances[j] - time * r0)
             if force <= 0.0 or distances[j] + step * r0 > 0.0:
                 continue
-            active, limit = step * s.stiffness[i], c.floor_friction * force
-            drag = step * limit / np.sqrt(r1 * r1 + r2 * r2 + (limit / s.grip[i]) ** 2 + SLIP * SLIP)
-            pressed = press(n, t0, t1, time * active, drag, -active * distances[j], common, pressed, right)
+            active = step * s.stiffness[i]
+            drag = step * drag_of(c.floor_friction, s.grip[i], force, along(rows, j, 1, v), along(rows, j, 2, v))
+            pressed = press(rows, j, time * active, drag, -active * distances[j], common, pressed, right)
         if pressed:
             add_squares(common, pressed, matrix)
             good = solve(matrix, right)
@@ -304,6 +301,7 @@ def _work(c):
         np.empty(2, np.int64),
         room(width, 3 * most),
         room(2 * width, 6 * most),
+        np.empty((2, samples, 12)),
     )
 
 
@@ -312,16 +310,19 @@ def _work(c):
 def advance_pair(c, s, time, states, step, out, slopes):
     """States (2, 20 + 2 K) of both after a step of `step` s, slopes there; returns the error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors, _, _ = work = _work(c)
+    chosen, gaps, what, jacobian, met, distances, rows, whole, half, _, floors, _, _, known = work = _work(c)
     for b in range(2):
-        floors[b], _ = find_near(c, b, states[b], size, False, step, chosen[b], gaps[b], what)
+        floors[b], _ = find_near(c, b, states[b], size, False, step, chosen[b], gaps[b], what, known[b])
     first, count = _met(c, s, states, size, step, met, distances)
     good, begin = True, states
     # a whole step, its first half with the same contacts, and the second
     for part in range(3):
         if part != 1:
             for b in range(2):
-                linearise(c, b, begin[b], size, False, chosen[b], what, floors[b], floors[b], jacobian[b], gaps[b])
+                linearise(
+                    c, b, begin[b], size, False, chosen[b], what, floors[b], floors[b], jacobian[b], gaps[b],
+                    known[b], part == 0,
+                )  # fmt: skip
             _between(c, s, begin, size, met, first, count, rows, distances)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:

@@ -17,7 +17,6 @@ from odeform.mechanics.compiled_forces import (
     free_motion,
     local_velocity,
     move,
-    relative_velocity,
     resist,
     rotate,
     set_masses,
@@ -110,14 +109,15 @@ def second_order(c, size, pushed, whole, out):
 def _step(c, b, z, pushed, time, step, out, work):
     """The state after a step of second order from a time on; returns its error in m."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, springs, away, whole, half, rows, matrix = work
-    floor, count = find_near(c, b, z, size, pushed, step, chosen, gaps, what)
+    chosen, gaps, what, jacobian, springs, away, whole, half, rows, matrix, known = work
+    floor, count = find_near(c, b, z, size, pushed, step, chosen, gaps, what, known)
     good, begin = True, z
     # a whole step, its first half with the same contacts, and the second; one call, or compiling takes longer
     for part in range(3):
         if part != 1:
-            linearise(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps)
-            linearise_hold(c, b, begin, size, springs, away)
+            linearise(c, b, begin, size, pushed, chosen, what, floor, count, jacobian, gaps, known, part == 0)
+            if len(away) > 0:
+                linearise_hold(c, b, begin, size, springs, away)
         length, end = (0.5 * step, half) if part else (step, whole)
         if part == 2:
             end = out
@@ -182,12 +182,13 @@ def _work(c):
         np.empty(max(c.points.shape[2], most)),
         np.empty(most, np.int64),
         np.empty((most, 3, width)),
-        np.empty((3 * c.hold_points.shape[2], width)),
+        np.empty((c.hold_points.shape[2], 3, width)),
         np.empty(3 * c.hold_points.shape[2]),
         np.empty(state),
         np.empty(state),
         room(width, 3 * (most + c.hold_points.shape[2])),
         np.empty((width, width)),
+        np.empty((c.points.shape[2], 12)),
     )
 
 
@@ -266,13 +267,13 @@ def follow(c, b, control, times, states, slopes, rates, tried):
 def slope_of(c, rows, times, states, out):
     """The slopes (R, 20 + 2 K) of states of the pushes `rows` (R,) at `times` (R,) s."""
     size = c.eigenvalues.shape[1]
-    chosen, gaps, what, jacobian, springs, away, _, _, _, matrix = _work(c)
+    chosen, gaps, what, jacobian, springs, away, _, _, _, matrix, known = _work(c)
     start = 13 + size
     for row in range(len(rows)):
         b, z, pushed = rows[row], states[row], times[row] < c.pulse
         width = 6 + size + (1 if pushed else 0)
-        floor, count = find_near(c, b, z, size, pushed, 0.0, chosen, gaps, what)
-        linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps)
+        floor, count = find_near(c, b, z, size, pushed, 0.0, chosen, gaps, what, known)
+        linearise(c, b, z, size, pushed, chosen, what, floor, count, jacobian, gaps, known, True)
         v, momentum, rate = np.empty(width), np.empty(width), np.empty(width)
         local_velocity(z, size, v)
         free_motion(c, b, z, size, pushed, times[row], v, momentum, rate)
@@ -280,18 +281,19 @@ def slope_of(c, rows, times, states, out):
             rate[6 + k] -= c.relaxation * c.eigenvalues[b, k] * v[6 + k]
         linearise_hold(c, b, z, size, springs, away)
         for j in range(len(away)):
-            pull = c.hold_stiffness[b, j // 3] * (away[j] + c.hold_damping * along(springs[j], v))
+            i, axis = j // 3, j % 3
+            pull = c.hold_stiffness[b, i] * (away[j] + c.hold_damping * along(springs, i, axis, v))
             for k in range(width):
-                rate[k] -= pull * springs[j, k]
+                rate[k] -= pull * springs[i, axis, k]
         for j in range(count):
-            n, s, t, i = jacobian[j, 0], jacobian[j, 1], jacobian[j, 2], chosen[j]
-            r0, r1, r2 = relative_velocity(n, s, t, v)
+            i, r0 = chosen[j], along(jacobian, j, 0, v)
+            r1, r2 = along(jacobian, j, 1, v), along(jacobian, j, 2, v)
             force = c.stiffness[b, i] * (-gaps[j] - (c.floor_damping if j < floor else c.push_damping) * r0)
             if force <= 0.0 or (j < floor and gaps[j] + c.onset * r0 > 0.0):
                 continue
-            drag = drag_of(c, b, j, i, floor, force, r1, r2)
+            drag = drag_of(c.floor_friction if j < floor else c.push_friction, c.grip[b, i], force, r1, r2)
             for k in range(width):
-                rate[k] += force * n[k] - drag * (r1 * s[k] + r2 * t[k])
+                rate[k] += force * jacobian[j, 0, k] - drag * (r1 * jacobian[j, 1, k] + r2 * jacobian[j, 2, k])
         set_masses(c, b, size, pushed, 0.0, matrix)
         if not solve(matrix, rate):
             for k in range(width):

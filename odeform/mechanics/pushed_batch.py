@@ -120,7 +120,7 @@ class CompiledBodies:
         return Constants(
             points=push.points,
             rows=push.rows,
-            extents=np.sqrt((push.rows[:, :3] ** 2).sum(axis=(1, 3))),
+            extents=np.sqrt(np.einsum("bask,bask->bs", push.rows[:, :3], push.rows[:, :3])),
             stiffness=stiffness,
             grip=grip,
             level=floor.level,

@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from odeform.geometry.rigid import rotation_z
 from odeform.geometry.shape import surface_weights
 from odeform.motion.local_frames import Axes, LocalFrames, evaluate_local_frames
 from odeform.motion.reduced_space import ReducedSpace, to_canonical
-from odeform.types import GaussianSplats, Geometry, Ints, Perpoint, PointCloud, Points
+from odeform.types import GaussianSplats, Geometry, Ints, Mesh, Perpoint, PointCloud, Points
 
 __all__ = ["STILL", "EvaluatedBasis", "evaluate_basis"]
 
@@ -48,6 +48,12 @@ class EvaluatedBasis:
         rows = self.rows.reshape(len(self.rows), -1, 3)[:, chosen].reshape(len(self.rows), -1)
         rest, areas = self.rest[chosen], self.areas[chosen]
         return replace(self, geometry=PointCloud(points), points=points, rest=rest, rows=rows, areas=areas)
+
+    @cached_property
+    def sides(self) -> Int[np.ndarray, "sides 2"]:
+        """The points at both ends of each side of its faces; none of shapes without faces."""
+        faces = self.geometry.faces if isinstance(self.geometry, Mesh) else np.empty((0, 3), dtype=int)
+        return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
 
     @cached_property
     def gram(self) -> Float[np.ndarray, "modes modes"]:

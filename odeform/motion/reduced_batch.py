@@ -114,7 +114,7 @@ class ReducedBatch(MotionBatch):
                 # as of a single motion: products of more rows round differently
                 out[row] = moved_points(evaluated, *one)
                 if (ground := self._grounds[row]) is not None:
-                    ground.keep_out(out[row])
+                    ground.keep_out(out[row], evaluated.sides)
 
         return self._filled(t, (count, 3), np.float32, move, lambda motion, times: motion.vertices(times))
 

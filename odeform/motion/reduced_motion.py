@@ -80,7 +80,7 @@ class ReducedMotion(Motion):
         y = self._reduced(t)
         out = moved_points(self.evaluated, y, *placements(self.space, y, self.schema.azimuth(self.parameters)))
         if self.ground is not None:
-            self.ground.keep_out(out)
+            self.ground.keep_out(out, self.evaluated.sides)
         return out[0] if np.ndim(t) == 0 else out
 
     def pose(self, t: float | Times) -> Pose:
@@ -91,7 +91,8 @@ class ReducedMotion(Motion):
         y, azimuth = self._reduced(t), self.schema.azimuth(self.parameters)
         out = self._deformation(y) @ self._to_canonical_axes.astype(np.float32)
         if self.ground is not None:
-            self.ground.keep_posed_out(self.evaluated.points, out, poses_of(self.space, y, azimuth))
+            evaluated, poses = self.evaluated, poses_of(self.space, y, azimuth)
+            self.ground.keep_posed_out(evaluated.points, out, poses, evaluated.sides)
         return out[0] if np.ndim(t) == 0 else out
 
     def deformed(self, t: float) -> Points:

@@ -109,10 +109,16 @@ def _flight(model: Predictor, parameters: Parameters) -> Flight | None:
 
 
 def _inside(model: PerObject, parameters: Parameters, frames: Frames) -> float:
-    """m by which frames (T, N, 3) are inside an obstacle, at most; negative outside of all."""
+    """m by which frames (T, N, 3), or the middles of sides of their faces, are inside an obstacle, at most; negative
+    outside of all."""
     load = load_of_scene(model.schema.scene)
     obstacles = () if load is None or not len(frames) else load.obstacles(parameters)
-    return max((-float(obstacle.met(frames)[0].min()) for obstacle in obstacles), default=float("-inf"))
+    if not obstacles:
+        return float("-inf")
+    corners = frames[:, model.rest_of(parameters).faces]
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=2))
+    met = [obstacle.met(places)[0].min() for obstacle in obstacles for places in (frames, middles)]
+    return -float(min(met))
 
 
 def _start_off(model: PerObject, parameters: Parameters, frame: Points) -> float:

@@ -149,3 +149,28 @@ def test_compiled_steps_are_those_of_numpy(block: Block, obstacles: tuple[tuple[
     free = replace(begun.push, obstacles=None)
     _, met = assert_same_steps(body.mechanics, begun.push, begun.start, 60, free)
     assert met > 1e-3, "they have met an obstacle"
+
+
+def test_a_side_that_an_edge_cuts_goes_off_it_and_others_stay() -> None:
+    box = step(0.5, 0.2)
+    # over the edge, with ends on top and in front; in front alone; on top alone; along the edge
+    points = np.array([[[0.56, 0.0, 0.2], [0.5, 0.0, 0.16], [0.4, 0.0, 0.1], [0.7, 0.1, 0.2], [0.5, 0.2, 0.2]]])
+    sides = np.array([[0, 1], [1, 2], [0, 3], [3, 4]])
+    moved = points.copy()
+    box.keep_sides_out(moved, sides)
+    places = moved[:, sides[:, :1]] + np.linspace(0.0, 1.0, 101)[:, None] * (
+        moved[:, sides[:, 1:]] - moved[:, sides[:, :1]]
+    )
+    assert box.met(places)[0].min() > -2e-3
+    assert box.met(points[:, sides].mean(axis=2))[0].min() < -0.015, "it was cut"
+    np.testing.assert_array_equal(moved[:, 2:], points[:, 2:])
+    assert np.abs(moved - points).max() < 0.04
+
+
+def test_no_side_is_cut_by_what_has_no_edge() -> None:
+    wall = half_space(np.array([0.5, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]), (-1.0, 1.0), (0.0, 1.0))
+    points = np.random.default_rng(0).normal(scale=0.5, size=(4, 20, 3))
+    wall.keep_out(points)
+    moved = points.copy()
+    wall.keep_sides_out(moved, np.stack([np.arange(19), np.arange(1, 20)], axis=1))
+    np.testing.assert_array_equal(moved, points)

@@ -42,10 +42,18 @@ class Coordinates:
         """Computes (T, 6 + B): the body's motion as shift, rotation vector and coefficients, in m and radians."""
         one, other = self.pairs
         arcs = (modes[:, one] * modes[:, other]) @ self.arcs
+        coefficients = modes @ self.coefficients.T + arcs[:, POSE:]
+        return np.concatenate([self._posed(shift, rotation, modes, arcs), coefficients], axis=1)
+
+    def pose(self, shift: Vectors, rotation: Rotations, modes: Floats) -> Float[np.ndarray, "times 6"]:
+        """Computes the first (T, 6) of `reduced`, alone."""
+        one, other = self.pairs
+        return self._posed(shift, rotation, modes, (modes[:, one] * modes[:, other]) @ self.arcs[:, :POSE])
+
+    def _posed(self, shift: Vectors, rotation: Rotations, modes: Floats, arcs: Floats) -> Floats:
         turned = rotation @ rotation_from_vector(modes @ self.modal_rotations.T + arcs[:, 3:POSE])
         moved = shift + np.einsum("tij,tj->ti", rotation, modes @ self.shifts.T + arcs[:, :3])
-        coefficients = modes @ self.coefficients.T + arcs[:, POSE:]
-        return np.concatenate([moved, vector_from_rotation(turned), coefficients], axis=1)
+        return np.concatenate([moved, vector_from_rotation(turned)], axis=1)
 
     def placed(self, pose: Float[np.ndarray, "times 6"], modes: Floats) -> tuple[Vectors, Rotations]:
         """Shifts (T, 3) m and rotations (T, 3, 3) of the mass centre for which `reduced` gives a pose."""

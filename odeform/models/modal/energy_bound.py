@@ -1,6 +1,7 @@
 """Ends motions of bodies that gain energy from nothing: deformed too far, they have left what a linear law can say."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +21,11 @@ __all__ = ["LOOKED_AHEAD", "BoundedBatch", "BoundedTrajectory", "EnergyBound"]
 
 LOOKED_AHEAD = 2  # times of the grid beyond what is asked for: up to the next one, and to the one after that
 
-MOST = 1.02  # times what a motion begins with: sound ones stay below 1.001
+MOST = 1.01  # times what a motion begins with: sound ones stay below 1.001; frames may show half a percent more
 STATUS = "it gains energy"
+
+Poses = Callable[[Times], Float[np.ndarray, "*batch times 6"]]
+"""Maps (T,) s to poses, in m and rad."""
 
 
 class EnergyBound:
@@ -32,9 +36,11 @@ class EnergyBound:
     `deformation`, RMS in m, obeys its law, and is not looked at.
     """
 
-    def __init__(self, moving: SolvedTrajectory | SolvedBatch, solid: Solid, deformation: float, step: float) -> None:
-        """`step` s is the grid's."""
-        self._moving, self._solid, self._step = moving, solid, step
+    def __init__(
+        self, moving: SolvedTrajectory | SolvedBatch, poses: Poses, solid: Solid, deformation: float, step: float
+    ) -> None:
+        """`poses` are those at times; `step` s is the grid's."""
+        self._moving, self._poses, self._solid, self._step = moving, poses, solid, step
         self._largest = deformation * np.sqrt(solid.mass)  # of amplitudes, root kg m
         self._looked, self._lock = 0, Lock()
         start = self._states(np.zeros(1))[:, 0]
@@ -57,8 +63,10 @@ class EnergyBound:
         far = np.linalg.norm(states[..., parts_of(states[0])[2]], axis=2) > self._largest
         far = np.logical_or.accumulate(far, axis=1) | self._deformed[:, None]
         if far.any():
-            wrong = far & (self._energies(self._looked, count + 1) > self._most[:, None])
-            first = self._step * (self._looked + wrong.argmax(axis=1))
+            begin = int(far.any(axis=0).argmax())  # nothing is looked at before
+            energies = self._energies(self._looked + begin, count + 1)
+            wrong = far[:, begin:] & (energies > self._most[:, None])
+            first = self._step * (self._looked + begin + wrong.argmax(axis=1))
             self.ends = np.minimum(self.ends, np.where(wrong.any(axis=1), first, np.inf))
         self._deformed, self._looked = far[:, -1], count
 
@@ -68,11 +76,10 @@ class EnergyBound:
 
     def _energies(self, before: int, after: int) -> Float[np.ndarray, "batch times"]:
         """(B, T) m^2/s^2, per mass, at the grid's times between these two."""
-        y = self._moving.reduced(self._step * np.arange(before, after + 1))
-        y = y.reshape(-1, *y.shape[-2:])
+        poses = self._poses(self._step * np.arange(before, after + 1))
+        poses = poses.reshape(-1, *poses.shape[-2:])
         rotation, shift = (
-            part.reshape(*y.shape[:2], *part.shape[1:])
-            for part in rotation_of(y.reshape(-1, y.shape[2])[:, :POSE], 0.0)
+            part.reshape(*poses.shape[:2], *part.shape[1:]) for part in rotation_of(poses.reshape(-1, POSE), 0.0)
         )
         speed = (shift[:, 2:] - shift[:, :-2]) / (2.0 * self._step)
         turned = rotation[:, :-2].swapaxes(2, 3) @ rotation[:, 2:]
@@ -103,9 +110,17 @@ def _of_rigid(speed: Floats, spin: Floats, raised: Floats, solid: Solid) -> Floa
 class BoundedTrajectory:
     """A solved motion up to the last moment that is valid; later ones show that one."""
 
-    def __init__(self, inner: SolvedTrajectory, solid: Solid, deformation: float, step: float) -> None:
-        """See `EnergyBound`."""
-        self._inner, self._bound = inner, EnergyBound(inner, solid, deformation, step)
+    def __init__(
+        self,
+        inner: SolvedTrajectory,
+        poses: Callable[[Floats], Floats],
+        solid: Solid,
+        deformation: float,
+        step: float,
+    ) -> None:
+        """See `EnergyBound`; `poses` maps states (T, S) to (T, 6)."""
+        self._inner = inner
+        self._bound = EnergyBound(inner, lambda times: poses(inner.states(times)), solid, deformation, step)
 
     @property
     def stats(self) -> SolveStats:
@@ -129,7 +144,8 @@ class BoundedBatch:
 
     def __init__(self, inner: SolvedBatch, solid: Solid, deformation: float, step: float) -> None:
         """See `EnergyBound`."""
-        self._inner, self._bound = inner, EnergyBound(inner, solid, deformation, step)
+        self._inner = inner
+        self._bound = EnergyBound(inner, lambda times: inner.reduced(times)[..., :POSE], solid, deformation, step)
 
     @property
     def ok(self) -> Bool[np.ndarray, " batch"]:

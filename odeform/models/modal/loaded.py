@@ -73,10 +73,14 @@ class LoadedBody:
         return Beginning(push, starts, 0.0, all(situation.flight is None for situation in situations))
 
     @cached_property
+    def falling(self) -> Push:
+        """The body that nothing but the floor touches: the same for all motions."""
+        return no_push(self.mechanics.body, self.soft)
+
+    @cached_property
     def both(self) -> Push:
         """Two like bodies."""
-        push = no_push(self.mechanics.body, self.soft)
-        return _together([push, push])
+        return _together([self.falling, self.falling])
 
     def begin_pair(self, situation: Situation) -> Float[np.ndarray, "2 state"]:
         """Where two like bodies begin: the one in the air, and the other one where it stands."""
@@ -100,7 +104,7 @@ class LoadedBody:
         if situation.clamp is not None:
             return held(self.mechanics.body, self.soft, situation.clamp)
         if pulse is None:
-            return no_push(self.mechanics.body, self.soft)
+            return self.falling
         return kicked(self.mechanics.body, self.soft, pulse.place.point - self.anchor, pulse)
 
     @cached_property

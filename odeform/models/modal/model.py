@@ -38,7 +38,7 @@ from odeform.models.modal.release import before, released
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
-from odeform.models.solved import Problem, SolvedTrajectory
+from odeform.models.solved import Problem
 from odeform.models.solved_batch import BatchProblem, SolvedBatch
 from odeform.motion.base import Motion
 from odeform.motion.batch_trajectory import AdjustedBatch, BatchTrajectory, PiecewiseBatch
@@ -95,6 +95,12 @@ class _Readout:
         shift, rotation, modes = body_motion(states)
         y = self.coordinates.reduced(shift, rotation, self.scale * modes)
         return y if self.settled is None else self.settled.relative(y)
+
+    def poses(self, states: Floats) -> Float[np.ndarray, "times 6"]:
+        """The first (T, 6) coordinates of states (T, 20 + 2 K), without the deformation, which takes longest."""
+        shift, rotation, modes = body_motion(states)
+        y = self.coordinates.pose(shift, rotation, self.scale * modes)
+        return y if self.settled is None else self.settled.relative_pose(y)
 
     def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
         """Releases the body, see `odeform.models.modal.release.released`."""
@@ -229,7 +235,7 @@ class ModalModel(Model):
         measured = self._measured_body  # and the coordinates that the space is made with: they stay for all such bodies
         out = copy(self)
         out._ratios, out._changed, out._recent = (mass, stiffness), Recent(SETTLED), Recent(1)
-        for name in ("_loaded", "_pair"):
+        for name in ("_loaded", "_pair", "_falling"):
             vars(out).pop(name, None)
         out.space = replace(self.space, largest=largest)
         if self.residual is not None:
@@ -242,8 +248,9 @@ class ModalModel(Model):
             out.settled_body = settled_body(
                 self.body, self.contact_parameters, self.projectile, out._ratios, coordinates, basis
             )
-            if self.load is not None:
-                out._flat_on = self._flat_below(out.settled_body.rest)
+            if self._flat_on is not None and not self._flies:
+                # a heavy and soft body rests deeper than its own self, which it is not shown to
+                out.settled_body = out.settled_body.above(self._flat_on)
         every = replace(measured.all, space=out.space)
         if (settled := out.settled_body) is not None:
             every = settled.basis(every, PointCloud(settled.rest.points))
@@ -261,7 +268,7 @@ class ModalModel(Model):
         out.contact_parameters, out._changed, out._recent = contact_parameters, Recent(SETTLED), Recent(1)
         if (settled := self.settled_body) is not None:
             out.settled_body = replace(settled, mechanics=replace(settled.mechanics, parameters=contact_parameters))
-        for name in ("_loaded", "_mechanics", "_pair"):
+        for name in ("_loaded", "_mechanics", "_pair", "_falling"):
             vars(out).pop(name, None)
         return out
 
@@ -278,9 +285,11 @@ class ModalModel(Model):
         return rest if self._flies and same else geometry
 
     def _flat_below(self, rest: Mesh) -> float | None:
-        """The height below which a body of this rest shape is flat: what rests there already stays as it is."""
+        """The height below which a body of this rest shape is flat: one that begins there stays as it is."""
         floor = self.surroundings.floor if self.surroundings else None
-        return None if floor is None else min(floor - SKIN, float(rest.points[:, 2].min()))
+        if floor is None:
+            return None
+        return floor - SKIN if self._flies else min(floor - SKIN, float(rest.points[:, 2].min()))
 
     def ground_of(self, parameters: Parameters) -> Ground | None:
         if self.load is None or self._flat_on is None:
@@ -397,11 +406,17 @@ class ModalModel(Model):
     def problem(self, theta: Floats, evaluated: EvaluatedBasis, dtype: type = np.float64) -> Problem:
         """States the problem of one push, for theta (P,) in [-1, 1]; always in double precision."""
         if self._pairs:
-            read = self._readout(self._loaded.both.modes[0])
-            return pair_problem(self._loaded, self._pair, self._situation(theta), read)
+            return pair_problem(self._loaded, self._pair, self._situation(theta), self._falling)
         begun = self._begin(theta[None])
         pushed = PushedBody(self._moving, begun.push, begun.pulse)
-        return Problem(pushed, begun.start[0], self._readout(begun.push.modes[0]), at_rest=begun.at_rest)
+        falls = self.load is not None and begun.push.modes is self._loaded.falling.modes
+        read = self._falling if falls else self._readout(begun.push.modes[0])
+        return Problem(pushed, begun.start[0], read, at_rest=begun.at_rest)
+
+    @cached_property
+    def _falling(self) -> _Readout:
+        """Reads out a body that nothing but the floor and obstacles touches."""
+        return self._readout(self._loaded.falling.modes[0])
 
     @property
     def _moving(self) -> Mechanics:
@@ -426,13 +441,15 @@ class ModalModel(Model):
     def trajectory(
         self, theta: Floats, evaluated: EvaluatedBasis, settings: SolverSettings | None, until: float
     ) -> Trajectory:
+        if self._flies:
+            assert settings is not None
+            problem = self.problem(theta, evaluated)
+            read = problem.readout
+            assert isinstance(read, _Readout)
+            solved = self._solved(problem, lambda: problem, settings, until)
+            return BoundedTrajectory(solved, read.poses, *self._bounds)
         motion = self._motion(theta, evaluated, settings, until)
-        if self.load is None:
-            return Adjusted(motion, self._projection(motion))
-        if not self._flies:
-            return motion
-        assert isinstance(motion, SolvedTrajectory)
-        return BoundedTrajectory(motion, *self._bounds)
+        return Adjusted(motion, self._projection(motion)) if self.load is None else motion
 
     @property
     def _bounds(self) -> tuple[Solid, float, float]:

@@ -34,6 +34,12 @@ class SettledBody:
     y: Float[np.ndarray, " y"]
     """(6 + K,) how it lies in the coordinates of the body that was measured."""
 
+    def above(self, floor: float) -> "SettledBody":
+        """The same, flat where it would be below `floor` m."""
+        points = self.rest.points.copy()
+        np.maximum(points[:, 2], points.dtype.type(floor), out=points[:, 2])
+        return replace(self, rest=Mesh(points, self.rest.faces))
+
     @property
     def turn(self) -> Rotations:
         """(3, 3) of `y`."""
@@ -41,9 +47,12 @@ class SettledBody:
 
     def relative(self, y: Float[np.ndarray, "times y"]) -> Floats:
         """(T, 6 + K) from its own rest, of coordinates (T, 6 + K) of the body that was measured."""
+        return np.concatenate([self.relative_pose(y), y[:, POSE:] - self.y[POSE:]], axis=1)
+
+    def relative_pose(self, y: Float[np.ndarray, "times y"]) -> Float[np.ndarray, "times 6"]:
+        """Computes the first (T, 6) of `relative`, which depend on the first six alone."""
         turn = rotation_from_vector(y[:, 3:POSE]) @ self.turn.T
-        shift = y[:, :3] - turn @ self.y[:3]
-        return np.concatenate([shift, vector_from_rotation(turn), y[:, POSE:] - self.y[POSE:]], axis=1)
+        return np.concatenate([y[:, :3] - turn @ self.y[:3], vector_from_rotation(turn)], axis=1)
 
     def absolute(self, pose: Float[np.ndarray, "times 6"]) -> Floats:
         """Computes (T, 6) the inverse of `relative`, of rigid motions."""

@@ -90,3 +90,12 @@ def test_all_draws_of_data_sets_begin_outside(pushed: Predictor, load: str) -> N
     model = pushed.under(load)
     for parameters in get_scene(f"object-{load}").sample(32, 1):
         get_load(load).situation(model.rest_of(parameters), parameters)
+
+
+def test_no_face_is_cut_by_the_edge_of_a_step(pushed: Predictor) -> None:
+    model = pushed.under("step")
+    parameters = model.complete({OBJECT: "donut", **get_load("step").presets["against its edge"]})
+    motion, (edge,) = model.solve(parameters=parameters), get_load("step").obstacles(parameters)
+    vertices, faces = motion.vertices(np.linspace(0.1, 0.6, 101)), model.rest_of(parameters).faces
+    middles = 0.5 * (vertices[:, faces] + vertices[:, np.roll(faces, 1, axis=1)])
+    assert edge.met(middles)[0].min() > -2e-3

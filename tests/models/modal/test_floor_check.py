@@ -88,3 +88,14 @@ def test_few_points_are_nearly_as_low_as_all(predictor: PerObject) -> None:
         every, few = ((each.rest.astype(float) @ directions.T).min(axis=0) for each in (body.all, body.few))
         assert (few - every).max() < 3e-3, name
         assert len(body.few.rest) < 0.5 * len(body.all.rest)
+
+
+def test_under_loads_a_heavy_and_soft_body_is_shown_as_flat_as_its_own_self(predictor: PerObject) -> None:
+    heavy, times = {"object": "dog", "mass": 2.6583, "young": 56.2465}, np.linspace(0.0, 1.2, 40)
+    assert predictor.settled(heavy).points[:, 2].min() < -3e-3, "its springs to the floor give way"
+    for load, more in (("drop", {"height": 0.1}), ("kick", {})):
+        model = predictor.under(load)
+        motion = model.solve(parameters=heavy | more)
+        assert motion.vertices(times)[:, :, 2].min() > -1e-3 - 1e-6
+        if load == "kick":
+            np.testing.assert_array_equal(motion.vertices(0.0), model.settled(heavy | more).points)

@@ -83,7 +83,7 @@ def predicted(model: ModalModel, impact: Impact, evaluated: EvaluatedBasis, fram
     y = solved.reduced(times)
     out = moved_points(evaluated, y, *placements(body.space, y, 0.0)).astype(float)
     if (ground := body.ground_of(impact.parameters)) is not None:
-        ground.keep_out(out)
+        ground.keep_out(out, evaluated.sides)
     return out
 
 
