@@ -52,7 +52,6 @@ class ShapeModel(Predictor):
     knows_objects = True
     resumable = True
     descends = True
-    rescales_input = False
     network = ShapeNet()
 
     @classmethod

@@ -11,7 +11,7 @@ from odeform.models.points.shape_network import ShapeNet, moved_rigidly, point_f
 from odeform.motion.point_motion import PointFrame
 from odeform.motion.threads import thread_map
 from odeform.schema import Window
-from odeform.types import Floats, Points, Rotations, Times
+from odeform.types import Floats, Frames, Points, Rotations, Times
 
 __all__ = ["ShapePush", "ShapeTrajectory", "displaced"]
 
@@ -53,7 +53,7 @@ class ShapeTrajectory(FramedPoints):
         self._x, self._wall_ms = x, 0.0
         self._frames = np.empty((0, len(x), 3), dtype=np.float32)
 
-    def _roll_out(self, grid: Times) -> Floats:
+    def _roll_out(self, grid: Times) -> Frames:
         push, out = self._push, np.empty((len(grid), len(self._x), 3), dtype=np.float32)
         turn = push.turn.astype(np.float32)
         states = self._shapes.states(self._net, push.first, in_windows(grid, self._window))

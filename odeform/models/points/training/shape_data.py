@@ -17,7 +17,7 @@ from odeform.models.points.training.point_data import displacements
 from odeform.schema import Window
 from odeform.simulation.contacts import CONTACT, FORCE, vector_of
 from odeform.simulation.objects.catalog import OBJECTS, get_object
-from odeform.types import Bools, Floats, Frames, Rotations
+from odeform.types import Bools, Floats, Rotations
 
 __all__ = ["BodyMotions", "ShapeData", "prepare_shapes"]
 
@@ -30,7 +30,7 @@ class BodyMotions:
     """(S, 3) m."""
     force: Floats
     """(S, 3) N."""
-    moved: Frames
+    moved: Floats
     """(S, T, N, 3) displacements, float32."""
     rotation: Rotations
     """(S, T, 3, 3) of the best rigid motion."""
