@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from few_pushes import few_pushes
 
 from odeform.dataset.index import Dataset
 from odeform.dataset.store import open_dataset
@@ -29,17 +30,9 @@ BODIES, OTHER = ("donut", "chip"), "bottle"
 ROUNDING = 2e-6  # m; sums in another order round otherwise
 
 
-def few(*names: str) -> Dataset:
-    """Some pushes of some objects."""
-    dataset = open_dataset("contact-force").of(*names)
-    kept = {"train": 4, "val": 2, "test": 1}
-    entries = [e for name in names for split, n in kept.items() for e in dataset.select(split, name)[:n]]
-    return replace(dataset, entries=tuple(entries))
-
-
 @pytest.fixture(scope="module")
 def pushes() -> Dataset:
-    return few(*BODIES)
+    return few_pushes(*BODIES)
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +135,7 @@ def test_training_brings_the_error_down(data: ShapeData) -> None:
 
 
 def test_a_body_that_was_not_trained_can_be_asked_for(model: ShapeModel, tmp_path: Path) -> None:
-    truth = next(few(OTHER).sequences("test"))
+    truth = next(few_pushes(OTHER).sequences("test"))
     wider = model.with_body(OTHER, truth.rest, 0.75, 8.3e4)
     assert wider.schema.objects == (*BODIES, OTHER)
     moved = wider.solve(None, truth.parameters).vertices(TIMES)
