@@ -11,7 +11,7 @@ from odeform.simulation.objects.catalog import get_object
 from odeform.types import MotionSequence
 from odeform_figures.unseen.shapes import LEFT_OUT, UnseenShape
 
-__all__ = ["MOTIONS", "left_out_shape", "without"]
+__all__ = ["left_out_shape", "without"]
 
 MOTIONS = 20  # of an object
 
