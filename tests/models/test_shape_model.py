@@ -26,6 +26,8 @@ from odeform.training.train import train
 from odeform.types import GaussianSplats, Mesh, PointCloud
 
 TIMES = np.arange(0, 20, 3) / 100.0
+pytestmark = pytest.mark.slow  # data of whole objects are read
+
 BODIES, OTHER = ("donut", "chip"), "bottle"
 ROUNDING = 2e-6  # m; sums in another order round otherwise
 

@@ -11,6 +11,8 @@ from odeform.errors import InputError
 from odeform.models.points.shape_model import ShapeModel
 from odeform_figures.studies.one_network import OfAnotherShape, Plan, train_each, with_left_out
 
+pytestmark = pytest.mark.slow  # data of whole objects are read
+
 BODIES = ("donut", "chip")
 
 
