@@ -7,6 +7,7 @@ MODELS: dict[str, str] = {
     "rolling": "odeform.models.rolling.model:RollingModel",
     "modal": "odeform.models.modal.model:ModalModel",
     "odeform-per-point": "odeform.models.points.odeform_per_point:OdeformPerPoint",
+    "odeform-shapes": "odeform.models.points.shape_model:ShapeModel",
     "node": "odeform.models.points.node:Node",
     "rnn": "odeform.models.points.rnn:Rnn",
     "direct": "odeform.models.points.direct:Direct",

@@ -11,6 +11,7 @@ FAMILIES = {
     "rolling": "ODeform (rolling ball)",
     "modal": "ODeform (elastic body)",
     "odeform-per-point": "ODeform per point",
+    "odeform-shapes": "ODeform, one network",
     "gp": "kernel regression",
     "pod-rbf": "POD + RBF",
     "nearest": "nearest training motion",

@@ -24,7 +24,7 @@ from odeform.motion.plausibility import PlausibilityCheck, Sample
 from odeform.motion.reduced_space import to_canonical
 from odeform.motion.validity import UNKNOWN, Validity
 from odeform.schema import Parameters, Schema, soft_clip
-from odeform.types import Frames, Geometry, Matrices, Mesh, Points, Pose, Times, Vector, Vectors
+from odeform.types import Frames, Geometry, Matrices, Points, Pose, Times, Vector, Vectors
 
 __all__ = ["MeanMotion", "PointFrame", "PointMotion", "PointTrajectory", "Probes", "evaluate_probes"]
 
@@ -106,13 +106,13 @@ class PointFrame:
 
 @dataclass(frozen=True, eq=False)
 class Probes:
-    """`points` (M, 3) of the trained body, canonical, metres, and their `areas` (M,), fractions of its surface."""
+    """`points` (M, 3) of a body, canonical, metres, and their `areas` (M,), fractions of its surface."""
 
     points: Float[np.ndarray, "probes 3"]
     areas: Float[np.ndarray, " probes"]
 
 
-def evaluate_probes(rest: Mesh, anchor: Vector, count: int = PROBES) -> Probes:
+def evaluate_probes(rest: Geometry, anchor: Vector, count: int = PROBES) -> Probes:
     """Chooses vertices spread over the body, each the farthest from the ones before (Gonzalez 1985)."""
     points = to_canonical(rest.points, anchor, 0.0)
     chosen, distance = [0], np.linalg.norm(points - points[0], axis=1)

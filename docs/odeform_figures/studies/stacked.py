@@ -11,7 +11,8 @@ import torch
 from odeform.models.layers import layer_shapes
 from odeform.models.points.arithmetic import Net
 from odeform.models.points.point_network import PointBatch, PointNet, Trial, sum_of
-from odeform.models.points.training.fit import CLIP, WARM, all_validated, initial_weights, parts_loss
+from odeform.models.points.training.fit import all_validated, parts_loss
+from odeform.models.points.training.learner import CLIP, WARM, initial_weights
 from odeform.models.points.training.point_data import PointData
 from odeform.models.points.training.samplers import SAMPLERS, Sample, Sampler
 from odeform.models.points.training.torch_arithmetic import Torch

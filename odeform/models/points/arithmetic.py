@@ -31,6 +31,10 @@ class Arithmetic(Protocol):
         """Stack arrays (...) of one shape along a new axis."""
         ...
 
+    def largest(self, x: Any) -> Any:
+        """Returns the largest of each feature (..., features) over the points of x (..., points, features)."""
+        ...
+
     def act(self, name: str, x: Any) -> Any:
         """Returns the activation function `name`, elementwise; any shape (...)."""
         ...
@@ -68,6 +72,10 @@ class Numpy:
         """Stack arrays (...) of one shape along a new first axis."""
         return np.stack(parts)
 
+    def largest(self, x: Any) -> Any:
+        """Returns the largest of each feature (..., features) over the points of x (..., points, features)."""
+        return x.max(axis=-2)
+
     def act(self, name: str, x: Any) -> Any:
         """Returns the activation function `name`, elementwise; any shape (...). `KeyError` for an unknown name."""
         return self.acts[name](x)
@@ -79,6 +87,7 @@ class Net:
     def __init__(self, weights: Mapping[str, Any], arithmetic: Arithmetic) -> None:
         self.weights, self.arithmetic = weights, arithmetic
         self.join, self.stack, self.act = arithmetic.join, arithmetic.stack, arithmetic.act
+        self.largest = arithmetic.largest
 
     def layers(self, part: str, x: Any, act: str = "silu") -> Any:
         """Maps (..., inputs) to (..., outputs): linear layers with `act` between them."""

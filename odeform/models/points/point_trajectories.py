@@ -14,7 +14,7 @@ from odeform.motion.threads import thread_map
 from odeform.schema import LATER, Window
 from odeform.types import Floats, Frames, Points, Times
 
-__all__ = ["FramedPoints", "MomentaryPoints", "point_batch"]
+__all__ = ["TRAJECTORIES", "FramedPoints", "MomentaryPoints", "in_windows", "point_batch"]
 
 CHUNK = 1 << 14  # points times times that a network evaluates at once: its activations stay in the cache
 TRAJECTORIES = 256  # points that are rolled out at once, on one core

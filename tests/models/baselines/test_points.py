@@ -21,7 +21,8 @@ from odeform.models.points.arithmetic import Net, Numpy
 from odeform.models.points.point_model import PointModel
 from odeform.models.points.point_network import Trial, sum_of
 from odeform.models.points.point_trajectories import point_batch
-from odeform.models.points.training.fit import fit_points, initial_weights
+from odeform.models.points.training.fit import fit_points
+from odeform.models.points.training.learner import initial_weights
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.torch_arithmetic import Torch
 from odeform.models.registry import load

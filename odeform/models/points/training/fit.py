@@ -5,8 +5,8 @@ and the weights with the best validation error. Learning rate and width are chos
 each a fifth as long as the final training.
 """
 
-import math
 import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -16,14 +16,12 @@ import torch
 from odeform.checkpoint import Checkpoint
 from odeform.dataset.subsampling import FrameSubsampling
 from odeform.errors import InputError
-from odeform.models.layers import layer_shapes
-from odeform.models.points.arithmetic import Net
 from odeform.models.points.point_model import PointModel, point_checkpoint
 from odeform.models.points.point_network import PointNet, Trial, sum_of
+from odeform.models.points.training.learner import PointLearner
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.points.training.samplers import SAMPLERS, Sample, Sampler
-from odeform.models.points.training.torch_arithmetic import Torch
-from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
+from odeform.models.training.descent import Budget, descend, small_batches
 from odeform.models.training.loss import Loss, torch_device
 from odeform.models.training.part import read_part, write_part
 from odeform.models.training.run import Run
@@ -31,33 +29,19 @@ from odeform.types import Arrays
 
 __all__ = [
     "BETWEEN",
-    "CLIP",
     "FRACTION",
-    "WARM",
     "all_validated",
+    "best_of_trials",
     "fit_points",
-    "initial_weights",
     "network_checkpoint",
     "parts_loss",
     "train_points",
 ]
 
 FRACTION = 0.2  # length of a trial, relative to the final training
-WARM = 0.03  # fraction of the length in which the learning rate rises
-CLIP = 1.0  # norm of the gradient
 BETWEEN = 20  # steps between two validations, at least
 AHEAD = 1.0  # windows beyond the trained one, each of which takes as long as that
 VALIDATED = 256  # validation motions of a point
-
-
-def initial_weights(shapes: list[tuple[str, tuple[int, ...]]], seed: int) -> dict[str, torch.Tensor]:
-    """Draws weights, uniform within 1 / sqrt(inputs of the layer), as `torch.nn.Linear` draws them."""
-    generator, out = torch.Generator().manual_seed(seed), {}
-    inputs = 1
-    for name, shape in shapes:
-        inputs = shape[1] if name.endswith("weight") else inputs
-        out[name] = (2.0 * torch.rand(shape, generator=generator) - 1.0) / math.sqrt(inputs)
-    return out
 
 
 def parts_loss(
@@ -84,28 +68,19 @@ def all_validated(split: Sampler) -> Sample:
     return split.all_frames(torch.arange(VALIDATED) % sequences, drawn)
 
 
-class _Learner:
-    """One training of one network."""
+class _Learner(PointLearner):
+    """One training of a network that moves each point by itself."""
 
     def __init__(
         self, network: PointNet, data: PointData, trial: Trial, seed: int, device: torch.device, loss: Loss | None
     ) -> None:
-        self.network, self.trial, self.scale_mm, self.given_loss = network, trial, 1e3 * data.frame.scale, loss
+        super().__init__(network.sizes(data.theta["train"].shape[1], trial.width), trial.rate, seed, device)
+        self.network, self.scale_mm, self.given_loss = network, 1e3 * data.frame.scale, loss
         sampler = SAMPLERS[network.sampling]
         self.train_split, self.val_split = (sampler(network, data, split, device) for split in ("train", "val"))
-        shapes = list(layer_shapes(network.sizes(data.theta["train"].shape[1], trial.width)))
-        self.weights = {name: w.to(device).requires_grad_() for name, w in initial_weights(shapes, seed).items()}
-        self.net = Net(self.weights, Torch())
-        self.optimiser = torch.optim.Adam(self.weights.values(), lr=trial.rate)
-        self.generator = torch.Generator().manual_seed(seed + 1)
         self.validated_on = all_validated(self.val_split)
-        self.best = (math.inf, self._snapshot())
-        self.done, self.elapsed = 0, 0.0
 
-    def _snapshot(self) -> Arrays:
-        return {name: weight.detach().cpu().numpy().copy() for name, weight in self.weights.items()}
-
-    def _loss(self, fraction: float) -> torch.Tensor:
+    def loss(self, fraction: float) -> torch.Tensor:
         train = self.train_split
         sample = train.draw(fraction, self.generator)
         batch, truth, centre = train.batch(sample)
@@ -116,46 +91,11 @@ class _Learner:
             return self.given_loss(guessed, known, weights.expand_as(truth)[..., 0])
         return parts_loss(parts, truth, centre, weights, train.finer)
 
-    def advance(self, fraction: float) -> float:
-        """One step of descent at this fraction of the length; returns its loss."""
-        warm_up = min(1.0, (fraction + 1e-3) / WARM)
-        self.optimiser.param_groups[0]["lr"] = self.trial.rate * warm_up * cosine_decay(fraction)
-        self.optimiser.zero_grad()
-        loss = self._loss(fraction)
-        loss.backward()
-        norm = torch.nn.utils.clip_grad_norm_(self.weights.values(), CLIP)
-        if torch.isfinite(norm):
-            self.optimiser.step()
-        self.done += 1
-        return float(loss.detach())
-
-    @torch.no_grad()
-    def validate(self) -> float:
-        """Pooled RMSE in mm on validation; keeps the weights if they are the best so far."""
+    def error(self) -> float:
         sample = self.validated_on
         batch, truth, _ = self.val_split.batch(sample)
         squares = (sum_of(self.network.predict(self.net, batch)) - truth).square()
-        error = self.scale_mm * float((self.val_split.weights(sample) * squares).mean().sqrt())
-        if error < self.best[0]:
-            self.best = (error, self._snapshot())
-        return error
-
-    def state(self) -> dict[str, Any]:
-        """All that `restore` needs to go on bit-exactly."""
-        best = {name: torch.from_numpy(value) for name, value in self.best[1].items()}
-        weights = {name: weight.detach() for name, weight in self.weights.items()}
-        state = {"weights": weights, "optimiser": self.optimiser.state_dict(), "best": best, "error": self.best[0]}
-        return {**state, "generator": self.generator.get_state(), "done": self.done, "elapsed": self.elapsed}
-
-    @torch.no_grad()
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `state`."""
-        for name, weight in self.weights.items():
-            weight.copy_(state["weights"][name])
-        self.optimiser.load_state_dict(state["optimiser"])
-        self.generator.set_state(state["generator"])
-        self.best = state["error"], {name: value.numpy() for name, value in state["best"].items()}
-        self.done, self.elapsed = state["done"], state["elapsed"]
+        return self.scale_mm * float((self.val_split.weights(sample) * squares).mean().sqrt())
 
 
 def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
@@ -163,10 +103,26 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
 
     The state is kept in `run.part` after each validation; a resumed training continues from there bit-exactly.
     """
-    request, device = run.request, torch_device(run.device)
-    budget, whole = Budget(60.0 * request.minutes, request.steps), 1.0 / (1.0 + FRACTION * len(network.trials))
-    sizes = [asdict(trial) for trial in network.trials]
-    training = {"model": request.model, "data": data.identity, "given": data.given, "seed": request.seed, "of": sizes}
+    device = torch_device(run.device)
+    training = {"model": run.request.model, "data": data.identity, "given": data.given, "seed": run.request.seed}
+
+    def learner(trial: Trial) -> PointLearner:
+        return _Learner(network, data, trial, run.request.seed, device, run.loss)
+
+    weights, config = best_of_trials(network.trials, learner, training, run)
+    return network_checkpoint(run.request.model, network, data, weights, {**config, "every": data.given})
+
+
+def best_of_trials(
+    choices: Sequence[Trial], learner_of: Callable[[Trial], PointLearner], training: Mapping[str, Any], run: Run
+) -> tuple[Arrays, dict[str, Any]]:
+    """Trains by the trial that is best on validation: the weights, and what a checkpoint tells of their training.
+
+    A single choice needs no trial. `training` describes the training to whoever resumes it.
+    """
+    request, tried = run.request, choices if len(choices) > 1 else ()
+    budget, whole = Budget(60.0 * request.minutes, request.steps), 1.0 / (1.0 + FRACTION * len(tried))
+    training = {**training, "of": [asdict(trial) for trial in choices]}
     known: dict[str, Any] = {"trials": [], "seconds": 0.0, "learner": {}}
     if request.resume and run.part is not None:
         known = read_part(run.part, training)
@@ -178,8 +134,8 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
             state = {"trials": trials, "seconds": time.process_time() - begin, "learner": learner}
             write_part(run.part, training, state)
 
-    def learn(trial: Trial, budget: Budget, title: str) -> _Learner:
-        learner = _Learner(network, data, trial, request.seed, device, run.loss)
+    def learn(trial: Trial, budget: Budget, title: str) -> PointLearner:
+        learner = learner_of(trial)
         if known["learner"]:
             learner.restore(known["learner"])
             known["learner"] = {}
@@ -187,17 +143,16 @@ def fit_points(network: PointNet, data: PointData, run: Run) -> Checkpoint:
         return learner
 
     with small_batches():
-        for trial in network.trials[len(trials) :]:
+        for trial in tried[len(trials) :]:
             title = f"trial of rate {trial.rate:g}, width {trial.width}"
             learner = learn(trial, budget.part(FRACTION * whole), title)
             trials.append({**asdict(trial), "steps": learner.done, "val": learner.best[0]})
             keep({})
-        best = network.trials[int(np.argmin([trial["val"] for trial in trials]))]
+        best = choices[int(np.argmin([trial["val"] for trial in trials]))] if trials else choices[0]
         learner = learn(best, budget.part(whole), f"rate {best.rate:g}, width {best.width}")
     error, weights = learner.best
     val = {"val_rmse_mm": error, "steps": learner.done, "seconds": time.process_time() - begin}
-    config = {**asdict(best), "every": data.given, "trials": trials, "val": val}
-    return network_checkpoint(request.model, network, data, weights, config)
+    return weights, {**asdict(best), "trials": trials, "val": val}
 
 
 def network_checkpoint(

@@ -13,7 +13,7 @@ from odeform.dataset.subsampling import FrameSubsampling
 from odeform.models.points.node_graph import NodeGraph
 from odeform.models.points.pe_gnn import PeGnn, new_network
 from odeform.models.points.point_model import PREFIX, frame_to_json, weights_in_steps
-from odeform.models.points.training.fit import CLIP
+from odeform.models.points.training.learner import CLIP
 from odeform.models.points.training.point_data import PointData, prepare_points
 from odeform.models.training.descent import Budget, cosine_decay, descend, small_batches
 from odeform.models.training.run import Run

@@ -13,7 +13,7 @@ from odeform.motion.reduced_space import to_canonical
 from odeform.schema import Schema, Window
 from odeform.types import Bools, Floats, Vector
 
-__all__ = ["PointData", "prepare_points"]
+__all__ = ["PointData", "displacements", "prepare_points"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None
     rest = to_canonical(first.vertices[0], anchor, dataset.schema.azimuth(first.parameters))
     theta, moved, observed = {}, {}, {}
     for split in ("train", "val"):
-        theta[split], moved[split] = _displacements(dataset, split, subsampling, count, anchor, len(rest))
+        theta[split], moved[split] = displacements(dataset, split, subsampling, count, anchor, len(rest))
         observed[split] = subsampling.observed(count, len(theta[split]))
     times = np.arange(count) / dataset.schema.window.rate
     largest = max(float(np.linalg.norm(motion, axis=-1).max()) for motion in moved["train"])
@@ -75,7 +75,7 @@ def prepare_points(dataset: Dataset, subsampling: FrameSubsampling | None = None
     return PointData(schema, frame, mean, frame.inputs(rest), first.weights, theta, moved, observed, identity, given)
 
 
-def _displacements(
+def displacements(
     dataset: Dataset, split: str, subsampling: FrameSubsampling, count: int, anchor: Vector, points: int
 ) -> tuple[Floats, Floats]:
     """Parameters (S, P) and displacements from rest (S, T, N, 3) in metres, canonical, float32."""

@@ -23,6 +23,10 @@ class Torch:
         """Stack tensors (...) of one shape along a new first axis."""
         return torch.stack(parts)
 
+    def largest(self, x: Any) -> Any:
+        """Returns the largest of each feature (..., features) over the points of x (..., points, features)."""
+        return x.amax(-2)
+
     def act(self, name: str, x: Any) -> Any:
         """Returns the activation function `name`, elementwise; any shape (...). `AttributeError` for an unknown
         name."""
