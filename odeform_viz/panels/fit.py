@@ -8,7 +8,7 @@ from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
-from odeform.identification.pushed.identify import identifies_pushes, recorded_points
+from odeform.identification.pushed.identify import PUSH_NAMES, identifies_pushes, recorded_points
 from odeform.identification.pushed.simulator import can_simulate
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
@@ -26,6 +26,9 @@ NEXT = "the push that would tell most of what is least known of the body"
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
+PUSH_OPEN = (
+    "⚠ **Intervals were calibrated on pushes that are known**: this one is estimated, and they may be too narrow."
+)
 ALONE = "the model"
 CORRECTED = f"the model, corrected by {CORRECTIONS} simulations"
 HOW = (
@@ -35,6 +38,10 @@ HOW = (
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "After the best next push, the widest interval of the body is expected to be {:.0%} as wide."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
+KNOWN = "the push is known"
+KNOWN_HINT = (
+    "give the fit the contact and the force of the visible truth; mass, stiffness and friction are then found better"
+)
 EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 
 
@@ -77,6 +84,8 @@ class FitPanel(Panel):
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
             self._how = gui.add_dropdown("by", [ALONE, CORRECTED], hint=HOW) if _corrects(page) else None
+            pushes = page.model.predictor is not None and identifies_pushes(page.model.predictor)
+            self._known = gui.add_checkbox(KNOWN, False, hint=KNOWN_HINT) if pushes else None
             self._start = gui.add_button(
                 "Fit to the truth", hint="find the parameters that reproduce the visible truth"
             )
@@ -151,15 +160,18 @@ class FitPanel(Panel):
     def _begin_push(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
         """Searches the body and the push of a recorded motion."""
         named = {name: value for name, value in truth.setting.items() if isinstance(value, str)}
+        if self._known is not None and self._known.value:
+            named |= {name: truth.setting[name] for name in PUSH_NAMES if name in truth.setting}
         try:
             seen = recorded_points(predictor, truth.sequence, named)
         except InputError as error:
             self._show(FAILED.format(error))
             return
-        search = _Search(self._page, model, truth.setting, named, self._show, CALIBRATED)
+        corrects = self._how is not None and self._how.value == CORRECTED
+        note = CALIBRATED if set(PUSH_NAMES) <= set(named) or not corrects else PUSH_OPEN
+        search = _Search(self._page, model, truth.setting, named, self._show, note)
         self._show("starting", working=True)
-        simulations = CORRECTIONS if self._how is not None and self._how.value == CORRECTED else 0
-        arguments = predictor, seen, named, simulations
+        arguments = predictor, seen, named, CORRECTIONS if corrects else 0
         self._job = Job(fit_push, arguments, search.done, search.failed, search.progress)
         self._job.start()
 

@@ -21,17 +21,27 @@ from odeform.models.base import Predictor
 from odeform.schema import OBJECT
 from odeform.types import Floats, MotionSequence, Times
 
-__all__ = ["PUSHED", "WIDENED", "identifies_pushes", "identify_push", "model_errors", "posterior_of", "recorded_points"]
+__all__ = [
+    "PUSHED",
+    "PUSH_NAMES",
+    "WIDENED",
+    "identifies_pushes",
+    "identify_push",
+    "model_errors",
+    "posterior_of",
+    "recorded_points",
+]
 
 PUSHED = "push"
 """Contact and force, in lists of what is known."""
+PUSH_NAMES = tuple(f"{kind}_{axis}" for kind in ("contact", "force") for axis in "xyz")
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
 WIDENED = 7.8
 """Factor on all intervals where the model is wrong by an unknown amount: the conformal one of 20 drawn bodies that the
 simulator moved (docs/identification.md). What a model misses looks like another body, from frame to frame alike."""
-CORRECTED = 1.0
-"""The same where simulations have corrected the model."""
+CORRECTED = 7.1
+"""The same where simulations have corrected the model, of 14 bodies."""
 
 
 def identify_push(
@@ -132,7 +142,7 @@ def _problem(
 
 def _free(given: Collection[str]) -> tuple[int, ...]:
     body = [index for index, name in enumerate(BODY) if name not in given]
-    parts = {f"{kind}_{axis}" for kind in ("contact", "force") for axis in "xyz"}
+    parts = set(PUSH_NAMES)
     if parts & set(given) and not parts <= set(given):
         raise InputError("identify: expected the whole push to be known, contact and force, or nothing of it")
     return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH)))

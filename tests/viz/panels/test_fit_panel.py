@@ -179,7 +179,7 @@ def telling(report: Report, predictor: Predictor, seen: Known, known: dict[str, 
     """What a fit of a push says on its way."""
     numbers = {name: value for name, value in predictor.complete(known).items() if not isinstance(value, str)}
     report(({**numbers, "friction": 0.5}, 3.0))
-    report(f"{simulations} simulations of {len(seen.times)} frames")
+    report(f"{simulations} simulations of {len(seen.times)} frames, {'contact_x' in known}")
     time.sleep(60.0)
 
 
@@ -193,15 +193,18 @@ def test_a_fit_of_a_push_can_be_corrected_by_simulations(monkeypatch: pytest.Mon
             client.set("test sequence", entry_label(entry, app.session.schema))
             assert client.until(lambda: not client.controls[START].props["disabled"])
             client.set("by", fit.CORRECTED)
-            client.click(START)
-            # the last step stays while the estimate is simulated
-            assert client.until(lambda: f"{fit.CORRECTIONS} simulations of 20 frames" in client.text())
-            assert "step 1:" in client.text()
-            client.click(CANCEL)
-            assert client.until(lambda: client.controls[START].visible)
+            for known in (True, False):
+                client.set(fit.KNOWN, known)
+                client.click(START)
+                # the last step stays while the estimate is simulated
+                told = f"{fit.CORRECTIONS} simulations of 20 frames, {known}"
+                assert client.until(lambda told=told: told in client.text())
+                assert "step 1:" in client.text()
+                client.click(CANCEL)
+                assert client.until(lambda: client.controls[START].visible)
     finally:
         app.close()
 
 
 def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
-    assert "by" not in dropped[1].controls
+    assert not {"by", fit.KNOWN} & set(dropped[1].controls)
