@@ -30,7 +30,7 @@ PUSH_OPEN = (
     "⚠ **Intervals were calibrated on pushes that are known**: this one is estimated, and they may be too narrow."
 )
 ALONE = "the model"
-CORRECTED = f"the model, corrected by {CORRECTIONS} simulations"
+CORRECTED = f"model + {CORRECTIONS} simulations"
 HOW = (
     "what the model misses looks like another body; simulations of the estimate say what it misses, and take some ten "
     "seconds each"
