@@ -32,7 +32,7 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
     pushed.add_argument("--drawn", type=int, metavar="N", help="identify N drawn bodies of each object")
     pushed.add_argument("--object", nargs="+", metavar="NAME", help="these objects only (default: all)")
     pushed.add_argument("--simulated", action="store_true", help="the simulator moves them (default: the model itself)")
-    pushed.add_argument("--simulations", type=int, default=0, metavar="N",
+    pushed.add_argument("--simulations", type=int, metavar="N",
                         help="correct the model by N simulations of each body, each of the last estimate")  # fmt: skip
     pushed.add_argument("--cloud", action="store_true", help="observe --points of half of the surface in each frame, "
                         "without correspondence, from an unknown place (default: 200 points)")  # fmt: skip
@@ -47,7 +47,7 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> None:
     from odeform.models.registry import load
 
-    for name in ("limit", "drawn"):
+    for name in ("limit", "drawn", "simulations"):
         if (count := getattr(args, name)) is not None:
             positive(f"--{name}", count)
     if (args.data is None) == (args.drawn is None):
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> None:
             args.seed,
             args.simulated,
             args.known,
-            args.simulations,
+            args.simulations or 0,
         )
         write_json(result, args.json)
         print(report_drawn(result))

@@ -51,6 +51,8 @@ class Identification:
         proposed: Parameters of the next experiment, which would narrow the widest interval most; empty where none was
             asked for.
         narrowed: Half the width that this interval is expected to have afterwards, relative to that it has now.
+        simulations: How many simulations of estimates corrected the model.
+        stopped: Why no more of them did, if one failed.
     """
 
     parameters: dict[str, Identified]
@@ -58,6 +60,8 @@ class Identification:
     seconds: float
     proposed: dict[str, float] = field(default_factory=dict)
     narrowed: float = 1.0
+    simulations: int = 0
+    stopped: str = ""
 
 
 def identify(

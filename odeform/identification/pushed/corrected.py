@@ -79,6 +79,8 @@ class Correction:
     """(9,) the last step of the estimate, in units of `PushState.vector`: how far it may be from where it would end."""
     simulations: int
     """How many succeeded."""
+    stopped: str = ""
+    """Why no more of them did."""
 
 
 def corrected_search(
@@ -91,7 +93,7 @@ def corrected_search(
 ) -> Correction:
     """Estimates again with up to `most` simulations (T, S, 3) m, each at the estimate before it, and mechanics alone.
 
-    A body that cannot be simulated ends it.
+    It ends at a body that cannot be simulated, or where a simulation was as expected.
     """
     model, tried = Corrected(problem.forward.without_residual()), list[tuple[PushState, Frames]]()
     last = np.zeros(len(found.state.vector))
@@ -99,8 +101,8 @@ def corrected_search(
         note(f"Simulating the estimate ({count + 1} of at most {most})")
         try:
             surface = simulate(found.state)
-        except SimulationError:
-            return Correction(problem, found, last, count)
+        except SimulationError as error:
+            return Correction(problem, found, last, count, str(error))
         missed = _rms_mm(surface - model.motions([found.state])[0])
         model = model.with_simulated(found.state, surface)
         # at first, what the model itself is expected to miss bounds it

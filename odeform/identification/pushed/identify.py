@@ -9,7 +9,7 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.identify import Identification, Identified
-from odeform.identification.pushed.corrected import corrected_search
+from odeform.identification.pushed.corrected import Correction, corrected_search
 from odeform.identification.pushed.evidence import Evidence, Known
 from odeform.identification.pushed.experiment import candidates, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
@@ -84,17 +84,20 @@ def identify_push(
         progress(_values(state), misfit)
 
     simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
-    found, widened, last = search(problem, start, report), WIDENED if errors_mm is None else 1.0, None
+    found = search(problem, start, report)
+    correction = Correction(problem, found, np.zeros(0), 0)
     if simulate is not None:
         correction = corrected_search(problem, found, simulate, simulations, report, note)
         problem, found = correction.problem, correction.found
-        if correction.simulations:
-            widened, last = CORRECTED, correction.last
-    estimates, seconds = _identified(problem, found, widened, last), time.perf_counter() - begin
-    if not propose or not set(problem.free) & set(range(len(BODY))):
-        return Identification(estimates, found.misfit, seconds)
-    proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
-    return Identification(estimates, found.misfit, time.perf_counter() - begin, proposed, narrowed)
+    corrected = correction.simulations > 0
+    widened = CORRECTED if corrected else WIDENED if errors_mm is None else 1.0
+    estimates = _identified(problem, found, widened, correction.last if corrected else None)
+    proposed, narrowed = {}, 1.0
+    if propose and set(problem.free) & set(range(len(BODY))):
+        proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
+    seconds = time.perf_counter() - begin
+    came_to = correction.simulations, correction.stopped
+    return Identification(estimates, found.misfit, seconds, proposed, narrowed, *came_to)
 
 
 def identifies_pushes(predictor: Predictor) -> bool:

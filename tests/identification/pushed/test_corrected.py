@@ -81,6 +81,7 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
 
     nothing = corrected_search(problem, found, broken, 4)
     assert (nothing.problem, nothing.found, nothing.simulations) == (problem, found, 0)
+    assert nothing.stopped == "it is inside out"
 
 
 @pytest.mark.slow

@@ -206,5 +206,28 @@ def test_a_fit_of_a_push_can_be_corrected_by_simulations(monkeypatch: pytest.Mon
         app.close()
 
 
+def unable(report: Report, *_: object) -> Identification:
+    """A fit whose second simulation failed."""
+    one = Identified(1.2, 1.0, 1.4, True, 0.0, 0.2)
+    return Identification({"mass": one}, 0.5, 9.0, simulations=1, stopped="it is inside out")
+
+
+def test_a_simulation_that_failed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit, "fit_push", unable)
+    model = load("contact-force")
+    app = App([Column("odeform", model, model.rest)], port=0)
+    try:
+        with LoopbackClient(app.server.get_port()) as client:
+            entry = open_dataset("contact-force").select("test")[0]
+            client.set("test sequence", entry_label(entry, app.session.schema))
+            assert client.until(lambda: not client.controls[START].props["disabled"])
+            client.set("by", fit.CORRECTED)
+            client.click(START)
+            assert client.until(lambda: fit.STOPPED.format(1, "it is inside out") in client.text())
+            assert fit.PUSH_OPEN in client.text()
+    finally:
+        app.close()
+
+
 def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
     assert not {"by", fit.KNOWN} & set(dropped[1].controls)
