@@ -24,7 +24,9 @@ from odeform.models.error_band import OUTSIDE
 from odeform.models.registry import load, load_model
 from odeform.models.training.outside import growth_outside
 from odeform.parallel import parallel_map
-from odeform.schema import Parameter, Parameters, Schema
+from odeform.schema import OBJECT, Parameter, Parameters, Schema
+from odeform.simulation.objects.catalog import get_object
+from odeform.simulation.scenes.contact_force import drawn_on, simulate_object
 from odeform.simulation.scenes.registry import get_scene
 from odeform.types import Floats, Frames, PointCloud
 from odeform_figures.output import write_or_print
@@ -35,6 +37,7 @@ FRACTIONS = (0.1, 0.25)
 """How far outside: of the end of a range, or of the range where that end is zero."""
 FIT, TEST = 11, 23
 """Seeds of the motions that a band is fitted to, and of those that say how right it is."""
+PUSHES = 3
 SCATTER = (0.7, 1.3)  # times these fractions, for corners of the first
 
 
@@ -49,8 +52,11 @@ class Outside(NamedTuple):
     """(T, 2) mm."""
 
 
-def outside(schema: Schema, fraction: float, seed: int) -> list[tuple[str, dict[str, float]]]:
-    """Names and parameters: one beyond each end of each range, the others inside; then all beyond, at each corner."""
+def outside(schema: Schema, fraction: float, seed: int) -> list[tuple[str, dict[str, Any]]]:
+    """Names and parameters: one beyond each end of each range, the others inside; then all beyond, at each corner. Of
+    bodies that are pushed, `PUSHES` of each, by more than the strongest force."""
+    if schema.objects:
+        return [row for name in schema.objects for row in _pushes(name, fraction, seed)]
     rng, rows = np.random.default_rng(seed + round(100 * fraction)), []
 
     def inside() -> dict[str, float]:
@@ -67,18 +73,30 @@ def outside(schema: Schema, fraction: float, seed: int) -> list[tuple[str, dict[
     return rows
 
 
+def _pushes(name: str, fraction: float, seed: int) -> list[tuple[str, dict[str, Any]]]:
+    item = get_object(name)
+    force = (1.0 + fraction) * item.forces[1]
+    drawn = drawn_on(item, (force, force), PUSHES, seed)
+    return [(f"{name} {index}", {OBJECT: name, **one}) for index, one in enumerate(drawn)]
+
+
 def _beyond(p: Parameter, side: int, fraction: float) -> float:
     end = p.low if side < 0 else p.high
     return end + side * fraction * (abs(end) if end else p.high - p.low)
 
 
-def _simulated(scene: str, keep: Path | None, job: tuple[str, dict[str, float]]) -> Frames:
+def _simulated(scene: str, keep: Path | None, job: tuple[str, dict[str, Any]]) -> Frames:
     name, parameters = job
     file = None if keep is None else keep / f"{name}.npy"
     if file is not None and file.exists():
         return np.load(file)
     known = get_scene(scene)
-    vertices = known.simulate(parameters, rate=known.schema.window.rate, step=known.step).vertices.astype(np.float32)
+    simulate = known.simulate
+    if (
+        OBJECT in parameters
+    ):  # guarded, as those that one asks for on the page: strong pushes turn tetrahedra inside out
+        simulate = partial(simulate_object, get_object(parameters[OBJECT]))
+    vertices = simulate(parameters, rate=known.schema.window.rate, step=known.step).vertices.astype(np.float32)
     if file is not None:
         file.parent.mkdir(parents=True, exist_ok=True)
         np.save(buffer := io.BytesIO(), vertices)
@@ -144,7 +162,7 @@ def main() -> None:
     """Run the comparison from the command line."""
     parser = argparse.ArgumentParser(prog="python -m odeform_figures.studies.outside", description=__doc__)
     cores = os.cpu_count() or 1
-    parser.add_argument("checkpoint", metavar="CKPT", help="a checkpoint of a scene without objects")
+    parser.add_argument("checkpoint", metavar="CKPT", help="a checkpoint")
     parser.add_argument("--workers", type=int, default=cores, metavar="W", help=f"processes (default: {cores})")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="folder of simulations, which take minutes")
     parser.add_argument("--fit", type=Path, metavar="FILE", help="fit the band first, and write the checkpoint")

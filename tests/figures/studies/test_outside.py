@@ -21,6 +21,15 @@ def test_one_parameter_is_outside_at_sides_and_all_at_corners() -> None:
     assert outside(SCHEMA, 0.1, TEST) == rows
 
 
+def test_bodies_are_pushed_by_more_than_the_strongest_force() -> None:
+    pushed = load("contact-force")
+    rows = outside(pushed.schema, 0.25, TEST)
+    assert len(rows) == 3 * 7
+    for _, parameters in rows:
+        force = np.linalg.norm([parameters[f"force_{axis}"] for axis in "xyz"])
+        assert force == pytest.approx(1.25 * pushed.force_range({"object": parameters["object"]})[1])
+
+
 def test_a_band_that_is_fitted_to_errors_covers_them(tmp_path: Path) -> None:
     """Truths that a model misses by more the farther they are outside, and the later."""
     model, times = load("mass-elastic/nearest"), SCHEMA.window.times
