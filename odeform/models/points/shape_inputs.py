@@ -82,7 +82,7 @@ class Ranges:
         return soft_clip(2.0 * (described - low) / (high - low) - 1.0, 1.0, BEYOND)
 
     def denormalised(self, bounded: Floats) -> Floats:
-        """Inverts `bounded` where nothing was clipped: (B, C) in [-1, 1] -> (B, C) in their own units."""
+        """Inverts `bounded` where nothing was clipped: (S, n) in [-1, 1] -> (S, n)."""
         low, high = np.array(self.low), np.array(self.high)
         return low + (high - low) * (bounded + 1.0) / 2.0
 
