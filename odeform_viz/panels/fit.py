@@ -37,7 +37,7 @@ HOW = (
 )
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "After the best next push, the widest interval of the body is expected to be {:.0%} as wide."
-STOPPED = "⚠ **Only {} simulations corrected it**: the last estimate could not be simulated, {}."
+STOPPED = "⚠ **Corrected by {} of {} simulations**: the last estimate could not be simulated, {}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 KNOWN = "the push is known"
 KNOWN_HINT = (
@@ -235,7 +235,7 @@ class _Search:
         text = describe_identification(found, self.page.schema, self.truth)
         proposed = {**self.fixed, **found.proposed} if found.proposed else {}
         further = FURTHER.format(found.narrowed) if proposed else ""
-        stopped = STOPPED.format(found.simulations, found.stopped) if found.stopped else ""
+        stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
         lines = "\n\n".join(filter(None, (text, stopped, further, self.note, self.hidden)))
         self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
 

@@ -2,6 +2,7 @@
 
 import io
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -183,8 +184,9 @@ def telling(report: Report, predictor: Predictor, seen: Known, known: dict[str, 
     time.sleep(60.0)
 
 
-def test_a_fit_of_a_push_can_be_corrected_by_simulations(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fit, "fit_push", telling)
+@pytest.fixture
+def pushed() -> Iterator[LoopbackClient]:
+    """A client of a page with a push as truth, which a fit is to correct by simulations."""
     model = load("contact-force")
     app = App([Column("odeform", model, model.rest)], port=0)
     try:
@@ -193,17 +195,24 @@ def test_a_fit_of_a_push_can_be_corrected_by_simulations(monkeypatch: pytest.Mon
             client.set("test sequence", entry_label(entry, app.session.schema))
             assert client.until(lambda: not client.controls[START].props["disabled"])
             client.set("by", fit.CORRECTED)
-            for known in (True, False):
-                client.set(fit.KNOWN, known)
-                client.click(START)
-                # the last step stays while the estimate is simulated
-                told = f"{fit.CORRECTIONS} simulations of 20 frames, {known}"
-                assert client.until(lambda told=told: told in client.text())
-                assert "step 1:" in client.text()
-                client.click(CANCEL)
-                assert client.until(lambda: client.controls[START].visible)
+            yield client
     finally:
         app.close()
+
+
+def test_a_fit_of_a_push_can_be_corrected_by_simulations(
+    pushed: LoopbackClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fit, "fit_push", telling)
+    for known in (True, False):
+        pushed.set(fit.KNOWN, known)
+        pushed.click(START)
+        # the last step stays while the estimate is simulated
+        told = f"{fit.CORRECTIONS} simulations of 20 frames, {known}"
+        assert pushed.until(lambda told=told: told in pushed.text())
+        assert "step 1:" in pushed.text()
+        pushed.click(CANCEL)
+        assert pushed.until(lambda: pushed.controls[START].visible)
 
 
 def unable(report: Report, *_: object) -> Identification:
@@ -212,21 +221,11 @@ def unable(report: Report, *_: object) -> Identification:
     return Identification({"mass": one}, 0.5, 9.0, simulations=1, stopped="it is inside out")
 
 
-def test_a_simulation_that_failed_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulation_that_failed_is_told(pushed: LoopbackClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fit, "fit_push", unable)
-    model = load("contact-force")
-    app = App([Column("odeform", model, model.rest)], port=0)
-    try:
-        with LoopbackClient(app.server.get_port()) as client:
-            entry = open_dataset("contact-force").select("test")[0]
-            client.set("test sequence", entry_label(entry, app.session.schema))
-            assert client.until(lambda: not client.controls[START].props["disabled"])
-            client.set("by", fit.CORRECTED)
-            client.click(START)
-            assert client.until(lambda: fit.STOPPED.format(1, "it is inside out") in client.text())
-            assert fit.PUSH_OPEN in client.text()
-    finally:
-        app.close()
+    pushed.click(START)
+    assert pushed.until(lambda: fit.STOPPED.format(1, fit.CORRECTIONS, "it is inside out") in pushed.text())
+    assert fit.PUSH_OPEN in pushed.text()
 
 
 def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
