@@ -14,6 +14,7 @@ from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Parameters, Schema
 from odeform.simulation.recorded import read_truth
 from odeform.types import Geometry
+from odeform_viz.words import parameter_title
 
 __all__ = ["Column", "Columns", "columns_under", "truth_column"]
 
@@ -109,7 +110,7 @@ class Columns:
                 f"cannot compare {column.label}: its scene is {schema.scene}, expected {self._schema.scene}"
             )
         names = {p.name for p in schema.parameters} | set(column.truth.setting if column.truth else ())
-        return [p.name for p in self._schema.parameters if p.name not in names]
+        return [parameter_title(p) for p in self._schema.parameters if p.name not in names]
 
     def remove(self, key: int) -> None:
         """Remove a column, if it still exists."""

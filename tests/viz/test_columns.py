@@ -7,6 +7,7 @@ import pytest
 from odeform import InputError
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
+from odeform.models.registry import load
 from odeform.motion.recorded import RecordedMotion
 from odeform_viz.columns import MOST, Column, Columns
 from odeform_viz.panels.compare import sweep
@@ -33,6 +34,12 @@ def test_a_model_that_lacks_a_parameter_says_so(kick: Predictor) -> None:
     fewer = Foreign(kick, parameters=tuple(p for p in kick.schema.parameters if p.name != "bending"))
     columns = Columns.of([_column(kick), Column("plain", fewer, kick.rest)])  # pyright: ignore[reportArgumentType]
     assert columns.all[1].label == "plain (no bending)"
+
+
+def test_what_a_model_lacks_is_called_as_its_slider() -> None:
+    pushed, gp = load("contact-force"), load("contact-force/gp")
+    columns = Columns.of([_column(pushed), Column("gp", gp, gp.rest)])
+    assert columns.all[1].label == "gp (no mass, stiffness)"
 
 
 def test_labels_and_keys_are_distinct_and_last(kick: Predictor) -> None:
