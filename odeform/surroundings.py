@@ -25,6 +25,10 @@ class Contacts:
         """Returns the weakest and strongest force on an object in newton; those of the first for an unknown one."""
         return self.forces.get(name) or next(iter(self.forces.values()))
 
+    def stronger(self, name: str, strength: float) -> float:
+        """By how much a push of `strength` newton is stronger than all on that object, in halves of the strongest."""
+        return max(strength / self.forces_on(name)[1] - 1.0, 0.0) / 0.5
+
 
 @dataclass(frozen=True)
 class Surroundings:

@@ -25,7 +25,7 @@ from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, SHOWN, Parameters
-from odeform.simulation.contacts import CONTACT, complete_push
+from odeform.simulation.contacts import CONTACT, FORCE, complete_push, vector_of
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
@@ -323,7 +323,14 @@ class Predictor(ABC):
         if self.model_of(parameters).is_changed(parameters):
             return None
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
-        return None if band is None else band.at(self.schema.vector(parameters), times)
+        return None if band is None else band.at(self.schema.vector(parameters), times, self.stronger(parameters))
+
+    def stronger(self, parameters: Parameters) -> float:
+        """By how much a push is stronger than all in training (`Contacts.stronger`); 0 in scenes without a sphere."""
+        if self.surroundings is None or self.surroundings.contacts is None:
+            return 0.0
+        strength = float(np.linalg.norm(vector_of(parameters, FORCE)))
+        return self.surroundings.contacts.stronger(str(parameters.get(OBJECT, "")), strength)
 
     def band_motions(self, parameters: Parameters) -> int:
         """On how many whole motions the error band of a body was calibrated, none of which chose the model: nine in ten

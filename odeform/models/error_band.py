@@ -7,7 +7,7 @@ from odeform.models.conformal import SCORES, conformal_factor
 from odeform.models.continuation import LATER_ERRORS
 from odeform.types import Arrays, Floats, Times
 
-__all__ = ["FEWEST", "OUTSIDE", "ErrorBand", "error_band", "excess_of"]
+__all__ = ["FEWEST", "OUTSIDE", "STRONGER", "ErrorBand", "error_band", "excess_of"]
 
 NOMINAL = 0.9
 FEWEST = 8
@@ -17,6 +17,8 @@ WIDTHS = (0.2, 0.35, 0.6, 1.0, 2.0)
 TINY = 1e-6  # mm
 OUTSIDE = "val.outside"
 """(2, P): by how much the logarithm of errors grows, per half trained range below and above it."""
+STRONGER = "val.stronger"
+"""(): by how much it grows where a push is stronger than all in training, per half of the strongest of these."""
 FARTHEST = 10.0  # doublings outside the trained range, at which the band stops widening
 ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a frame are taken over
 
@@ -30,10 +32,10 @@ def error_band(arrays: Arrays) -> "ErrorBand | None":
 class ErrorBand:
     """The RMSE over time that half, and a fraction `NOMINAL`, of unseen motions with given parameters stay within.
 
-    A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are
-    the product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles
-    around each time make the band; the scale of a sequence is estimated from the others alone. Outside of the trained
-    ranges it grows as errors on simulations there did (`OUTSIDE`); without these, it doubles with each `width`. Beyond
+    A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are the
+    product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles around
+    each time make the band; the scale of a sequence is estimated from the others alone. Outside of the trained ranges
+    it grows as errors on simulations there did (`OUTSIDE`, `STRONGER`); without, it doubles with each `width`. Beyond
     the window it grows in proportion to the time, or as the errors of the continuation did when it predicted the last
     third of the window, if that is more; after as long as that, with the square of the time that they were predicted
     for. Where a checkpoint has scores of whole motions (`odeform.models.conformal`), the upper quantile is widened or
@@ -43,7 +45,7 @@ class ErrorBand:
     def __init__(self, arrays: Arrays) -> None:
         """Reads `val.theta` (S, P) in [-1, 1], `val.times` (T,) s and `val.rmse_mm` (S, T); KeyError without them. A
         continuation adds `val.later_mm` (S, L): errors 1 to L frames after the last that it was given."""
-        self._growth = arrays.get(OUTSIDE)
+        self._growth, self._stronger = arrays.get(OUTSIDE), arrays.get(STRONGER)
         scores = arrays.get(SCORES, np.zeros(0)).astype(float)
         factor = conformal_factor(scores, NOMINAL)
         self._whole = factor or 1.0
@@ -71,17 +73,18 @@ class ErrorBand:
         weights = np.exp(squares.min(axis=1, keepdims=True) - squares)
         return (weights @ self._levels) / weights.sum(axis=1)
 
-    def _outside(self, theta: Floats) -> float:
-        excess = excess_of(theta)
-        if self._growth is None:
-            grown = np.log(2.0) * float(np.linalg.norm(excess)) / self._width
-        else:
-            grown = float((excess * self._growth).sum())
-        return min(grown, np.log(2.0) * FARTHEST)
+    def _outside(self, theta: Floats, stronger: float) -> float:
+        excess, doubling = excess_of(theta), np.log(2.0) / self._width
+        grown = doubling * np.linalg.norm(excess) if self._growth is None else (excess * self._growth).sum()
+        grown += min(stronger, 1e3) * (doubling if self._stronger is None else self._stronger)
+        return min(float(grown), np.log(2.0) * FARTHEST)
 
-    def at(self, theta: Floats, times: Times) -> Floats:
-        """Maps (P,) parameters in [-1, 1] and (T,) seconds to (T, 2) mm: the median, and the quantile `NOMINAL`."""
-        level = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0] + self._outside(theta)
+    def at(self, theta: Floats, times: Times, stronger: float = 0.0) -> Floats:
+        """Maps (P,) parameters in [-1, 1] and (T,) seconds to (T, 2) mm: the median, and the quantile `NOMINAL`.
+
+        `stronger` is `odeform.surroundings.Contacts.stronger` of a push.
+        """
+        level = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0] + self._outside(theta, stronger)
         stop = self._times[-1]
         profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
         grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from odeform.models.error_band import OUTSIDE, ErrorBand, excess_of
+from odeform.models.error_band import OUTSIDE, STRONGER, ErrorBand, excess_of
 from odeform.models.registry import load
 from odeform.models.rolling.model import RollingModel
-from odeform.models.training.outside import growth_outside
+from odeform.models.training.outside import growth_of_stronger, growth_outside
 from odeform.motion.reduced_motion import ReducedMotion
 from odeform.types import Arrays, Floats
 
@@ -42,6 +42,46 @@ def test_growth_is_that_of_the_errors_where_they_grow() -> None:
     assert growth[[0, 0, 1], [0, 1, 1]] == pytest.approx(0.0, abs=1e-9)
     widened = bands[..., 1] * np.exp((excess * growth).sum(axis=(1, 2)))[:, None]
     assert (rmse <= widened).mean() >= 0.9
+
+
+def test_the_band_widens_with_a_push_that_is_stronger_than_in_training() -> None:
+    inside, middle = validated(), np.array([0.3, -0.2])
+    fitted, plain = ErrorBand({**inside, STRONGER: np.array(1.5)}), ErrorBand(inside)
+    assert fitted.at(middle, TIMES, 0.4)[1:] == pytest.approx(np.exp(0.4 * 1.5) * fitted.at(middle, TIMES)[1:])
+    wider = plain.at(middle, TIMES, 0.4)[1:] / plain.at(middle, TIMES)[1:]
+    assert wider == pytest.approx(np.full_like(wider, wider[0, 0]))
+    assert wider[0, 0] > 1.1
+    assert np.isfinite(plain.at(middle, TIMES, 1e300)).all()
+
+
+def test_growth_with_strength_is_enough_for_nine_in_ten() -> None:
+    rng = np.random.default_rng(2)
+    stronger = np.repeat([0.2, 0.5], 50)
+    scores = stronger * rng.normal(1.0, 1.0, 100)
+    growth = growth_of_stronger(stronger, scores)
+    assert 0.9 <= (scores <= growth * stronger).mean() <= 0.93
+    assert growth_of_stronger(stronger, -np.ones(100)) == 0.0
+    with pytest.raises(ValueError, match="more motions"):
+        growth_of_stronger(stronger[:5], scores[:5])
+
+
+def test_pushes_beyond_the_strongest_force_have_a_wider_band() -> None:
+    """Forces grow to their own strongest of each object, whatever the direction in which they act."""
+    model = load("contact-force")
+    start = model.complete({"object": "donut"})
+    force = np.array([start[f"force_{axis}"] for axis in "xyz"])
+    for strength, stronger in ((0.5, 0.0), (1.0, 0.0), (1.25, 0.5)):
+        scaled = strength * model.force_range(start)[1] * force / np.linalg.norm(force)
+        push = {**start, **dict(zip(("force_x", "force_y", "force_z"), map(float, scaled), strict=True))}
+        assert model.stronger(push) == pytest.approx(stronger, abs=1e-9)
+        band = model.error_band(push, TIMES[1:4] / 2.0)
+        assert band is not None
+        known = model.error_band(
+            {**push, **{name: push[name] / max(strength, 1.0) for name in push if name.startswith("force")}},
+            TIMES[1:4] / 2.0,
+        )
+        assert known is not None
+        assert (band[:, 1] > known[:, 1]).all() == (stronger > 0.0)
 
 
 @pytest.fixture(scope="module")

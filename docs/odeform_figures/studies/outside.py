@@ -20,11 +20,13 @@ from odeform.checkpoint import write_checkpoint
 from odeform.errors import InputError
 from odeform.io import atomic_write
 from odeform.models.base import Predictor
-from odeform.models.error_band import OUTSIDE
-from odeform.models.registry import load, load_model
-from odeform.models.training.outside import growth_outside
+from odeform.models.conformal import motion_score
+from odeform.models.error_band import OUTSIDE, STRONGER
+from odeform.models.registry import load
+from odeform.models.training.outside import growth_of_stronger, growth_outside
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameter, Parameters, Schema
+from odeform.simulation.contacts import FORCE
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import drawn_on, simulate_object
 from odeform.simulation.scenes.registry import get_scene
@@ -146,16 +148,36 @@ def _rms(values: list[Floats]) -> float:
 
 
 def fitted(model: Predictor, motions: list[Outside]) -> Predictor:
-    """The model with a band that widens as the errors of these motions do."""
-    schema, times, bands = model.schema, model.schema.window.times, []
-    theta = np.stack([schema.vector(schema.complete(each.parameters)) for each in motions])
-    for row in theta:
-        ends = zip(schema.learned, np.clip(row, -1.0, 1.0), strict=True)
-        nearest = schema.complete({p.name: p.denormalise(float(u)) for p, u in ends})
-        bands.append(model.error_band(nearest, times))
-    growth = growth_outside(theta, np.stack([each.errors for each in motions]), np.stack(bands)[:, 1:])
-    arrays = {**model.checkpoint.arrays, OUTSIDE: growth}
-    return load_model(replace(model.checkpoint, arrays=arrays))
+    """The model with a band that widens as the errors of these motions do: of pushed bodies, all alike."""
+    if model.schema.objects:
+        stronger = np.array([model.stronger(each.parameters) for each in motions])
+        bands = [_of_nearest(model, _weakened(each.parameters, by)) for each, by in zip(motions, stronger, strict=True)]
+        scores = [motion_score(each.errors, band[:, 1]) for each, band in zip(motions, bands, strict=True)]
+        growth = growth_of_stronger(stronger, np.array(scores))
+        added = {f"{name}/{STRONGER}": growth for name in model.schema.objects}
+    else:
+        theta = np.stack([model.schema.vector(model.schema.complete(each.parameters)) for each in motions])
+        bands = np.stack([_of_nearest(model, each.parameters) for each in motions])
+        added = {OUTSIDE: growth_outside(theta, np.stack([each.errors for each in motions]), bands)}
+    return model.of_same_kind(replace(model.checkpoint, arrays={**model.checkpoint.arrays, **added}))
+
+
+def _of_nearest(model: Predictor, parameters: Parameters) -> Floats:
+    """(T, 2) mm: the band of the nearest parameters in the trained ranges, after the first frame."""
+    schema = model.schema
+    complete = model.complete(parameters)
+    ends = zip(schema.learned, np.clip(schema.vector(complete), -1.0, 1.0), strict=True)
+    band = model.error_band({**complete, **{p.name: p.denormalise(float(u)) for p, u in ends}}, schema.window.times)
+    if band is None:
+        raise InputError(f"{model.model}: expected a model with an error band")
+    return band[1:]
+
+
+def _weakened(parameters: Parameters, stronger: float) -> dict[str, Any]:
+    """The same push with the strongest force in training, of one that is so much stronger (`Contacts.stronger`)."""
+    return {
+        name: value / (1.0 + 0.5 * stronger) if name.startswith(FORCE) else value for name, value in parameters.items()
+    }
 
 
 def main() -> None:

@@ -4,10 +4,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
+from odeform.models.conformal import conformal_factor
 from odeform.models.error_band import NOMINAL, excess_of
 from odeform.types import Floats
 
-__all__ = ["growth_outside"]
+__all__ = ["growth_of_stronger", "growth_outside"]
 
 RIDGE = 0.2  # half ranges; what few motions say of one side is chance
 WIDER = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0)  # times the growth of the mean, to choose from
@@ -34,6 +35,20 @@ def growth_outside(
 
     wider = next((times for times in WIDER if covered(times) >= NOMINAL), WIDER[-1])
     return wider * growth.reshape(2, -1)
+
+
+def growth_of_stronger(
+    stronger: Float[np.ndarray, " motions"], scores: Float[np.ndarray, " motions"]
+) -> Float[np.ndarray, ""]:
+    """Returns the growth that `odeform.models.error_band.STRONGER` names, which is enough for `NOMINAL` of the motions.
+
+    `stronger` says how much stronger each push is, and `scores` how far its motion leaves the band of the strongest
+    in training (`odeform.models.conformal.motion_score`). `ValueError` for too few motions.
+    """
+    factor = conformal_factor(np.maximum(scores, 0.0) / stronger, NOMINAL)
+    if factor is None:
+        raise ValueError(f"expected more motions than {len(scores)}")
+    return np.array(np.log(factor))
 
 
 def _rms(values: Float[np.ndarray, "motions times"]) -> Floats:

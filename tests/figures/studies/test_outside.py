@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odeform.models.error_band import OUTSIDE
+from odeform.models.error_band import OUTSIDE, STRONGER
 from odeform.models.registry import load
-from odeform_figures.studies.outside import FIT, TEST, compared, fitted, outside, summary
+from odeform_figures.studies.outside import FIT, TEST, Outside, compared, fitted, outside, summary
 
 SCHEMA = load("mass-elastic").schema
 
@@ -46,3 +46,19 @@ def test_a_band_that_is_fitted_to_errors_covers_them(tmp_path: Path) -> None:
     assert found["covered_frames"] > 0.7
     assert found["sides_mm"] > 0.0
     assert len(found["motions"]) == 8
+
+
+def test_bands_of_pushes_widen_as_much_as_errors_of_stronger_ones_need() -> None:
+    """Errors that double where the force is a quarter beyond the strongest."""
+    pushed, motions = load("contact-force"), []
+    times = pushed.schema.window.times
+    for share in (0.1, 0.25):
+        for name, parameters in outside(pushed.schema, share, FIT):
+            complete = pushed.complete(parameters)
+            weaker = {k: v / (1.0 + share) if k.startswith("force") else v for k, v in complete.items()}
+            band = pushed.error_band(weaker, times)
+            assert band is not None
+            motions.append(Outside(name, complete, 2.0 ** (share / 0.25) * band[1:, 1], band[1:]))
+    again = fitted(pushed, motions)
+    growth = [again.checkpoint.arrays[f"{name}/{STRONGER}"] for name in pushed.schema.objects]
+    assert growth == pytest.approx([np.log(2.0) / 0.5] * 7, rel=1e-6)
