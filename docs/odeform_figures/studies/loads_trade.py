@@ -28,15 +28,20 @@ SEED = 3
 
 
 def traded(
-    checkpoint: str, acting: str, objects: Sequence[str], draws: int, tolerances: Sequence[float] = TOLERANCES
+    checkpoint: str,
+    acting: str,
+    objects: Sequence[str],
+    draws: int,
+    tolerances: Sequence[float] = TOLERANCES,
+    reference: SolverSettings = QUALITIES["reference"],
 ) -> list[dict[str, Any]]:
     """One row for each tolerance: ms of processor time of a new motion with a frame at its end, mean over `draws` of
-    each object; and the RMS distance from *reference* over the window, relative to the RMS displacement."""
+    each object; and the RMS distance from that of `reference` over the window, relative to the RMS displacement."""
     model = load(checkpoint).under(acting)
     drawn = [one for name in objects for one in get_scene(model.schema.scene).sample(draws, SEED, [name])]
     rows = []
     with as_viewed():
-        sure = [_frames(model, one, QUALITIES["reference"]) for one in drawn]
+        sure = [_frames(model, one, reference) for one in drawn]
         for tolerance in tolerances:
             settings = replace(QUALITIES["balanced"], tolerance=tolerance)
             begin = time.process_time()

@@ -11,7 +11,7 @@ from odeform.checkpoint import read_checkpoint, resolve_checkpoint
 from odeform.errors import InputError
 from odeform.loads.registry import known_loads
 from odeform.models.base import Predictor
-from odeform.models.modal.model import ModalModel
+from odeform.models.modal.model import QUALITIES, ModalModel
 from odeform.models.modal.user_body import UserBodyPredictor, resting_body
 from odeform.models.registry import load_model
 from odeform.simulation.objects.catalog import get_object
@@ -35,6 +35,17 @@ def test_a_model_of_mechanics_takes_all_loads_and_leads_back(pushed: Predictor, 
     assert thrown.under("push") is pushed
     assert thrown.under("drop").schema.scene == "object-drop"
     assert odeform.load("contact-force:kick").schema.scene == "object-kick"
+
+
+def test_steps_of_a_body_that_lands_are_as_long_as_its_errors_allow(pushed: Predictor) -> None:
+    """Those of one that is held or kicked are shorter: its errors are smaller."""
+    drop = pushed.under("drop")
+    sure = drop.solve(parameters={"object": "donut"}, quality=replace(QUALITIES["balanced"], tolerance=2e-5))
+    points = [motion.vertices(TIMES) for motion in (drop.solve(parameters={"object": "donut"}), sure)]
+    off, moved = points[0] - points[1], points[1] - points[1][0]
+    assert np.sqrt((off**2).mean() / (moved**2).mean()) < 0.03
+    tolerances = {name: pushed.under(name).qualities["balanced"].tolerance for name in ("drop", "hold", "kick")}
+    assert tolerances == {"drop": 2.5e-4, "hold": 1.5e-4, "kick": 1.5e-4}
 
 
 @pytest.mark.parametrize("load", ["drop", "kick"])
