@@ -25,7 +25,10 @@ __all__ = ["FitPanel", "describe_identification"]
 LABEL = "fit"
 CORRECTIONS = 3  # simulations; more of them tell little
 NEXT = "Set sliders to the next {}"
-NEXT_HINT = "what would tell most of what is least known of the body; another load is another page"
+NEXT_HINT = (
+    "what would tell most of what is least known of the body; a drop or a throw is on a page of its own, and no fit "
+    "reads it yet"
+)
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."

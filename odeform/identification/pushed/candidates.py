@@ -6,17 +6,15 @@ from odeform.errors import InputError
 from odeform.identification.pushed.experiment import Candidates
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.linearised import linearised, steps_from
-from odeform.identification.pushed.trials import Falls, Pushes
+from odeform.identification.pushed.trials import Falls, Pushes, Trials
 from odeform.loads.measured import FALLS
 from odeform.loads.registry import get_load
 from odeform.types import Floats, Times
 
 __all__ = ["candidates"]
 
-PUSHED, FALLING = 32, 12
+PUSHED, FALLING = 32, 8
 """Experiments that are tried: pushes, and as many of each load under which bodies fall."""
-MISLEADING = 1.0
-"""How many times as far the model's error leads in falls than in pushes, by simulations (docs/identification.md)."""
 
 
 def candidates(
@@ -28,12 +26,12 @@ def candidates(
     drops and throws are from the ranges of their loads. All are observed at points of the surface with `noise_mm`.
     """
     bodies = [body, *(body + steps_from(body))]
-    trials = [
-        (Pushes(forward, bodies, forces, errors_mm, PUSHED, seed), 1.0),
-        *((Falls(forward, body, get_load(load), FALLING, seed), MISLEADING) for load in FALLS),
+    trials: list[Trials] = [
+        Pushes(forward, bodies, forces, errors_mm, PUSHED, seed),
+        *(Falls(forward, body, get_load(load), FALLING, seed) for load in FALLS),
     ]
-    found = [(one, misleading) for one, misleading in trials if one.experiments]
+    found = [one for one in trials if one.experiments]
     if not found:
         raise InputError("identify: no experiment with this body was found")
-    told = [linearised(forward, one, body, noise_mm, misleading=misleading).informations for one, misleading in found]
-    return Candidates([one for each, _ in found for one in each.experiments], np.concatenate(told))
+    told = [linearised(forward, one, body, noise_mm).informations for one in found]
+    return Candidates([one for each in found for one in each.experiments], np.concatenate(told))

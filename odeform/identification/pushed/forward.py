@@ -17,7 +17,7 @@ from odeform.schema import Parameter, Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
 
-__all__ = ["BODY_STEP", "SETTINGS", "Forward", "pushed_model", "with_friction"]
+__all__ = ["BODY_STEP", "Forward", "pushed_model", "with_friction"]
 
 SETTINGS = SolverSettings("limex", step=1e-3, dtype="float64")
 """Even steps: motions are smooth functions of the parameters, which differences need."""

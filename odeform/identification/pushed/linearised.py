@@ -34,13 +34,11 @@ def linearised(
     trials: Trials,
     body: Floats,
     noise_mm: float,
-    misleading: float = 1.0,
     observed: list[Frames] | None = None,
 ) -> Linearised:
     """Linearises motions around a body (3,) by differences, of which points of the surface are seen with `noise_mm`.
 
-    The model errs by `misleading` times what was measured. `observed` is E times (T, S, 3) m; by default the body moves
-    as the model says.
+    `observed` is E times (T, S, 3) m; by default the body moves as the model says.
     """
     base, steps = trials.surfaces(body), steps_from(body)
     slopes = np.stack([(trials.surfaces(body + step) - base) / step.sum() for step in steps], axis=1)
@@ -48,6 +46,6 @@ def linearised(
     for index, (moved, changes) in enumerate(zip(base, slopes, strict=True)):
         seen = moved if observed is None else observed[index]
         evidence = points_of(trials.times[index], seen, forward.model.rest.faces, noise_mm)
-        problem = Problem(forward, evidence, misleading * trials.errors_mm[index], free)
+        problem = Problem(forward, evidence, trials.errors_mm[index], free)
         out.append(information_of(problem, evidence.compared(moved, changes, Camera())))
     return Linearised(np.stack([row[0] for row in out]), np.stack([row[1] for row in out]))
