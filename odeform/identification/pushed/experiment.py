@@ -46,9 +46,9 @@ class Candidates:
         """Returns the experiment after which the widest interval of the body is expected to be narrowest."""
         return int(np.argmin([widest(self.after(covariance, index)) for index in range(len(self.informations))]))
 
-    def under(self, *loads: str) -> "Candidates":
-        """Those under some loads."""
-        kept = [index for index, one in enumerate(self.experiments) if one.load in loads]
+    def under(self, load: str) -> "Candidates":
+        """Those under one load."""
+        kept = [index for index, one in enumerate(self.experiments) if one.load == load]
         return Candidates([self.experiments[index] for index in kept], self.informations[kept])
 
 

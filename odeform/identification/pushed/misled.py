@@ -76,8 +76,7 @@ def report_misled(result: dict[str, Any]) -> str:
     """Returns a line for each load."""
     lines = ["where one simulated experiment leads from the true body, in standard deviations of its posterior"]
     for load, one in result["loads"].items():
-        factor = (
-            "too few" if one["factor_90"] is None else f"{one['factor_90']:.1f} times as wide would hold nine in ten"
-        )
-        lines.append(f"{load:<8}{one['experiments']:>4} experiments, median {one['median']:.1f}; intervals {factor}")
+        factor = one["factor_90"]
+        wide = "" if factor is None else f"; intervals {factor:.1f} times as wide would hold nine in ten"
+        lines.append(f"{load:<8}{one['experiments']:>4} experiments, median {one['median']:.1f}{wide}")
     return "\n".join(lines)

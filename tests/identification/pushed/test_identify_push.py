@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -6,6 +8,8 @@ from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.experiment import Candidates, Experiment, until_halved, widest
 from odeform.identification.pushed.halving import report_halved
 from odeform.identification.pushed.identify import WIDENED, identifies_pushes, identify_push, model_errors
+from odeform.identification.pushed.misled import misled_drawn, report_misled
+from odeform.identification.pushed.search import PRIOR
 from odeform.identification.pushed.table import identify_drawn, report_drawn
 from odeform.identification.pushed.views import CloudView, cloud_of, points_of
 from odeform.models.registry import load
@@ -94,6 +98,26 @@ def test_experiments_are_counted_by_load() -> None:
     assert "of all loads: proposed 2.0 on average, at most two for 50%; random 3.0 on average, 2.0 times" in text
     assert "3 times drop, 1 times push" in text
     assert "of pushes alone: proposed 3.0 on average, at most two for 50%; random 4.0 on average, 1.5 times" in text
+
+
+def test_how_far_experiments_lead_is_told_by_load() -> None:
+    loads = {
+        "push": {"experiments": 7, "median": 4.0, "factor_90": 13.9},
+        "drop": {"experiments": 1, "median": 2.0, "factor_90": None},
+    }
+    text = re.sub(" +", " ", report_misled({"loads": loads}))
+    assert "push 7 experiments, median 4.0; intervals 13.9 times as wide would hold nine in ten" in text
+    assert text.endswith("drop 1 experiments, median 2.0")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_one_simulated_experiment_of_each_load_is_compared_with_what_it_promised() -> None:
+    found = misled_drawn(load("contact-force"), ["flip-flop"], 1)
+    assert {row["load"] for row in found["rows"]} == {"push", "drop", "throw"}
+    for row in found["rows"]:
+        assert (np.array(row["expected"]) < PRIOR).all(), "each tells something"
+        assert np.isfinite(row["off"]).all()
 
 
 @pytest.mark.slow
