@@ -1,10 +1,10 @@
 """Composes the viewer: server, session, panels, scene and the loop that joins them."""
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -72,8 +72,8 @@ class App:
         self._panels, self._workspace, self._switching = panels, workspace, Lock()
         self._build(columns)
 
-    def _build(self, columns: Sequence[Column]) -> None:
-        """Build a page for these columns on the server, and start it."""
+    def _build(self, columns: Sequence[Column], parameters: Mapping[str, Any] | None = None) -> None:
+        """Build a page for these columns on the server, with sliders at `parameters`, and start it."""
         self.columns = Columns.of(columns)
         self.session = Session(columns[0].source.schema)
         window = self.session.schema.window
@@ -104,12 +104,16 @@ class App:
         for column in columns:
             if column.truth:
                 self.page.controls.set_parameters(self.session.schema.known(column.truth.setting))
+        if parameters:
+            self.page.controls.set_parameters(parameters)
         self.server.on_client_connect(lambda _: self._worker.wake())  # recordings wait for somebody who watches
         self._play_first()
         self._worker.start()
 
-    def show_load(self, load: str) -> None:
+    def show_load(self, load: str, parameters: Mapping[str, Any] | None = None) -> None:
         """Build the page anew, with its models under another load; models that know one scene only are left out.
+
+        `parameters` are what its sliders then show, defaults for the others.
 
         `InputError` while a recording, which is of one scene, is in progress, and if the page cannot be built; the page
         before is then there again.
@@ -119,17 +123,17 @@ class App:
                 raise InputError("a recording is of one scene: stop it before something else happens")
             before, columns = self.columns.all, columns_under(self.columns.all, load)
             try:
-                self._rebuild(columns)
+                self._rebuild(columns, parameters)
             except Exception as error:  # of any panel, also a plugged one: the page must not stay half built
                 self._rebuild(before)
                 raise InputError(f"load {load!r}: its page could not be built: {error}") from error
 
-    def _rebuild(self, columns: Sequence[Column]) -> None:
+    def _rebuild(self, columns: Sequence[Column], parameters: Mapping[str, Any] | None = None) -> None:
         self._end_page()
         self.scene.close()
         with clear_page(self.server):
             self.server.gui.set_panel_label(_title(columns))
-            self._build(columns)
+            self._build(columns, parameters)
 
     def _end_page(self) -> None:
         for panel in self.page.panels:

@@ -67,8 +67,8 @@ class Controls:
     have no use for clicks."""
     pull: Callable[[ShownPush, Vector, str], None] | None = None
     """Told of the arrow of a force being dragged: the push, where its tail is (3,) m, and the phase of the drag."""
-    show_load: Callable[[str], None] = lambda _: None
-    """Builds the page anew, with its models under another load."""
+    show_load: Callable[[str, Mapping[str, Any]], None] = lambda *_: None
+    """Builds the page anew, with its models under another load, and its sliders at parameters; others at defaults."""
     quality: Callable[[], str] = lambda: "balanced"
     overlay: Callable[[], bool] = lambda: False
     set_overlay: Callable[[bool], None] = lambda _: None

@@ -37,7 +37,10 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
     pushed.add_argument("--cloud", action="store_true", help="observe --points of half of the surface in each frame, "
                         "without correspondence, from an unknown place (default: 200 points)")  # fmt: skip
     pushed.add_argument(
-        "--next", action="store_true", help="count the pushes that halve the widest interval, the best against random"
+        "--next",
+        action="store_true",
+        help="count the pushes, drops and throws that halve the widest interval, the best "
+        "against random; with --simulated, how far each leads from the true body",
     )
     choices = ("mass", "young", "friction", "push")
     pushed.add_argument("--known", nargs="+", default=[], choices=choices, metavar="NAME",
@@ -55,6 +58,7 @@ def run(args: argparse.Namespace) -> None:
     predictor = load(args.checkpoint)
     if args.drawn is not None:
         from odeform.identification.pushed.halving import halve_drawn, report_halved
+        from odeform.identification.pushed.misled import misled_drawn, report_misled
         from odeform.identification.pushed.table import identify_drawn, report_drawn
         from odeform.identification.pushed.views import CloudView
 
@@ -62,6 +66,11 @@ def run(args: argparse.Namespace) -> None:
         objects = args.object or predictor.schema.objects
         for name in objects:
             predictor.schema.check_object(name)
+        if args.next and args.simulated:
+            misled = misled_drawn(predictor, objects, args.drawn, args.noise, args.seed)
+            write_json(misled, args.json)
+            print(report_misled(misled))
+            return
         if args.next:
             halved = halve_drawn(predictor, objects, args.drawn, args.noise, args.seed)
             write_json(halved, args.json)

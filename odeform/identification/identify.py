@@ -53,6 +53,8 @@ class Identification:
         narrowed: Half the width that this interval is expected to have afterwards, relative to that it has now.
         simulations: How many simulations of estimates corrected the model.
         stopped: Why no more of them did, if one failed.
+        proposed_load: What happens in the proposed experiment: "push", or the name of a load; empty where none was
+            asked for.
     """
 
     parameters: dict[str, Identified]
@@ -62,6 +64,7 @@ class Identification:
     narrowed: float = 1.0
     simulations: int = 0
     stopped: str = ""
+    proposed_load: str = ""
 
 
 def identify(

@@ -8,8 +8,10 @@ from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
+from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.identify import PUSH_NAMES, identifies_pushes, recorded_points
 from odeform.identification.pushed.simulator import can_simulate
+from odeform.loads.registry import PUSH
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
 from odeform.schema import Parameters, Schema
@@ -22,7 +24,11 @@ __all__ = ["FitPanel", "describe_identification"]
 
 LABEL = "fit"
 CORRECTIONS = 3  # simulations; more of them tell little
-NEXT = "the push that would tell most of what is least known of the body"
+NEXT = "Set sliders to the next {}"
+NEXT_HINT = (
+    "what would tell most of what is least known of the body; a drop or a throw is on a page of its own, and no fit "
+    "reads it yet"
+)
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
@@ -36,13 +42,14 @@ HOW = (
     "seconds each"
 )
 FAILED = "⚠ **The fit failed**: {}"
-FURTHER = "After the best next push, the widest interval of the body is expected to be {:.0%} as wide."
+FURTHER = "After the next {}, the widest interval of the body is expected to be {:.0%} as wide."
 STOPPED = "⚠ **Corrected by {} of {} simulations**: the last estimate could not be simulated, {}."
 NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 KNOWN = "the push is known"
 KNOWN_HINT = (
     "give the fit the contact and the force of the visible truth; mass, stiffness and friction are then found better"
 )
+NOTHING = Experiment("", {})
 EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 
 
@@ -80,7 +87,7 @@ class FitPanel(Panel):
         self._job: Job | None = None
         self._truth: RecordedMotion | None = None
         self._found: Parameters = {}
-        self._proposed: Parameters = {}
+        self._proposed = NOTHING
         gui = page.server.gui
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
@@ -95,7 +102,7 @@ class FitPanel(Panel):
             self._cancel.on_click(lambda _: self.close())
             self._use = gui.add_button("Set sliders to the estimate", color="gray", visible=False)
             self._use.on_click(lambda _: self._use_estimate())
-            self._next = gui.add_button("Set sliders to the next push", color="gray", visible=False, hint=NEXT)
+            self._next = gui.add_button(NEXT.format(PUSH), color="gray", visible=False, hint=NEXT_HINT)
             self._next.on_click(lambda _: self._use_proposed())
         page.on_columns_changed(lambda: page.on_event_loop(self._refresh))
         self._refresh()
@@ -123,12 +130,13 @@ class FitPanel(Panel):
             self._show("" if truth else NO_TRUTH)
 
     def _show(
-        self, text: str, found: Parameters | None = None, working: bool = False, proposed: Parameters | None = None
+        self, text: str, found: Parameters | None = None, working: bool = False, proposed: Experiment = NOTHING
     ) -> None:
         self._text.content, self._text.visible = text, bool(text)
         self._found = found or {}
-        self._proposed = proposed or {}
-        self._use.visible, self._next.visible = bool(found), bool(proposed)
+        self._proposed = proposed
+        self._next.label = NEXT.format(proposed.load or PUSH)
+        self._use.visible, self._next.visible = bool(found), bool(proposed.load)
         self._start.visible, self._cancel.visible = not working, working
 
     def _begin(self) -> None:
@@ -177,7 +185,15 @@ class FitPanel(Panel):
         self._job.start()
 
     def _use_proposed(self) -> None:
-        self._page.controls.set_parameters(self._proposed)
+        """Set the sliders, on this page or on that of another load."""
+        load, parameters = self._proposed.load, self._proposed.parameters
+        if load != PUSH:
+            try:
+                self._page.controls.show_load(load, parameters)
+            except InputError as error:
+                self._page.notices.show("Nothing changed", str(error))
+            return
+        self._page.controls.set_parameters(parameters)
         self._page.wake()
 
     def _use_estimate(self) -> None:
@@ -233,8 +249,9 @@ class _Search:
         estimate = {name: one.value for name, one in found.parameters.items() if name in known}
         self._place(estimate)
         text = describe_identification(found, self.page.schema, self.truth)
-        proposed = {**self.fixed, **found.proposed} if found.proposed else {}
-        further = FURTHER.format(found.narrowed) if proposed else ""
+        body = {name: value for name, value in self.fixed.items() if isinstance(value, str)}
+        proposed = Experiment(found.proposed_load, {**body, **found.proposed})
+        further = FURTHER.format(proposed.load, found.narrowed) if proposed.load else ""
         stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
         lines = "\n\n".join(filter(None, (text, stopped, further, self.note, self.hidden)))
         self.show(lines, {**self.fixed, **estimate}, proposed=proposed)

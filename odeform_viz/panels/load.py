@@ -77,7 +77,7 @@ class LoadPanel(Panel):
         try:
             if title not in self._names:
                 raise InputError(f"what happens: expected one of {', '.join(self._names)}, got {title!r}")
-            self._page.controls.show_load(self._names[title])
+            self._page.controls.show_load(self._names[title], {})
         except InputError as error:
             if not self._closed:  # a page that is built anew has a list of its own
                 self._choice.value = self._shown

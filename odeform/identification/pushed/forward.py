@@ -17,7 +17,7 @@ from odeform.schema import Parameter, Parameters
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
 
-__all__ = ["Forward", "pushed_model"]
+__all__ = ["BODY_STEP", "Forward", "pushed_model", "with_friction"]
 
 SETTINGS = SolverSettings("limex", step=1e-3, dtype="float64")
 """Even steps: motions are smooth functions of the parameters, which differences need."""
@@ -31,6 +31,15 @@ def pushed_model(predictor: Predictor, parameters: Parameters) -> ModalModel | N
     if not isinstance(part, ModalModel) or part.load is not None or set(part.own_values) != {"mass", "young"}:
         return None
     return part
+
+
+def with_friction(model: ModalModel, ratio: float) -> ModalModel:
+    """The same body, with so many times its coefficients of friction against the floor and the sphere."""
+    if abs(ratio - 1.0) < 1e-9:
+        return model
+    known = model.contact_parameters
+    rougher = replace(known, floor_friction=ratio * known.floor_friction, push_friction=ratio * known.push_friction)
+    return model.with_contact_parameters(rougher)
 
 
 class Forward:
@@ -61,13 +70,7 @@ class Forward:
         return PushState(self.model.rest, self.ranges, strongest, unit, place, pull)
 
     def _model_of(self, state: PushState) -> ModalModel:
-        ratio = state.value(FRICTION) / self.friction
-        changed = self.model.changed(state.parameters())
-        if abs(ratio - 1.0) < 1e-9:
-            return changed
-        known = self.model.contact_parameters
-        rougher = replace(known, floor_friction=ratio * known.floor_friction, push_friction=ratio * known.push_friction)
-        return changed.with_contact_parameters(rougher)
+        return with_friction(self.model.changed(state.parameters()), state.value(FRICTION) / self.friction)
 
     def motions(self, states: Sequence[PushState]) -> Float[np.ndarray, "batch times points 3"]:
         """(B, T, S, 3) m: the surface for states of one and the same body."""

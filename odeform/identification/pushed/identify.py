@@ -9,9 +9,10 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.discrepancy import TWO_SIDED
 from odeform.identification.identify import Identification, Identified
+from odeform.identification.pushed.candidates import candidates
 from odeform.identification.pushed.corrected import Correction, corrected_search
 from odeform.identification.pushed.evidence import Evidence, Known
-from odeform.identification.pushed.experiment import candidates, widest
+from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.simulator import simulator_of
@@ -64,10 +65,10 @@ def identify_push(
         errors_mm: (T,) how wrong the model is at the times of the evidence, by errors that are independent from frame
             to frame; by default as its error band says, and intervals are widened by what bodies in the simulator took.
         progress: Called with the parameters and the misfit before each step; an exception that it raises ends it.
-        propose: Whether to look for the push that would tell most next.
+        propose: Whether to look for the push, drop or throw that would tell most next.
         simulations: How often at most to simulate the estimate, to correct the model by what it misses there, and to
             estimate again: some ten seconds each.
-        note: Called with what is done before each simulation.
+        note: Called with what is done, before each simulation and before experiments are compared.
 
     Returns:
         Estimates of `mass`, `young`, `friction`, and of the push where it is not known. A parameter whose interval
@@ -92,12 +93,15 @@ def identify_push(
     corrected = correction.simulations > 0
     widened = CORRECTED if corrected else WIDENED if errors_mm is None else 1.0
     estimates = _identified(problem, found, widened, correction.last if corrected else None)
-    proposed, narrowed = {}, 1.0
+    proposed, narrowed = Experiment("", {}), 1.0
     if propose and set(problem.free) & set(range(len(BODY))):
+        note("Looking for the experiment that would tell most next")
         proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
     seconds = time.perf_counter() - begin
     came_to = correction.simulations, correction.stopped
-    return Identification(estimates, found.misfit, seconds, proposed, narrowed, *came_to)
+    return Identification(
+        estimates, found.misfit, seconds, dict(proposed.parameters), narrowed, *came_to, proposed_load=proposed.load
+    )
 
 
 def identifies_pushes(predictor: Predictor) -> bool:
@@ -151,16 +155,16 @@ def _free(given: Collection[str]) -> tuple[int, ...]:
     return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH)))
 
 
-def _proposed(problem: Problem, found: Found, forces: tuple[float, float]) -> tuple[dict[str, float], float]:
-    """The push that narrows the widest interval of the body most, and to which fraction. Keeps the estimated body."""
+def _proposed(problem: Problem, found: Found, forces: tuple[float, float]) -> tuple[Experiment, float]:
+    """The experiment that narrows the widest interval of the body most, and to which fraction."""
     covariance = CERTAIN**2 * np.eye(len(BODY))
     open_ = [index for index in problem.free if index < len(BODY)]
     posterior = posterior_of(problem, found)[0]
     covariance[np.ix_(open_, open_)] = posterior[: len(open_), : len(open_)]
-    errors = problem.errors_mm
-    pushes = candidates(problem.forward, found.state.body, forces, problem.evidence.noise_mm, errors)
-    best = pushes.best(covariance)
-    return pushes.states[best].parameters(), widest(pushes.after(covariance, best)) / widest(covariance)
+    noise_mm, errors = problem.evidence.noise_mm, problem.errors_mm
+    tried = candidates(problem.forward, found.state.body, forces, noise_mm, errors)
+    best = tried.best(covariance)
+    return tried.experiments[best], widest(tried.after(covariance, best)) / widest(covariance)
 
 
 def _values(state: PushState) -> dict[str, float]:

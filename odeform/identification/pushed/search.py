@@ -176,14 +176,15 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
 
 
 def search(problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None) -> Found:
-    """Compares drawn pushes, if the push is unknown; refines the push of the best briefly, and all that is unknown of
-    those that are best then, until one explains the observation."""
+    """Compares drawn pushes, if the push is unknown; refines the best briefly, by the push if it is unknown, and all
+    that is unknown of those that are best then, until one explains the observation."""
     found: list[Found] = []
     with threadpool_limits(1):  # products are small
         starts = _apart(_starts(problem, start))[:TRIED]
         if len(starts) > REFINED:
-            push = tuple(index for index in problem.free if index >= len(BODY))
-            brief = [refined(replace(problem, free=push), state, progress, BRIEF) for state in starts]
+            # starts differ by their pushes, or, where the push is known, only by the camera, which is always refined
+            first = tuple(index for index in problem.free if index >= len(BODY)) or problem.free
+            brief = [refined(replace(problem, free=first), state, progress, BRIEF) for state in starts]
             starts = [one.state for one in sorted(brief, key=lambda one: one.misfit)]
         for state in starts[:REFINED]:
             found.append(refined(problem, state, progress))

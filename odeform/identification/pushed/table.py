@@ -18,7 +18,7 @@ from odeform.progress import Progress
 from odeform.schema import OBJECT
 from odeform.simulation.errors import SimulationError
 
-__all__ = ["identify_drawn", "report_drawn"]
+__all__ = ["NOMINAL", "TINY", "identify_drawn", "report_drawn"]
 
 NOMINAL = 0.9
 TINY = 1e-9  # of an interval; an error of zero has no logarithm

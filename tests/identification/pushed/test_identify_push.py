@@ -1,12 +1,17 @@
+import re
+
 import numpy as np
 import pytest
 
 from odeform.errors import InputError
 from odeform.identification.pushed.drawn import drawn_states, forward_of
-from odeform.identification.pushed.experiment import Candidates, until_halved, widest
+from odeform.identification.pushed.experiment import Candidates, Experiment, until_halved, widest
+from odeform.identification.pushed.halving import report_halved
 from odeform.identification.pushed.identify import WIDENED, identifies_pushes, identify_push, model_errors
+from odeform.identification.pushed.misled import misled_drawn, report_misled
+from odeform.identification.pushed.search import PRIOR
 from odeform.identification.pushed.table import identify_drawn, report_drawn
-from odeform.identification.pushed.views import points_of
+from odeform.identification.pushed.views import CloudView, cloud_of, points_of
 from odeform.models.registry import load
 
 
@@ -27,7 +32,9 @@ def test_the_body_and_the_push_of_the_models_own_motion_are_found() -> None:
     np.testing.assert_allclose(contact, state.contact, atol=2e-3)
     assert found.misfit < 1.3
     assert found.narrowed < 1.0
-    assert set(found.proposed) == {*state.parameters()}
+    body = {"mass", "young"}
+    wanted = {p.name for p in predictor.under(found.proposed_load).schema.parameters}
+    assert set(found.proposed) == wanted | body
     with pytest.raises(InputError, match="whole push"):
         identify_push(predictor, seen, {"object": "cat", "force_x": 1.0})
 
@@ -69,11 +76,57 @@ def test_drawn_bodies_are_scored_by_how_much_wider_intervals_would_have_to_be() 
     assert f"{wider['factor_90']:.2f} times as wide" in report_drawn(wider)
 
 
-def test_the_push_that_tells_of_what_is_most_open_is_proposed() -> None:
-    # one push tells of mass, the other of friction
-    pushes = Candidates([], np.array([np.diag([100.0, 0.0, 0.0]), np.diag([0.0, 0.0, 9.0])]))
+def test_the_experiment_that_tells_of_what_is_most_open_is_proposed() -> None:
+    # the push tells of mass, the drop of friction
+    experiments = [Experiment("push", {}), Experiment("drop", {"height": 0.1})]
+    found = Candidates(experiments, np.array([np.diag([100.0, 0.0, 0.0]), np.diag([0.0, 0.0, 9.0])]))
     open_friction = np.diag([0.01, 0.01, 0.3])
-    assert pushes.best(open_friction) == 1
-    assert widest(pushes.after(open_friction, 1)) < 0.6 * widest(open_friction)
-    assert until_halved(pushes, open_friction, None) == 2
-    assert until_halved(pushes, open_friction, [0, 0, 1, 1]) == 4
+    assert found.best(open_friction) == 1
+    assert widest(found.after(open_friction, 1)) < 0.6 * widest(open_friction)
+    assert until_halved(found, open_friction) == [1, 1]
+    assert until_halved(found, open_friction, [0, 0, 1, 1]) == [0, 0, 1, 1]
+    assert [one.load for one in found.under("push").experiments] == ["push"]
+    assert len(until_halved(found.under("push"), open_friction)) == 20, "it never is"
+
+
+def test_experiments_are_counted_by_load() -> None:
+    rows = [
+        {"proposed": 1, "random": 3.0, "loads": ["drop"], "pushes": {"proposed": 2, "random": 4.0}},
+        {"proposed": 3, "random": 3.0, "loads": ["drop", "push", "drop"], "pushes": {"proposed": 4, "random": 4.0}},
+    ]
+    text = report_halved({"bodies": 2, "noise_mm": 2.0, "rows": rows})
+    assert "of all loads: proposed 2.0 on average, at most two for 50%; random 3.0 on average, 2.0 times" in text
+    assert "3 times drop, 1 times push" in text
+    assert "of pushes alone: proposed 3.0 on average, at most two for 50%; random 4.0 on average, 1.5 times" in text
+
+
+def test_how_far_experiments_lead_is_told_by_load() -> None:
+    loads = {
+        "push": {"experiments": 7, "median": 4.0, "factor_90": 13.9},
+        "drop": {"experiments": 1, "median": 2.0, "factor_90": None},
+    }
+    text = re.sub(" +", " ", report_misled({"loads": loads}))
+    assert "push 7 experiments, median 4.0; intervals 13.9 times as wide would hold nine in ten" in text
+    assert text.endswith("drop 1 experiments, median 2.0")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_one_simulated_experiment_of_each_load_is_compared_with_what_it_promised() -> None:
+    found = misled_drawn(load("contact-force"), ["flip-flop"], 1)
+    assert {row["load"] for row in found["rows"]} == {"push", "drop", "throw"}
+    for row in found["rows"]:
+        assert (np.array(row["expected"]) < PRIOR).all(), "each tells something"
+        assert np.isfinite(row["off"]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("unchecked")
+def test_a_body_in_a_cloud_is_found_where_the_push_is_known() -> None:
+    predictor = load("contact-force")
+    forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=1)[0]
+    seen = cloud_of(forward.times, forward.motions([state])[0], forward.model.rest.faces, CloudView(noise_mm=0.5))
+    push = {name: value for name, value in state.parameters().items() if name not in ("mass", "young")}
+    found = identify_push(predictor, seen, {"object": "dog", **push}, np.zeros(len(forward.times)))
+    for name, true in zip(("mass", "young"), state.body, strict=False):
+        assert abs(found.parameters[name].unit - true) < 0.1

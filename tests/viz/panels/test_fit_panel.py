@@ -228,5 +228,30 @@ def test_a_simulation_that_failed_is_told(pushed: LoopbackClient, monkeypatch: p
     assert fit.PUSH_OPEN in pushed.text()
 
 
+DROP = {"height": 0.11, "turn_x": 30.0, "turn_y": -20.0, "turn_z": 0.0, "mass": 0.06, "young": 30.0}
+
+
+def proposing(report: Report, predictor: Predictor, seen: Known, known: dict[str, Any], _: int) -> Identification:
+    """A fit after which a drop would tell most."""
+    estimates = {"mass": Identified(0.06, 0.05, 0.07, True, 0.0, 0.2)}
+    return Identification(estimates, 0.5, 9.0, DROP, narrowed=0.4, proposed_load="drop")
+
+
+def test_the_next_experiment_is_one_click_away_under_its_own_load(
+    pushed: LoopbackClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fit, "fit_push", proposing)
+    body = pushed.controls["object"].value
+    pushed.click(START)
+    assert pushed.until(lambda: "After the next drop, the widest interval" in pushed.text())
+    assert fit.NEXT.format("push") not in pushed.controls
+    pushed.click(fit.NEXT.format("drop"))
+    assert pushed.until(lambda: "height (m)" in pushed.controls)
+    assert pushed.until(lambda: pushed.controls["height (m)"].value == pytest.approx(DROP["height"]))
+    assert pushed.controls["turn y (°)"].value == pytest.approx(DROP["turn_y"])
+    assert pushed.controls["what happens"].value == "Drop it"
+    assert pushed.controls["object"].value == body
+
+
 def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
     assert not {"by", fit.KNOWN} & set(dropped[1].controls)

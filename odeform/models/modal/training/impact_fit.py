@@ -15,7 +15,7 @@ from odeform.motion.reduced_motion import moved_points, placements
 from odeform.schema import Parameters
 from odeform.types import Floats, Frames, MotionSequence, Perpoint, Times
 
-__all__ = ["FITTED", "Impact", "impact_fit", "impacts_of", "predicted"]
+__all__ = ["FITTED", "FRAMES", "Impact", "first_contact", "impact_fit", "impacts_of", "predicted"]
 
 FITTED = {
     "static_penetration": 0.01,
@@ -57,13 +57,14 @@ def impacts_of(sequences: Iterable[MotionSequence], rate: float, load: Load) -> 
     for sequence in sequences:
         known = sequence.frames(float(sequence.times[-1]), rate)
         vertices = known.vertices.astype(float)
-        first = 0 if load.held else _first_contact(vertices, load, sequence.parameters)
+        first = 0 if load.held else first_contact(vertices, load, sequence.parameters)
         found.append(Impact(sequence.parameters, known.times, vertices, sequence.weights, first))
     return found
 
 
-def _first_contact(vertices: Frames, load: Load, parameters: Parameters) -> int:
-    """The frame in which a body that flies touches something; of two, the one that stands has then begun to move."""
+def first_contact(vertices: Frames, load: Load, parameters: Parameters) -> int:
+    """The frame of a motion (T, S, 3) m in which a body that flies touches something; of two, the one that stands has
+    then begun to move. The first one, if none does."""
     first = first_body(load.scene, vertices.shape[1])
     thrown, other = vertices[:, first], vertices[:, first.stop :]
     gaps = [thrown[:, :, 2], *(one.met(thrown)[0] for one in load.obstacles(parameters))]
