@@ -4,7 +4,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from odeform.loads.registry import first_body
+from odeform.loads.registry import first_body, meets_twin
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import Floats, GaussianSplats, Mesh, Perpoint, Points, Pose
@@ -50,7 +50,9 @@ class ColumnView:
         self._server, self._geometry, self._color = server, column.geometry, color
         self.root = f"/world/column_{column.key}"
         points = np.asarray(column.geometry.points, dtype=float)
-        first = points[first_body(column.source.schema.scene, len(points))]
+        scene = column.source.schema.scene
+        self._first, self._pair = first_body(scene, len(points)), meets_twin(scene)
+        first = points[self._first]
         self._rest, self._centre = points.astype(np.float32), first.mean(axis=0)
         self._extent = float(np.ptp(points, axis=0).max())
         self._place = server.scene.add_frame(self.root, show_axes=False)
@@ -84,12 +86,14 @@ class ColumnView:
         return np.asarray(self._place.position)
 
     def centre(self, frame: ColumnFrame) -> Floats:
-        """(3,) m: where the pose takes the centre of the body."""
-        return frame.pose[:3, :3] @ self._centre + frame.pose[:3, 3]
+        """(3,) m: where the pose takes the centre of the body; of two, the middle between them."""
+        points = self._rest if frame.points is None else frame.points
+        centre = points.mean(axis=0, dtype=float) if self._pair else self._centre
+        return frame.pose[:3, :3] @ centre + frame.pose[:3, 3]
 
     def displacement(self, frame: ColumnFrame) -> Floats:
-        """(3,) m: how far the centre of the body has moved."""
-        return self.centre(frame) - self._centre
+        """(3,) m: how far the centre of the body has moved; of two, where it is, since they rest in one place."""
+        return self.centre(frame) - (0.0 if self._pair else self._centre)
 
     def hide(self) -> None:
         """Hide the column until it is shown again."""
@@ -186,7 +190,7 @@ class ColumnView:
             elif isinstance(motion, Motion):
                 alone = self._disc is None  # beside others a label would lie over the next body
                 points, scene = self.points(frame, options), motion.schema.scene
-                self._glyphs.show(scene, motion.parameters, time, points, frame.pose, labels=alone)
+                self._glyphs.show(scene, motion.parameters, time, points[self._first], frame.pose, labels=alone)
 
     def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
         """(N, 3) m: the body as it is drawn, before its pose."""
