@@ -15,6 +15,7 @@ from odeform_viz.rendering.disc import FloorDisc
 from odeform_viz.rendering.ghost import show_ghost
 from odeform_viz.rendering.glyphs import GlyphView
 from odeform_viz.rendering.look import Look
+from odeform_viz.rendering.nodes import add_place
 from odeform_viz.rendering.obstacles import ObstacleView
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.push import Pull, PushView
@@ -55,10 +56,10 @@ class ColumnView:
         first = points[self._first]
         self._rest, self._centre = points.astype(np.float32), first.mean(axis=0)
         self._extent = float(np.ptp(points, axis=0).max())
-        self._place = server.scene.add_frame(self.root, show_axes=False)
+        self._place = add_place(server, self.root)
         # what lies on the floor moves with it, past a body that is followed
-        self._ground = server.scene.add_frame(f"{self.root}/ground", show_axes=False)
-        self._body = server.scene.add_frame(f"{self.root}/body", show_axes=False)
+        self._ground = add_place(server, f"{self.root}/ground")
+        self._body = add_place(server, f"{self.root}/body")
         on_floor = column.fit is None or column.fit.static is None  # a captured scene has shadows of its own
         coarse = column.geometry if column.truth and isinstance(column.geometry, Mesh) else None
         self._refined = refined(coarse, fine) if coarse and fine else None

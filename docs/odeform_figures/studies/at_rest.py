@@ -23,7 +23,7 @@ from odeform.schema import OBJECT, Parameters
 from odeform.simulation.errors import SimulationError
 from odeform.simulation.scenes.registry import get_scene
 from odeform.stress.objects import draws_of, end_of, with_body
-from odeform.types import MotionSequence, Times
+from odeform.types import MotionSequence
 from odeform_figures.output import write_or_print
 
 __all__ = ["compare", "simulated", "speed_at"]
@@ -38,7 +38,7 @@ def simulated(scene: str, parameters: Parameters, until: float, keep: Path | Non
     path = None if keep is None else keep / f"{scene}_{parameters[OBJECT]}_{digest}.npz"
     if path is not None and path.exists():
         with np.load(path, allow_pickle=False) as file:
-            return MotionSequence(*(file[name] for name in ("times", "vertices", "faces", "weights")), dict(parameters))
+            return MotionSequence(file["times"], file["vertices"], file["faces"], file["weights"], dict(parameters))
     try:
         found = get_scene(scene).simulate(parameters, until=until)
     except SimulationError:
@@ -51,15 +51,9 @@ def simulated(scene: str, parameters: Parameters, until: float, keep: Path | Non
 
 
 def speed_at(motion: Motion | RecordedMotion, until: float) -> float:
-    """m/s: the fastest corner of the box around the body, as it moves with the pose, in the mean of the `LAST` seconds
-    before `until`."""
-    points = np.asarray(motion.geometry.points, dtype=float)
-    ends = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    corners = np.stack(np.meshgrid(*ends), axis=-1).reshape(-1, 3)
-    times: Times = np.array([until - LAST, until])
-    pose = motion.pose(times)
-    places = corners @ pose[:, :3, :3].swapaxes(1, 2) + pose[:, None, :3, 3]
-    return float(np.linalg.norm(places[1] - places[0], axis=1).max()) / LAST
+    """m/s: how fast the fastest point is in the mean of the `LAST` seconds before `until`."""
+    before, after = motion.vertices(np.array([until - LAST, until])).astype(float)
+    return float(np.linalg.norm(after - before, axis=1).max()) / LAST
 
 
 def _row(motion: Motion | RecordedMotion, until: float) -> dict[str, Any]:
