@@ -42,7 +42,7 @@ def grip_of(body: ReducedBody, clamp: Clamp) -> Grip:
     points = vertices[inside]
     chosen = spread(points, HELD, int(every[inside].argmax()))
     owner = KDTree(points[chosen]).query(points)[1]
-    stiffness = np.bincount(owner, every[inside], len(chosen))
+    stiffness = np.bincount(owner, every[inside], len(chosen)).astype(float)
     weights = every[inside] / every[inside].sum()
     stiffness = _with_moments(stiffness, points[chosen], every, vertices)
     return Grip(inside[chosen], stiffness, _loads(body, inside, points, weights))
