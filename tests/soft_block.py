@@ -69,7 +69,8 @@ def make_block() -> Block:
     solid = solid_of(points, masses, 0.004)
     shapes = modes.shapes[:, surface]
     turns = surface_turns(points[surface], number[faces], shapes.transpose(1, 2, 0))
-    body = reduce_body(points[surface] - centre, number[faces], shapes, turns, modes.eigenvalues, solid)
+    fractions = masses[surface] / masses[surface].sum()
+    body = reduce_body(points[surface] - centre, number[faces], shapes, turns, modes.eigenvalues, solid, fractions)
     return Block(points, elements, masses, modes, body)
 
 

@@ -72,7 +72,9 @@ class ReducedBody:
     support: Samples
     """Samples that may be in contact with the floor."""
     surface: Samples
-    """Samples at which something may push it."""
+    """Samples at which something may push it: its V vertices, and then the middles of its faces."""
+    fractions: Perpoint
+    """(V,) of the mass, which each of its vertices stands for: inner nodes count for the nearest one."""
 
     def changed(self, mass: float, stiffness: float) -> "ReducedBody":
         """Returns the same body with so many times the mass and the stiffness. Its modes keep their shapes."""
@@ -114,11 +116,14 @@ def reduce_body(
     modal_rotations: Float[np.ndarray, "points 3 modes"],
     eigenvalues: Floats,
     solid: Solid,
+    fractions: Perpoint,
     support: int = SUPPORT,
 ) -> ReducedBody:
     """Makes the body from its surface (N, 3) m relative to the mass centre, the modes there in m per root kilogram, how
-    they turn it (`surface_turns`), and the rest. `support` points spread over all of it, and some more below it, may
-    touch the floor."""
+    they turn it (`surface_turns`), and the rest; `fractions` (N,) as of `ReducedBody`.
+
+    `support` points spread over all of it, and some more below it, may touch the floor.
+    """
     corners = surface[faces]
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     around = np.bincount(faces.ravel(), np.repeat(areas / 6.0, 3), len(surface))
@@ -132,7 +137,7 @@ def reduce_body(
         np.concatenate([rows, rows[:, faces].mean(axis=2)], axis=1, dtype=np.float32),
         np.concatenate([around, areas]),
     )
-    return ReducedBody(solid, eigenvalues, _support(surface, rows, solid.mass, support), everywhere)
+    return ReducedBody(solid, eigenvalues, _support(surface, rows, solid.mass, support), everywhere, fractions)
 
 
 def _support(points: Points, rows: Floats, mass: float, count: int) -> Samples:

@@ -26,7 +26,7 @@ class Grip:
     """What of a body's surface is held."""
 
     samples: Ints
-    """(H,) samples of the surface of the body."""
+    """(H,) vertices of the body."""
     stiffness: Float[np.ndarray, " held"]
     """(H,) N/m of each, along each axis."""
     loads: Float[np.ndarray, "modes loads"]
@@ -34,16 +34,40 @@ class Grip:
 
 
 def grip_of(body: ReducedBody, clamp: Clamp) -> Grip:
-    """The samples of a body's surface that stand for those that a clamp holds."""
-    surface, mass = body.surface, body.solid.mass
-    every = clamp.stiffness(surface.points, surface.masses, mass)
+    """The vertices of a body that stand for those that a clamp holds: as stiff as these together against every shift
+    and turn of the body."""
+    vertices = body.surface.points[: len(body.fractions)]
+    every = clamp.stiffness(vertices, body.fractions, body.solid.mass)
     inside = np.flatnonzero(every > LEAST * every.max())
-    points = surface.points[inside]
+    points = vertices[inside]
     chosen = spread(points, HELD, int(every[inside].argmax()))
     owner = KDTree(points[chosen]).query(points)[1]
-    stiffness = np.bincount(owner, every[inside], len(chosen))
+    stiffness = np.bincount(owner, every[inside], len(chosen)).astype(float)
     weights = every[inside] / every[inside].sum()
-    return Grip(inside[chosen], stiffness * (every.sum() / stiffness.sum()), _loads(body, inside, points, weights))
+    stiffness = _with_moments(stiffness, points[chosen], every, vertices)
+    return Grip(inside[chosen], stiffness, _loads(body, inside, points, weights))
+
+
+def _with_moments(
+    few: Floats, places: Float[np.ndarray, "held 3"], every: Floats, points: Float[np.ndarray, "all 3"]
+) -> Floats:
+    """Stiffnesses (H,) at `places` (H, 3) m near `few` (H,) whose sum, and first and second moments, are those of
+    `every` (N,) at `points` (N, 3) m. Samples stand for what is around them, and by themselves they would turn more
+    easily. Where that takes springs that push away, these are left out."""
+    middle = every @ points / every.sum()
+    size = float(np.ptp(places, axis=0).max()) or 1.0
+    wanted = _moments((points - middle) / size).T @ every
+    terms = _moments((places - middle) / size)
+    # the smallest changes, relative to the stiffness of each
+    changes = np.linalg.pinv(terms.T @ (few[:, None] * terms)) @ (wanted - terms.T @ few)
+    out = np.maximum(few * (1.0 + terms @ changes), 0.0)
+    return out * (every.sum() / out.sum())
+
+
+def _moments(places: Points) -> Float[np.ndarray, "points terms"]:
+    """(N, 10): one, the coordinates, and their products."""
+    first, second = np.triu_indices(3)
+    return np.column_stack([np.ones(len(places)), places, places[:, first] * places[:, second]])
 
 
 def _loads(body: ReducedBody, inside: Ints, points: Points, weights: Floats) -> Floats:

@@ -6,6 +6,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from odeform.motion.base import Motion
+    from odeform.motion.recorded import RecordedMotion
 
 __all__ = ["rests_from"]
 
@@ -13,7 +14,7 @@ STILL = 1e-3  # m that a body may still move
 STEP, LAST = 0.01, 0.05  # s between the times that are looked at; and at the end, in which a body cannot come to rest
 
 
-def rests_from(motion: "Motion", until: float) -> float | None:
+def rests_from(motion: "Motion | RecordedMotion", until: float) -> float | None:
     """Seconds from which on the box around the body moves by less than a millimetre, and its RMS deformation changes by
     less, to within 10 ms; None where it still moves just before `until` seconds.
 

@@ -19,7 +19,7 @@ from odeform.models.per_object import PerObject
 from odeform.motion.base import Motion
 from odeform.motion.rest import rests_from
 from odeform.parallel import parallel_map
-from odeform.schema import OBJECT, Parameters, Schema
+from odeform.schema import OBJECT, Parameters, Schema, Window
 from odeform.simulation.objects.soft_object import SoftObject
 from odeform.simulation.scenes.registry import find_scene
 from odeform.simulation.scenes.user_object import scene_with
@@ -27,7 +27,7 @@ from odeform.stress.check import Check
 from odeform.stress.energy import energy_gained
 from odeform.types import Frames, Points, Times
 
-__all__ = ["BEYOND", "Watched", "draws_of", "stress_objects", "watch"]
+__all__ = ["BEYOND", "Watched", "draws_of", "end_of", "stress_objects", "watch", "with_body"]
 
 BEYOND = 1.25  # times the trained forces, at most
 PATIENCE = 10.0  # s
@@ -70,22 +70,32 @@ def draws_of(schema: Schema, count: int, seed: int, item: SoftObject | None = No
     return out
 
 
+def with_body(model: PerObject, index: int, push: Parameters) -> dict[str, Any]:
+    """The draw number `index` with a mass and a stiffness from the ranges of its object."""
+    rng, own = np.random.default_rng(index), model.parts[push[OBJECT]].schema.parameters
+    return {**push, **{p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in own if p.role == "body"}}
+
+
+def end_of(window: Window) -> float:
+    """Seconds until which a model knows a motion."""
+    return window.start + (1.0 + window.reach) * (window.stop - window.start)
+
+
 def watch(model: PerObject, draw: tuple[int, Parameters]) -> Watched:
     """Solve one push, with a mass and a stiffness drawn from the ranges of its object, and look at all of its
     frames."""
     index, push = draw
-    part, rng, begin = model.parts[push[OBJECT]], np.random.default_rng(index), time.perf_counter()
-    body = {p.name: p.denormalise(rng.uniform(-1.0, 1.0)) for p in part.schema.parameters if p.role == "body"}
+    part, parameters, begin = model.parts[push[OBJECT]], with_body(model, index, push), time.perf_counter()
     try:
-        motion = model.solve(parameters={**push, **body})
+        motion = model.solve(parameters=parameters)
         window = motion.schema.window
-        end = window.start + (1.0 + window.reach) * (window.stop - window.start)
+        end = end_of(window)
         times = np.arange(0.0, end, 1.0 / window.rate)
         frames = motion.vertices(times)
         stops = [motion.stop_at(float(moment)) for moment in times]
         held = sum(stop is not None and not stop.limited for stop in stops) / len(times)
         rests = window.reach == 0.0 or rests_from(motion, end) is not None
-        status, begun = motion.stats.status, _start_off(model, {**push, **body}, frames[0])
+        status, begun = motion.stats.status, _start_off(model, parameters, frames[0])
         gained = _gained(part, motion, times)
     except InputError:
         return Watched("refused", 0, 0.0, 0.0, 0.0, True, time.perf_counter() - begin)

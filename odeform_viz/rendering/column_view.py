@@ -4,7 +4,7 @@ import numpy as np
 import viser
 import viser.transforms as vtf
 
-from odeform.loads.registry import first_body
+from odeform.loads.registry import first_body, meets_twin
 from odeform.motion.base import Motion
 from odeform.motion.recorded import RecordedMotion
 from odeform.types import Floats, GaussianSplats, Mesh, Perpoint, Points, Pose
@@ -15,6 +15,7 @@ from odeform_viz.rendering.disc import FloorDisc
 from odeform_viz.rendering.ghost import show_ghost
 from odeform_viz.rendering.glyphs import GlyphView
 from odeform_viz.rendering.look import Look
+from odeform_viz.rendering.nodes import add_place
 from odeform_viz.rendering.obstacles import ObstacleView
 from odeform_viz.rendering.path import show_path
 from odeform_viz.rendering.push import Pull, PushView
@@ -50,13 +51,15 @@ class ColumnView:
         self._server, self._geometry, self._color = server, column.geometry, color
         self.root = f"/world/column_{column.key}"
         points = np.asarray(column.geometry.points, dtype=float)
-        first = points[first_body(column.source.schema.scene, len(points))]
+        scene = column.source.schema.scene
+        self._first, self._pair = first_body(scene, len(points)), meets_twin(scene)
+        first = points[self._first]
         self._rest, self._centre = points.astype(np.float32), first.mean(axis=0)
         self._extent = float(np.ptp(points, axis=0).max())
-        self._place = server.scene.add_frame(self.root, show_axes=False)
+        self._place = add_place(server, self.root)
         # what lies on the floor moves with it, past a body that is followed
-        self._ground = server.scene.add_frame(f"{self.root}/ground", show_axes=False)
-        self._body = server.scene.add_frame(f"{self.root}/body", show_axes=False)
+        self._ground = add_place(server, f"{self.root}/ground")
+        self._body = add_place(server, f"{self.root}/body")
         on_floor = column.fit is None or column.fit.static is None  # a captured scene has shadows of its own
         coarse = column.geometry if column.truth and isinstance(column.geometry, Mesh) else None
         self._refined = refined(coarse, fine) if coarse and fine else None
@@ -84,12 +87,14 @@ class ColumnView:
         return np.asarray(self._place.position)
 
     def centre(self, frame: ColumnFrame) -> Floats:
-        """(3,) m: where the pose takes the centre of the body."""
-        return frame.pose[:3, :3] @ self._centre + frame.pose[:3, 3]
+        """(3,) m: where the pose takes the centre of the body; of two, the middle between them."""
+        points = self._rest if frame.points is None else frame.points
+        centre = points.mean(axis=0, dtype=float) if self._pair else self._centre
+        return frame.pose[:3, :3] @ centre + frame.pose[:3, 3]
 
     def displacement(self, frame: ColumnFrame) -> Floats:
-        """(3,) m: how far the centre of the body has moved."""
-        return self.centre(frame) - self._centre
+        """(3,) m: how far the centre of the body has moved; of two, where it is, since they rest in one place."""
+        return self.centre(frame) - (0.0 if self._pair else self._centre)
 
     def hide(self) -> None:
         """Hide the column until it is shown again."""
@@ -186,7 +191,7 @@ class ColumnView:
             elif isinstance(motion, Motion):
                 alone = self._disc is None  # beside others a label would lie over the next body
                 points, scene = self.points(frame, options), motion.schema.scene
-                self._glyphs.show(scene, motion.parameters, time, points, frame.pose, labels=alone)
+                self._glyphs.show(scene, motion.parameters, time, points[self._first], frame.pose, labels=alone)
 
     def points(self, frame: ColumnFrame, options: DisplayOptions) -> Points:
         """(N, 3) m: the body as it is drawn, before its pose."""

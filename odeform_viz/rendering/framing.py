@@ -137,15 +137,17 @@ def frame_columns(
     together: bool,
     level: bool,
     noted: bool = False,
+    reach: float = 0.0,
 ) -> Framing:
     """Place `count` bodies of `extent` m, each of which covers `body`, for a browser of size `viewport`.
 
     `together` puts all in one place; `level` keeps several on one floor, in one row; see `free_area` for `noted`.
+    What moves on a floor of its own gets `reach` m away from the middle of it, at most.
     """
     left, top, right, bottom = free_area(viewport, noted)
     places = 1 if together else count
     alone = places == 1
-    stage = STAGE * extent
+    stage = max(STAGE * extent, reach)
     box = body if alone else body.around(stage, axes)
     wide, tall, strip = box.right - box.left, box.high - box.low, 0 if alone else TITLE
     free = FILL[alone] * np.array([right - left, bottom - top])

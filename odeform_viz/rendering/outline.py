@@ -7,16 +7,18 @@ import numpy as np
 from odeform.loads.registry import first_body, load_of_scene, meets_twin
 from odeform.motion.base import Motion
 from odeform.simulation.scenes.registry import find_scene
-from odeform.types import Floats, Points, Pose, Vector
+from odeform.types import Floats, Frames, Points, Pose, Vector
 from odeform_viz.obstacles import obstacles_of
 from odeform_viz.pushing import push_shown
 from odeform_viz.rendering.framing import Axes, Box
-from odeform_viz.view import ColumnFrame
+from odeform_viz.view import ColumnFrame, played_until
 
-__all__ = ["RISE", "ceiling_of", "direction_of", "outline_of"]
+__all__ = ["RISE", "ceiling_of", "direction_of", "outline_of", "reach_of"]
 
 MOMENTS = 60  # of a motion that are looked at
 POINTS = 200  # of a body
+FEW = 9  # moments of two bodies, of which each takes as long as many of one
+ROOM = 1.05  # around what these moments show
 AWAY = 5.0  # heights of a box alone, from which the camera looks at it
 LABEL = 0.13  # of a body's size: the handle at an arrow's tail, and the label above it
 AROUND = np.array([[0.0, 0.0, 1.0], [0.7, 0.0, 0.0], [-0.7, 0.0, 0.0], [0.0, 0.7, 0.0], [0.0, -0.7, 0.0]])
@@ -43,6 +45,8 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
     Where it goes along the floor counts if it `travels` through the view, and not if the view follows it, as it does
     where the centre is more than `most` m above its lowest.
     """
+    if meets_twin(shown.motion.schema.scene) and not travels:
+        return _seen(_beside_each_other(shown).reshape(-1, 3), axes)
     poses = _poses(shown)
     points = _points(shown)
     points = points[:: max(len(points) // POINTS, 1)]
@@ -62,6 +66,22 @@ def outline_of(shown: ColumnFrame, axes: Axes, travels: bool, most: float = math
     if meets_twin(shown.motion.schema.scene):
         parts.append(_twin(shown))
     return _seen(np.concatenate(parts), axes)
+
+
+def reach_of(shown: ColumnFrame) -> float:
+    """How far two bodies get from the middle between them along the floor, in m; 0 for one, below which the floor
+    passes."""
+    if not meets_twin(shown.motion.schema.scene):
+        return 0.0
+    return ROOM * float(np.hypot(*np.moveaxis(_beside_each_other(shown)[..., :2], -1, 0)).max())
+
+
+def _beside_each_other(shown: ColumnFrame) -> Frames:
+    """(T, N, 3) m: two bodies over what is played, seen from above the middle between them."""
+    window = shown.motion.schema.window
+    frames = shown.motion.vertices(np.linspace(window.start, played_until(window), FEW)).astype(float)
+    frames[..., :2] -= frames[..., :2].mean(axis=1, keepdims=True)
+    return frames
 
 
 def _seen(corners: Points, axes: Axes) -> Box:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import viser
@@ -18,7 +19,7 @@ from odeform_viz.rendering.column_view import ColumnView
 from odeform_viz.rendering.framing import Axes, Box, Framing, Viewport, frame_columns
 from odeform_viz.rendering.lights import Lights
 from odeform_viz.rendering.look import Colors, Look
-from odeform_viz.rendering.outline import RISE, ceiling_of, direction_of, outline_of
+from odeform_viz.rendering.outline import RISE, ceiling_of, direction_of, outline_of, reach_of
 from odeform_viz.rendering.push import Pull
 from odeform_viz.rendering.stage import Stage
 from odeform_viz.rendering.titles import title_of
@@ -54,6 +55,7 @@ class SceneView:
         if pick is not None:
             server.scene.on_click()(self._clicked)  # pyright: ignore[reportArgumentType]
         self._framed: object = None  # what the framing was made for
+        self._reaches: WeakKeyDictionary[object, float] = WeakKeyDictionary()  # of motions, in m
         self._ceiling = 0.0  # m above the floor up to which the centres of bodies rise in it
         start = Box(-extent, extent, 0.0, extent)
         self._framing = frame_columns(1, Axes.beside(None), start, extent, self.viewport, together=True, level=False)
@@ -132,22 +134,29 @@ class SceneView:
         self._pick(column, point)
 
     def _frame_columns(self, frame: Frame, row: list[int], options: DisplayOptions, together: bool) -> Framing:
-        """Places the columns. The cameras are aimed only when that changes, or the body does."""
+        """Places the columns. The cameras are aimed only when that changes, or the body does, or where two bodies would
+        leave their floor."""
         shapes = [id(shown.column.geometry) for shown in frame.columns]
         noted = any(shown.untrained for shown in frame.columns)
         reasons = (row, shapes, together, options.viewport, frame.still is None, options.follow, noted)
-        if frame.columns and self._framed != reasons:
+        reach = 0.0 if together else max(map(self._reach, frame.columns), default=0.0)
+        if frame.columns and (self._framed != reasons or reach > self._framing.stage):
             axes = Axes.beside(direction_of(frame.columns[0]))
             extent, level = max(map(self._size, frame.columns)), frame.still is not None
             travels = together and meets_something(frame.columns[0].motion)
             most = RISE * extent if together and options.follow and not (travels or level) else math.inf
             box = _around([outline_of(c, axes, travels, most) for c in frame.columns])
-            self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level, noted)
+            self._framing = frame_columns(len(row), axes, box, extent, options.viewport, together, level, noted, reach)
             self._ceiling = max(ceiling_of(c, most) for c in frame.columns)
             self._cameras.aim(self._framing)
             self._lights.aim(self._framing, everywhere=level)
             self._framed = reasons  # last: a request cancelled on the way is framed anew
         return self._framing
+
+    def _reach(self, shown: ColumnFrame) -> float:
+        if shown.motion not in self._reaches:
+            self._reaches[shown.motion] = reach_of(shown)
+        return self._reaches[shown.motion]
 
     def _size(self, shown: ColumnFrame) -> float:
         """Metres: that of the trained body, or in scenes with several of the one that is shown."""

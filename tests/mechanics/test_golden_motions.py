@@ -59,7 +59,7 @@ def reduced(name: str) -> ReducedBody:
     points, shapes = item.settled[surface] - masses @ item.settled / masses.sum(), modes.shapes[:, surface]
     turns = surface_turns(points, item.faces, shapes.transpose(1, 2, 0))
     solid = solid_of(item.settled, masses, material.damping)
-    return reduce_body(points, item.faces, shapes, turns, modes.eigenvalues, solid)
+    return reduce_body(points, item.faces, shapes, turns, modes.eigenvalues, solid, item.weights)
 
 
 def pushed(name: str) -> Floats:

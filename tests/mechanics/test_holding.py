@@ -12,7 +12,8 @@ from test_loads import FINE, TILTED, flier, solved
 from odeform.compiling import compiles
 from odeform.loads.situation import Clamp, Flight, Situation
 from odeform.mechanics.flat import body_motion, parts_of, unpacked
-from odeform.mechanics.holding import Hold
+from odeform.mechanics.holding import Hold, grip_of
+from odeform.mechanics.rotations import skew
 from odeform.models.modal.loaded import Beginning, LoadedBody
 from odeform.surroundings import GRAVITY
 from odeform.types import Floats, Rotations
@@ -23,7 +24,8 @@ SINK, DAMPING = 5e-4, 2e-3
 def held(block: Block, place: Floats, turn: Rotations = TILTED, radius: float = 0.03) -> tuple[LoadedBody, Beginning]:
     """A block high in the air, held around the vertex that is nearest to a place, from its middle."""
     body = flier(block)
-    vertex = int(((body.mechanics.body.surface.points - place) ** 2).sum(axis=1).argmin())
+    known = body.mechanics.body
+    vertex = int(((known.surface.points[: len(known.fractions)] - place) ** 2).sum(axis=1).argmin())
     return body, body.begin([Situation(Flight(0.5, turn), clamp=Clamp(vertex, radius, SINK, DAMPING))])
 
 
@@ -70,6 +72,26 @@ def test_a_body_that_is_held_from_above_hangs_lower_by_what_its_springs_give_way
     sunk = hold.places[0, :, 2] - hold.begun(last).places[0, :, 2]
     weights = hold.stiffness[0] / hold.stiffness.sum()
     np.testing.assert_allclose(weights @ sunk, SINK, rtol=1e-2)
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.05])
+def test_a_patch_is_as_stiff_against_turns_as_all_of_the_vertices_that_it_stands_for(
+    block: Block, radius: float
+) -> None:
+    known = flier(block).mechanics.body
+    clamp = Clamp(3, radius, SINK, DAMPING)
+    grip = grip_of(known, clamp)
+    vertices = known.surface.points[: len(known.fractions)]
+    every = clamp.stiffness(vertices, known.fractions, known.solid.mass)
+    assert len(grip.samples) < np.count_nonzero(every > 1e-3 * every.max())
+    assert grip.stiffness.min() >= 0.0
+
+    def tensor(stiffness: Floats, points: Floats) -> Floats:
+        rows = np.concatenate([np.broadcast_to(np.eye(3), (len(points), 3, 3)), skew(-points)], axis=2)
+        return np.einsum("n,nia,nib->ab", stiffness, rows, rows)
+
+    wanted = tensor(every, vertices)
+    np.testing.assert_allclose(tensor(grip.stiffness, vertices[grip.samples]), wanted, atol=1e-3 * np.abs(wanted).max())
 
 
 def test_what_is_not_held_falls_and_what_is_held_stays(block: Block) -> None:

@@ -1,5 +1,7 @@
 """What mechanics has to obey whatever its numbers are: conservation, Coulomb's law of friction, weight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -202,12 +204,7 @@ def test_springs_balance_a_body_that_leans(block: Block) -> None:
     """Without equal springs on both sides, the floor tilts until weight and torque are balanced."""
     support = block.body.support
     uneven = support.masses * (1.0 + 8.0 * support.points[:, 0])
-    body = type(block.body)(
-        block.body.solid,
-        block.body.eigenvalues,
-        type(support)(support.points, support.rows, uneven),
-        block.body.surface,
-    )
+    body = replace(block.body, support=replace(support, masses=uneven))
     floor = stand(body, ContactParameters())
     force = floor.stiffness * np.maximum(-(support.points[:, 2] + floor.level), 0.0)
     weight = body.solid.mass * GRAVITY

@@ -54,6 +54,7 @@ class ElasticBody:
                 self.modal_rotations,
                 self.eigenvalues,
                 self.solid,
+                self.weights.astype(float),
                 support,
             )
         return self._reduced[support]
