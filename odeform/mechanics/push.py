@@ -17,6 +17,7 @@ __all__ = ["WIDTHS", "Patch", "Push", "held", "kicked", "make_push", "no_push"]
 NEAR = 300  # samples around the contact that the projectile may touch
 WIDTHS = (0.006, 0.015)  # m, of the patches whose loads shape the local deformations
 LOADED, REACH = 1000, 3.0  # samples that patches may load at most, up to so many times the largest width away
+LEAST = 1e-6  # of the largest weight of a vertex in the patch of a pulse, below which it is left out
 LONGEST = 0.25  # of a pulse, a step while it acts
 PARTS = ("modes", "eigenvalues", "points", "rows", "masses", "centres", "guides", "forces")  # of each push
 
@@ -131,12 +132,13 @@ def no_push(body: ReducedBody, soft: int) -> Push:
 def kicked(body: ReducedBody, soft: int, middle: Vector, pulse: Pulse) -> Push:
     """A body that a pulse acts on around a point (3,) m, relative to its mass centre. The `soft` softest modes are
     among the directions of deformation."""
-    around = body.near(middle[None], LOADED)
-    modes, eigenvalues = _directions(body, soft, middle[None], around)
-    surface, near = body.surface, around[0]
-    weights = pulse.weights(surface.points[near], surface.masses[near], middle)
-    rows = np.stack([weights @ row.take(near, axis=0) for row in surface.rows]) @ modes[0]
-    patch = Patch((weights @ surface.points[near])[None], rows[None], pulse.force[None], pulse.duration)
+    modes, eigenvalues = _directions(body, soft, middle[None], body.near(middle[None], LOADED))
+    surface, vertices = body.surface, body.surface.points[: len(body.fractions)]
+    weights = pulse.weights(vertices, body.fractions, middle)
+    patched = np.flatnonzero(weights > LEAST * weights.max())
+    weights = weights[patched] / weights[patched].sum()
+    rows = np.stack([weights @ row.take(patched, axis=0) for row in surface.rows]) @ modes[0]
+    patch = Patch((weights @ vertices[patched])[None], rows[None], pulse.force[None], pulse.duration)
     return replace(_without_sphere(body, modes, eigenvalues, soft), patch=patch)
 
 
