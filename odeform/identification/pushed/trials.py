@@ -66,7 +66,7 @@ class Pushes:
         self.times, self.errors_mm = (np.tile(row, (len(self._states), 1)) for row in (forward.times, errors_mm))
 
     def surfaces(self, body: Floats) -> Surfaces:
-        """See `Trials`."""
+        """(E, T, S, 3) m of a body (3,): see `Trials`."""
         return self._forward.motions([replace(state, body=body) for state in self._states])
 
 
@@ -100,7 +100,7 @@ class Falls:
         self.errors_mm = self._errors_mm(self._base)
 
     def surfaces(self, body: Floats) -> Surfaces:
-        """See `Trials`."""
+        """(E, T, S, 3) m of a body (3,): see `Trials`."""
         return self._base if np.array_equal(body, self._body) else self._observed(self._solved(body))
 
     def _errors_mm(self, moved: Surfaces) -> Float[np.ndarray, "experiments times"]:
