@@ -26,8 +26,8 @@ LABEL = "fit"
 CORRECTIONS = 3  # simulations; more of them tell little
 NEXT = "Set sliders to the next {}"
 NEXT_HINT = (
-    "what would tell most of what is least known of the body; a drop or a throw is on a page of its own, and no fit "
-    "reads it yet"
+    "what would tell most of what is least known of the body; a drop or a throw changes what happens (Explore leads "
+    "back to the push), and cannot be fitted yet"
 )
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."

@@ -159,7 +159,7 @@ class ModalModel(Model):
             self._largest = float("inf"), max(self._largest[1], ROOM * size)
             self._flat_on = self._flat_below(self.rest)
         self._read_settings(config)
-        lands = self._flies and self.load is not None and not self.load.held
+        lands = self.load is not None and self.load.flies and not self.load.held
         self.qualities = self.qualities or (LANDING if lands else QUALITIES)
         if "correction" in config:
             self.residual = contact_residual(checkpoint.arrays, config["correction"])
