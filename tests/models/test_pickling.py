@@ -68,9 +68,11 @@ def test_a_motion_is_pickled_with_its_geometry_settings_and_end(kick: Predictor)
 
 
 def test_a_pickle_holds_no_caches(kick: Predictor) -> None:
-    fresh, used = load("kick"), load("kick")
-    used.solve_batch({"mass": np.array([0.5, 0.6])}).vertices(0.1)
-    assert len(pickle.dumps(used)) < len(pickle.dumps(fresh)) + 100
+    predictor = load("kick")
+    fresh = len(pickle.dumps(predictor))
+    predictor.solve_batch({"mass": np.array([0.5, 0.6])}).vertices(0.1)
+    # a list of names is kept, and which strings are shared differs; the least array of a motion is larger
+    assert len(pickle.dumps(predictor)) < fresh + 1_000
 
 
 @pytest.mark.slow
