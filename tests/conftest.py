@@ -5,7 +5,6 @@ import math
 import os
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -67,19 +66,35 @@ def _coarsen(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(kick_scene, "SCENE", replace(scene, simulate=simulate, step=2e-3, resolutions=(4,)))
 
 
-@contextmanager
-def _unchecked() -> Iterator[None]:
-    """Shapes and types are not checked at run time, which takes longer than the ODE does where one is solved over and
-    over. Shorter tests of the same functions check them."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jaxtyping.config, "jaxtyping_disable", True)
-        yield
+FIRST, EVERY = 2_000, 101
+"""So many calls of a test have their shapes and types checked, and then one in so many. A check takes longer than a
+step of an ODE: with all of them, the tests of mechanics took twice as long."""
+
+
+class _Sparing(type(jaxtyping.config)):
+    """A configuration that is asked at each call whether it goes unchecked."""
+
+    calls, never = 0, False
+
+    @property
+    def jaxtyping_disable(self) -> bool:
+        self.calls += 1
+        return self.never or (self.calls > FIRST and self.calls % EVERY > 0)
+
+
+jaxtyping.config.__class__ = _Sparing
+
+
+@pytest.fixture(autouse=True)
+def checked_sparingly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each test begins to count its calls."""
+    monkeypatch.setattr(jaxtyping.config, "calls", 0)
 
 
 @pytest.fixture
-def unchecked() -> Iterator[None]:
-    with _unchecked():
-        yield
+def unchecked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As outside of tests: annotations refuse nothing."""
+    monkeypatch.setattr(jaxtyping.config, "never", True)
 
 
 @pytest.fixture
@@ -113,7 +128,7 @@ def dataset(made_once: MadeOnce) -> Dataset:
     """Coarse kicks: really simulated, with fewer vertices and a larger step than the scene's own."""
 
     def simulate(folder: Path) -> None:
-        with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"), _unchecked():
+        with pytest.MonkeyPatch.context() as patch, parallel_config(backend="threading"):
             _coarsen(patch)
             runner.simulate("kick", folder, count=21, seed=3, workers=2, ranges=RANGES)
 
@@ -128,7 +143,7 @@ def trained(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
     def fit(folder: Path) -> None:
         few = functools.partial(config.TrainConfig, random_features=200, sharpnesses=(1.0,))
         folder.mkdir()
-        with pytest.MonkeyPatch.context() as patch, _unchecked():
+        with pytest.MonkeyPatch.context() as patch:
             patch.setattr(config, "TrainConfig", few)
             for model in models:
                 path = folder / f"{model}.safetensors"
@@ -153,7 +168,7 @@ def point_models(dataset: Dataset, made_once: MadeOnce) -> dict[str, Path]:
 
     def fit(folder: Path) -> None:
         folder.mkdir()
-        with pytest.MonkeyPatch.context() as patch, _unchecked():
+        with pytest.MonkeyPatch.context() as patch:
             for name, model in POINT_MODELS.items():
                 patch.setattr(model.network, "trials", (Trial(1e-2, 24), Trial(3e-3, 24)), raising=False)
                 patch.setattr(model.network, "work", 256, raising=False)

@@ -249,7 +249,6 @@ def test_simulate_other_ranges(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "holds another data set" in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_pack(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "kick.odp"
     assert run("pack", dataset.root, "--out", out, "--tolerance", 0.1) == 0
@@ -264,7 +263,6 @@ def test_pack(dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert 0.01 < largest <= 0.1
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_a_packed_data_set_serves_as_its_folder(
     trained: dict[str, Path], dataset: Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -38,7 +38,7 @@ def small(monkeypatch: pytest.MonkeyPatch, trained: dict[str, Path]) -> None:
         monkeypatch.setattr(module, name, value)
 
 
-@pytest.mark.usefixtures("small", "unchecked")
+@pytest.mark.usefixtures("small")
 def test_bench(
     trained: dict[str, Path],
     dataset: Dataset,

@@ -43,7 +43,6 @@ CASES = {"kick/gp": (0.4, -0.7, 0.3, 0.8), "mass-elastic": (-0.35, 0.6)}
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 @pytest.mark.parametrize("name", CASES)
 def test_recovers_the_parameters_of_a_prediction(name: str) -> None:
     predictor, theta = load(name), np.array(CASES[name])
@@ -55,7 +54,6 @@ def test_recovers_the_parameters_of_a_prediction(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_recovers_those_of_a_motion_with_landings_within_its_intervals() -> None:
     """Its later frames are no smooth function of the parameters: they count as much as the model knows them."""
     predictor, theta = load("kick"), np.array([0.4, -0.7, 0.3, 0.8])
@@ -66,7 +64,6 @@ def test_recovers_those_of_a_motion_with_landings_within_its_intervals() -> None
     assert all(one.low <= value <= one.high for one, value in zip(found.parameters.values(), true, strict=True))
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_finds_a_corner_of_the_trained_box_step_by_step() -> None:
     predictor, theta = load("mass-elastic"), np.array([-1.0, 1.0])
     steps: list[dict[str, float]] = []
@@ -117,7 +114,6 @@ def test_can_be_cancelled() -> None:
         identify(predictor, view, certain(predictor), cancel)
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_few_noisy_points_give_wider_intervals_that_contain_the_truth() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
     clean = observed(predictor, theta, predictor.schema.window.times[2:90:3], points=5)
@@ -130,7 +126,6 @@ def test_few_noisy_points_give_wider_intervals_that_contain_the_truth() -> None:
         assert other.identifiable
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_the_expected_model_error_is_subtracted() -> None:
     predictor, theta = load("mass-elastic"), np.array([0.3, -0.4])
     whole = certain(predictor)
@@ -157,7 +152,6 @@ def test_free_flight_identifies_nothing() -> None:
         assert one.high <= 1.001 * parameter.high
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_unexplained_observations_widen_the_intervals() -> None:
     predictor, theta = load("mass-elastic"), np.array(CASES["mass-elastic"])
     view = observed(predictor, theta, predictor.schema.window.times[1:60:4], points=8)

@@ -36,7 +36,6 @@ def test_correlated_errors_carry_less_information(few: Dataset) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_the_command(
     few: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

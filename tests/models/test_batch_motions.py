@@ -16,7 +16,6 @@ from odeform.motion.motion_batch import MotionBatch
 from odeform.simulation.scenes.registry import find_scene
 from odeform.solver.integrate import SolverSettings
 
-pytestmark = pytest.mark.usefixtures("unchecked")
 SAME = 1e-6  # m
 FAMILIES = ["kick", "mass-elastic", "mass-elastic/odeform-rolling", "contact-force"]
 

@@ -10,7 +10,6 @@ import odeform
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 
-pytestmark = pytest.mark.usefixtures("unchecked")  # many solutions in double precision
 SLOW = ("kick", "mass-elastic/odeform-rolling", "mass-elastic/direct")
 CASES = {
     "mass-elastic": ({"mass": 0.25, "bending": 1.3}, 1e-5),

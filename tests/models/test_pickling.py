@@ -19,7 +19,6 @@ from odeform.simulation.objects.catalog import get_object
 from odeform.types import MotionSequence, PointCloud
 from tests.threads import THREADS, all_at_once
 
-pytestmark = pytest.mark.usefixtures("unchecked")
 TIMES = np.array([0.0, 0.02, 0.31])
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import jaxtyping
 import numpy as np
 import pytest
 
@@ -123,6 +122,7 @@ def test_an_unexpected_error_ends_one_sequence_and_is_tried_again(
     assert len(open_dataset(tmp_path).select("all")) == 3
 
 
+@pytest.mark.usefixtures("unchecked")
 def test_output_that_is_not_a_motion_fails_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -145,7 +145,6 @@ def test_output_that_is_not_a_motion_fails_with_the_reason(
         return SimpleNamespace(**{**sound, "weights": np.full(4, 0.25), **left.pop(0)})
 
     monkeypatch.setattr(kick, "SCENE", replace(kick.SCENE, simulate=faulty))
-    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)  # as outside of tests
     assert main(["simulate", "kick", "--out", str(tmp_path), "--count", str(len(defects)), "--workers", "1"]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == f"0 sequences in {tmp_path}; failed: {len(defects)}"

@@ -81,7 +81,7 @@ def test_bounds() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("_short", "unchecked")
+@pytest.mark.usefixtures("_short")
 @pytest.mark.parametrize("name", ["odeform", "pod-rbf"])
 def test_short_run(trained: dict[str, Path], tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     out, cases = tmp_path / "stress.json", 30
@@ -229,7 +229,6 @@ def test_spin_is_energy() -> None:
     assert energy_gained(times, poses, points, shares) == pytest.approx(3.0 / potential - 1.0, abs=0.01)
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_a_map_without_time_is_the_coarsest_and_the_same(model: LatentModel) -> None:
     fractions: list[float] = []
     found = refined_map(model, 0.0, scale=1.0, moments=(0.5, 1.0), report=fractions.append)
@@ -243,7 +242,6 @@ def test_a_map_without_time_is_the_coarsest_and_the_same(model: LatentModel) -> 
     assert np.allclose(finer.values[:, ::8, ::8] * finer.largest, found.values * found.largest)
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_the_plot_shows_where_and_when_a_model_is_unstable(model: LatentModel, monkeypatch: pytest.MonkeyPatch) -> None:
     plot = stability_map(model, ("force", "mass"), scale=1.0, count=3, moments=(0.5, 1.0, 10.0))
     assert plot.names == ("force", "mass")

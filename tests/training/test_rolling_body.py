@@ -53,7 +53,6 @@ def test_a_dent_that_stays_below_needs_few_patterns(data: TrainingData, dataset:
     assert data.reduced["val"].shape[2] == data.space.coordinates == POSE + rolling.patterns
 
 
-@pytest.mark.usefixtures("unchecked")
 def test_the_true_parameters_explain_the_motions_and_a_fit_approaches_it(data: TrainingData) -> None:
     support, motions = support_of(BALL.points, AXIS), motions_of(data, "train", AXIS, [0])
     start, true = initial_contact(1, 0), true_contact()

@@ -31,7 +31,6 @@ def test_every_checkpoint_records_how_it_was_trained_on_bundled_data(name: str, 
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_a_short_training_of_the_default_model_gives_the_recorded_scores(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

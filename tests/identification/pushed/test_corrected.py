@@ -56,7 +56,6 @@ def test_the_corrected_model_is_exact_where_it_was_simulated_and_along_the_way()
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
     predictor = load("contact-force")
     forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=0)[0]
@@ -85,7 +84,6 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_a_simulated_body_is_found_nearer_with_a_simulation() -> None:
     predictor = load("contact-force")
     found = identify_drawn(predictor, ["pillow"], 1, from_simulator=True, known=("push",), simulations=1)

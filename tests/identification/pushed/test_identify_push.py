@@ -16,7 +16,6 @@ from odeform.models.registry import load
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_the_body_and_the_push_of_the_models_own_motion_are_found() -> None:
     predictor = load("contact-force")
     assert identifies_pushes(predictor)
@@ -40,7 +39,6 @@ def test_the_body_and_the_push_of_the_models_own_motion_are_found() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_a_push_that_is_hardly_seen_says_that_it_is_not_identifiable() -> None:
     predictor = load("contact-force")
     forward, state = forward_of(predictor, "pillow"), drawn_states(predictor, "pillow", 1, seed=1)[0]
@@ -51,7 +49,6 @@ def test_a_push_that_is_hardly_seen_says_that_it_is_not_identifiable() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_intervals_are_as_wide_as_bodies_in_the_simulator_took() -> None:
     predictor = load("contact-force")
     forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=1)[0]
@@ -67,7 +64,6 @@ def test_intervals_are_as_wide_as_bodies_in_the_simulator_took() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_drawn_bodies_are_scored_by_how_much_wider_intervals_would_have_to_be() -> None:
     wider = identify_drawn(load("contact-force"), ["chip", "flip-flop", "dog"], 1, noise_mm=1.0)
     assert wider["bodies"] == 3
@@ -111,7 +107,6 @@ def test_how_far_experiments_lead_is_told_by_load() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_one_simulated_experiment_of_each_load_is_compared_with_what_it_promised() -> None:
     found = misled_drawn(load("contact-force"), ["flip-flop"], 1)
     assert {row["load"] for row in found["rows"]} == {"push", "drop", "throw"}
@@ -121,7 +116,6 @@ def test_one_simulated_experiment_of_each_load_is_compared_with_what_it_promised
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("unchecked")
 def test_a_body_in_a_cloud_is_found_where_the_push_is_known() -> None:
     predictor = load("contact-force")
     forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=1)[0]

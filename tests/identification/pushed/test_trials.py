@@ -18,9 +18,6 @@ OTHER = np.array([0.1, -0.2, 0.0])
 """One body that is not the donut's own."""
 
 
-pytestmark = pytest.mark.usefixtures("unchecked")
-
-
 @cache
 def _donut() -> Forward:
     return forward_of(load("contact-force"), "donut")
