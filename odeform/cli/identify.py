@@ -42,6 +42,8 @@ def _add_pushed(parser: argparse.ArgumentParser) -> None:
         help="count the pushes, drops and throws that halve the widest interval, the best "
         "against random; with --simulated, how far each leads from the true body",
     )
+    pushed.add_argument("--with", nargs="+", default=[], choices=("drop", "throw"), metavar="LOAD", dest="falls",
+                        help="each body also falls so: drop, throw; with --known push")  # fmt: skip
     choices = ("mass", "young", "friction", "push")
     pushed.add_argument("--known", nargs="+", default=[], choices=choices, metavar="NAME",
                         help="what is known: mass, young, friction, push (contact and force)")  # fmt: skip
@@ -86,6 +88,7 @@ def run(args: argparse.Namespace) -> None:
             args.simulated,
             args.known,
             args.simulations or 0,
+            args.falls,
         )
         write_json(result, args.json)
         print(report_drawn(result))

@@ -5,7 +5,8 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.pushed.experiment import Candidates
 from odeform.identification.pushed.forward import Forward
-from odeform.identification.pushed.linearised import linearised, steps_from
+from odeform.identification.pushed.linearised import linearised
+from odeform.identification.pushed.state import body_steps
 from odeform.identification.pushed.trials import Falls, Pushes, Trials
 from odeform.loads.measured import FALLS
 from odeform.loads.registry import get_load
@@ -25,7 +26,7 @@ def candidates(
     Pushes are of the weakest to the strongest of `forces` in newton, by a model that is wrong by `errors_mm` (T,);
     drops and throws are from the ranges of their loads. All are observed at points of the surface with `noise_mm`.
     """
-    bodies = [body, *(body + steps_from(body))]
+    bodies = [body, *(body + body_steps(body))]
     trials: list[Trials] = [
         Pushes(forward, bodies, forces, errors_mm, PUSHED, seed),
         *(Falls(forward, body, get_load(load), FALLING, seed) for load in FALLS),

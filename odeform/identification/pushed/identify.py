@@ -1,35 +1,40 @@
 """Stiffness, mass and friction of a pushed body, and the place and force of the push, from how its surface moved."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from odeform.errors import InputError
-from odeform.identification.discrepancy import TWO_SIDED
-from odeform.identification.identify import Identification, Identified
+from odeform.identification.identify import Identification
 from odeform.identification.pushed.candidates import candidates
 from odeform.identification.pushed.corrected import Correction, corrected_search
+from odeform.identification.pushed.estimates import estimates_of, posterior_of
 from odeform.identification.pushed.evidence import Evidence, Known
 from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
-from odeform.identification.pushed.simulator import simulator_of
-from odeform.identification.pushed.state import BODY, PUSH, PushState
+from odeform.identification.pushed.simulator import experiment_simulator, simulator_of
+from odeform.identification.pushed.state import BODY, PUSH_STEPS, PushState
+from odeform.identification.pushed.together import Made, Together, simulated_together
 from odeform.identification.pushed.views import points_of, window_of
+from odeform.loads.registry import PUSH
 from odeform.models.base import Predictor
+from odeform.models.modal.model import ModalModel
 from odeform.schema import OBJECT
-from odeform.types import Floats, MotionSequence, Times
+from odeform.simulation.contacts import vector_of
+from odeform.types import Floats, Frames, MotionSequence, Times
 
 __all__ = [
     "PUSHED",
     "PUSH_NAMES",
     "WIDENED",
     "identifies_pushes",
+    "identify_body",
     "identify_push",
     "model_errors",
-    "posterior_of",
     "recorded_points",
 ]
 
@@ -80,27 +85,104 @@ def identify_push(
     begin = time.perf_counter()
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
+    simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
+    correcting = _Correcting(simulate, simulations, progress, note)
+    found = _searched(predictor, problem, start, given, correcting, errors_mm is None, propose)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+def identify_body(
+    predictor: Predictor,
+    made: Sequence[Made],
+    evidence: Evidence,
+    known: Mapping[str, Any] | None = None,
+    errors_mm: Times | None = None,
+    progress: Callable[[dict[str, float], float], None] = lambda *_: None,
+    propose: bool = False,
+    simulations: int = 0,
+    note: Callable[[str], None] = lambda _: None,
+) -> Identification:
+    """Estimate mass, stiffness and friction of a body from several experiments that are known, each with a 90 %
+    interval.
+
+    Args:
+        predictor: As of `identify_push`.
+        made: Pushes, drops and throws of the body, and when it was looked at.
+        evidence: Points of the surface at all these times, those of one experiment after those of the one before, seen
+            from one place.
+        known: The object, and any of `mass` (kg), `young` (kPa) and `friction`.
+        errors_mm: (T,) how wrong the model is, as of `identify_push`; by default as the error band says of pushes, and
+            as was measured of drops and throws.
+        progress: As of `identify_push`, as are `propose`, `simulations` and `note`.
+
+    Returns:
+        Estimates of `mass`, `young` and `friction`.
+
+    Raises:
+        InputError: A model of another kind, another load, no experiment, as many times as frames not, or a body that
+            cannot be simulated but should be.
+    """
+    begin = time.perf_counter()
+    given = dict(known or {})
+    model, named = _model_of(predictor, given)
+    if not made:
+        raise InputError("identify: expected at least one experiment")
+    forward = Together(model, made, named if model.schema.objects else {})
+    if not np.array_equal(forward.times, evidence.times):
+        raise InputError("identify: expected points at the times of all experiments, one after the other")
+    start = forward.state(np.zeros(3), np.zeros(3), _known_body(forward, given))
+    errors = _errors_of(predictor, forward, start, named) if errors_mm is None else errors_mm
+    free = tuple(index for index, name in enumerate(BODY) if name not in given)
+    problem = Problem(forward, evidence, errors, free)
+    simulate = None
+    if simulations:
+        simulate = simulated_together(forward, experiment_simulator(forward, given.get(OBJECT)))
+    correcting = _Correcting(simulate, simulations, progress, note)
+    found = _searched(predictor, problem, start, given, correcting, errors_mm is None, propose)
+    return replace(found, seconds=time.perf_counter() - begin)
+
+
+@dataclass(frozen=True)
+class _Correcting:
+    """By what the model is corrected, how often at most, and who is told."""
+
+    simulate: Callable[[PushState], Frames] | None
+    most: int
+    progress: Callable[[dict[str, float], float], None]
+    note: Callable[[str], None]
+
+
+def _searched(
+    predictor: Predictor,
+    problem: Problem,
+    start: PushState,
+    given: dict[str, Any],
+    correcting: _Correcting,
+    unknown: bool,
+    propose: bool,
+) -> Identification:
+    """Searches, corrects and proposes; `unknown` is by how much the model is wrong."""
+    names = [*BODY, *(PUSH_NAMES if len(BODY) in problem.free else ())]
 
     def report(state: PushState, misfit: float) -> None:
-        progress(_values(state), misfit)
+        every = {**{name: state.value(name) for name in BODY}, **state.parameters()}
+        correcting.progress({name: every[name] for name in names}, misfit)
 
-    simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
     found = search(problem, start, report)
     correction = Correction(problem, found, np.zeros(0), 0)
-    if simulate is not None:
-        correction = corrected_search(problem, found, simulate, simulations, report, note)
+    if correcting.simulate is not None:
+        correction = corrected_search(problem, found, correcting.simulate, correcting.most, report, correcting.note)
         problem, found = correction.problem, correction.found
     corrected = correction.simulations > 0
-    widened = CORRECTED if corrected else WIDENED if errors_mm is None else 1.0
-    estimates = _identified(problem, found, widened, correction.last if corrected else None)
+    widened = CORRECTED if corrected else WIDENED if unknown else 1.0
+    estimates = estimates_of(problem, found, widened, correction.last if corrected else None)
     proposed, narrowed = Experiment("", {}), 1.0
     if propose and set(problem.free) & set(range(len(BODY))):
-        note("Looking for the experiment that would tell most next")
-        proposed, narrowed = _proposed(problem, found, predictor.force_range(given))
-    seconds = time.perf_counter() - begin
+        correcting.note("Looking for the experiment that would tell most next")
+        proposed, narrowed = _proposed(predictor, problem, found, given)
     came_to = correction.simulations, correction.stopped
     return Identification(
-        estimates, found.misfit, seconds, dict(proposed.parameters), narrowed, *came_to, proposed_load=proposed.load
+        estimates, found.misfit, 0.0, dict(proposed.parameters), narrowed, *came_to, proposed_load=proposed.load
     )
 
 
@@ -126,25 +208,47 @@ def model_errors(predictor: Predictor, given: Mapping[str, Any], times: Times) -
     return np.zeros(len(times)) if band is None else band.mean(axis=1)
 
 
-def _problem(
-    predictor: Predictor, evidence: Evidence, given: dict[str, Any], errors_mm: Times | None
-) -> tuple[Problem, PushState]:
+def _model_of(predictor: Predictor, given: Mapping[str, Any]) -> tuple[ModalModel, dict[str, Any]]:
+    """The model of the body that `given` selects, and the parameters that select it."""
     named = {name: value for name, value in given.items() if isinstance(value, str)}
     named = named or dict(getattr(predictor, "parameters_like", dict)())
     model = pushed_model(predictor, named)
     if model is None:
         raise InputError(f"identify: expected a mechanical model of pushed bodies, got {predictor.model}")
+    return model, named
+
+
+def _known_body(forward: Forward, given: Mapping[str, Any]) -> Floats:
+    """(3,) what is known of the body, in [-1, 1], and the middle of the range for the rest."""
+    body = np.array([r.normalise(float(given[r.name])) if r.name in given else 0.0 for r in forward.ranges])
+    if np.abs(body).max() > 1.0 + 1e-6:
+        raise InputError("identify: a value that is known lies outside of half to twice the body's own")
+    return np.clip(body, -1.0, 1.0)
+
+
+def _problem(
+    predictor: Predictor, evidence: Evidence, given: dict[str, Any], errors_mm: Times | None
+) -> tuple[Problem, PushState]:
+    model, named = _model_of(predictor, given)
     if errors_mm is None:
         errors_mm = model_errors(predictor, named, evidence.times)
     forward = Forward(model, evidence.times, named if model.schema.objects else {})
     complete = predictor.complete({**named, **{k: v for k, v in given.items() if k in predictor.schema.names}})
-    vectors = [np.array([complete[f"{kind}_{axis}"] for axis in "xyz"]) for kind in ("contact", "force")]
+    vectors = [vector_of(complete, kind) for kind in ("contact", "force")]
     strongest = predictor.force_range(complete)[1]
-    body = np.array([r.normalise(float(given[r.name])) if r.name in given else 0.0 for r in forward.ranges])
-    if np.abs(body).max() > 1.0 + 1e-6:
-        raise InputError("identify: a value that is known lies outside of half to twice the body's own")
-    state = forward.state(*vectors, body=np.clip(body, -1.0, 1.0), strongest=strongest)
+    state = forward.state(*vectors, body=_known_body(forward, given), strongest=strongest)
     return Problem(forward, evidence, errors_mm, _free(given)), state
+
+
+def _errors_of(predictor: Predictor, forward: Together, start: PushState, named: Mapping[str, Any]) -> Times:
+    """(T,) mm: how wrong the model is in all experiments."""
+    pairs = zip(forward.made, forward.parts(start), strict=True)
+    return np.concatenate(
+        [
+            model_errors(predictor, named, one.times) if one.experiment.load == PUSH else forward.fall_errors(moved)
+            for one, moved in pairs
+        ]
+    )
 
 
 def _free(given: Collection[str]) -> tuple[int, ...]:
@@ -152,75 +256,20 @@ def _free(given: Collection[str]) -> tuple[int, ...]:
     parts = set(PUSH_NAMES)
     if parts & set(given) and not parts <= set(given):
         raise InputError("identify: expected the whole push to be known, contact and force, or nothing of it")
-    return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH)))
+    return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH_STEPS)))
 
 
-def _proposed(problem: Problem, found: Found, forces: tuple[float, float]) -> tuple[Experiment, float]:
+def _proposed(predictor: Predictor, problem: Problem, found: Found, given: dict[str, Any]) -> tuple[Experiment, float]:
     """The experiment that narrows the widest interval of the body most, and to which fraction."""
     covariance = CERTAIN**2 * np.eye(len(BODY))
     open_ = [index for index in problem.free if index < len(BODY)]
     posterior = posterior_of(problem, found)[0]
     covariance[np.ix_(open_, open_)] = posterior[: len(open_), : len(open_)]
-    noise_mm, errors = problem.evidence.noise_mm, problem.errors_mm
-    tried = candidates(problem.forward, found.state.body, forces, noise_mm, errors)
+    forward, errors = problem.forward, problem.errors_mm
+    if isinstance(forward, Together):
+        forward = Forward(forward.model, forward.model.schema.window.times, forward.named)
+        errors = model_errors(predictor, given, forward.times)
+    forces = predictor.force_range(given)
+    tried = candidates(forward, found.state.body, forces, problem.evidence.noise_mm, errors)
     best = tried.best(covariance)
     return tried.experiments[best], widest(tried.after(covariance, best)) / widest(covariance)
-
-
-def _values(state: PushState) -> dict[str, float]:
-    return {**{name: state.value(name) for name in BODY}, **state.parameters()}
-
-
-def posterior_of(problem: Problem, found: Found) -> tuple[Floats, Floats]:
-    """Covariances (F, F) of what is unknown but the camera: with the prior, and of the observation alone."""
-    size, scale = len(problem.free), max(found.misfit, 1.0)
-    information = found.information / scale
-    with_prior = np.linalg.inv(information + np.diag(problem.precision()))
-    alone = np.linalg.inv(information + 1e-6 * np.eye(len(information)))
-    return with_prior[:size, :size], alone[:size, :size]
-
-
-def _identified(problem: Problem, found: Found, widened: float, last: Floats | None) -> dict[str, Identified]:
-    """Estimates, with intervals that are `widened` times as wide as those of the posterior, to which the `last` step of
-    the estimate (9,) adds, if simulations corrected it."""
-    state, free = found.state, list(problem.free)
-    step = np.zeros(len(free)) if last is None else _in_steps(state, last)[free]
-    posterior, alone = (
-        widened**2 * (covariance + np.outer(step, step) / TWO_SIDED**2) for covariance in posterior_of(problem, found)
-    )
-    out: dict[str, Identified] = {}
-    for index, name in enumerate(BODY):
-        if index in free:
-            at = free.index(index)
-            half = TWO_SIDED * float(np.sqrt(posterior[at, at]))
-            narrow = TWO_SIDED * float(np.sqrt(alone[at, at])) < 1.0
-            unit, parameter = float(state.body[index]), problem.forward.ranges[index]
-            low, high = (parameter.denormalise(float(np.clip(unit + side * half, -1.0, 1.0))) for side in (-1.0, 1.0))
-            out[name] = Identified(parameter.denormalise(unit), low, high, narrow, unit, half)
-    if len(BODY) in free:
-        first = free.index(len(BODY))
-        parts = (
-            ("contact", state.contact, slice(first, first + 2), state.size * state.tangents, state.size),
-            ("force", state.force, slice(first + 2, first + PUSH), state.strongest * np.eye(3), state.strongest),
-        )
-        for kind, vector, rows, span, scale in parts:
-            wide, narrow = (span.T @ covariance[rows, rows] @ span for covariance in (alone, posterior))
-            out |= _vector(kind, vector, narrow, wide, scale)
-    return out
-
-
-def _in_steps(state: PushState, vector: Floats) -> Floats:
-    """(9,) a difference of `PushState.vector` -> (8,) the step of `PushState.stepped` along it."""
-    body, contact, force = np.split(vector, [len(BODY), len(BODY) + 3])
-    return np.concatenate([body, state.tangents @ contact, force])
-
-
-def _vector(kind: str, value: Floats, covariance: Floats, alone: Floats, scale: float) -> dict[str, Identified]:
-    """Three estimates, of which `scale` is half of the range."""
-    out = {}
-    for axis, x, variance, wide in zip("xyz", value, np.diag(covariance), np.diag(alone), strict=True):
-        half = TWO_SIDED * float(np.sqrt(variance))
-        narrow = TWO_SIDED * float(np.sqrt(wide)) < scale
-        x = float(x)
-        out[f"{kind}_{axis}"] = Identified(x, x - half, x + half, narrow, x / scale, half / scale)
-    return out

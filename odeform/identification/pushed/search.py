@@ -12,7 +12,7 @@ from odeform.errors import InputError
 from odeform.identification.pushed.evidence import Cloud, Evidence, Known, Residuals
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.registration import cameras_of
-from odeform.identification.pushed.state import BODY, POSE, PUSH, Camera, PushState
+from odeform.identification.pushed.state import BODY, POSE, PUSH_STEPS, Camera, PushState
 from odeform.simulation.contact_draws import contact_draws
 from odeform.types import Floats, Frames, Ints
 
@@ -125,7 +125,7 @@ def _prior_cost(problem: Problem, state: PushState) -> float:
 
 
 def _moved(problem: Problem, state: PushState, step: Floats) -> PushState:
-    every = np.zeros(len(BODY) + PUSH)
+    every = np.zeros(len(BODY) + PUSH_STEPS)
     every[list(problem.free)] = step[: len(problem.free)]
     out = state.stepped(every)
     if problem.camera_free:
@@ -208,7 +208,7 @@ def _starts(problem: Problem, start: PushState) -> list[PushState]:
     cameras = [start.camera]
     if isinstance(problem.evidence, Cloud) and problem.camera_free:
         cameras = cameras_of(problem.evidence.points[0], problem.forward.model.rest, CAMERAS)
-    if set(problem.free).isdisjoint(range(len(BODY), len(BODY) + PUSH)):
+    if set(problem.free).isdisjoint(range(len(BODY), len(BODY) + PUSH_STEPS)):
         return [replace(start, camera=camera) for camera in cameras]
     rest, strongest = problem.forward.model.rest, start.strongest
     drawn = contact_draws(rest, (0.2 * strongest, strongest), DRAWS, [0])

@@ -1,5 +1,6 @@
 """Holds what is unknown of a pushed body: how it is made, where and how it was pushed, and where the camera stood."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,12 +13,14 @@ from odeform.geometry.rigid import rotation_from_vector
 from odeform.schema import Parameter
 from odeform.types import Floats, Mesh, Points, Rotations, Vector
 
-__all__ = ["BODY", "FRICTION", "POSE", "PUSH", "Camera", "PushState"]
+__all__ = ["BODY", "BODY_STEP", "FRICTION", "POSE", "PUSH_STEPS", "Camera", "PushState", "body_steps"]
 
 FRICTION = "friction"
 BODY = ("mass", "young", FRICTION)
 """Names of what is unknown of the body itself, in this order."""
-PUSH = 5
+BODY_STEP = 0.05
+"""Of differences, in halves of the ranges of `BODY`."""
+PUSH_STEPS = 5
 """Unknowns of a push: two of the contact's place on the surface, three of the force."""
 POSE = 6
 """Unknowns of a camera."""
@@ -94,6 +97,8 @@ class PushState:
     def stepped(self, step: Floats) -> "PushState":
         """Returns the state after a step (8,), `BODY` kept in its ranges. `InputError` where no sphere can push."""
         body = np.clip(self.body + step[: len(BODY)], -1.0, 1.0)
+        if not step[len(BODY) :].any():
+            return replace(self, body=body)
         along = self.size * step[len(BODY) : len(BODY) + 2] @ self.tangents
         force = self.force + self.strongest * step[len(BODY) + 2 :]
         contact = nearest_on(self.rest, self.contact + along).point if along.any() else self.contact
@@ -101,3 +106,17 @@ class PushState:
         if not force.any():
             raise InputError("force: expected one that is not zero")
         return replace(self, body=body, contact=contact, force=force)
+
+
+def body_steps(body: Float[np.ndarray, " 3"], free: Sequence[int] = range(len(BODY))) -> Float[np.ndarray, "free 3"]:
+    """(F, 3): a step from a body for each of those of `BODY` that are `free`, within the ranges.
+
+    Mass and stiffness scaled alike move a body nearly alike, and under no other force than its weight exactly so. One
+    step is therefore along both: with one along each, what is curved in their differences would look like information
+    about their common scale.
+    """
+    steps = np.zeros((len(free), len(BODY)))
+    for row, index in zip(steps, free, strict=True):
+        both = [0, 1] if index == 1 and 0 in free and np.ptp(body[:2]) < 2.0 - 2.0 * BODY_STEP else [index]
+        row[both] = -BODY_STEP if body[both].max() + BODY_STEP > 1.0 else BODY_STEP
+    return steps

@@ -8,10 +8,15 @@ import numpy as np
 from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.pushed.drawn import drawn_states, forward_of, seen
-from odeform.identification.pushed.identify import PUSHED, identify_push
-from odeform.identification.pushed.simulator import simulator_of
+from odeform.identification.pushed.experiment import Experiment
+from odeform.identification.pushed.forward import Forward
+from odeform.identification.pushed.identify import PUSH_NAMES, PUSHED, identify_body, identify_push
+from odeform.identification.pushed.simulator import experiment_simulator
 from odeform.identification.pushed.state import BODY, PushState
+from odeform.identification.pushed.together import Made, Together, simulated_together
+from odeform.identification.pushed.trials import Falls
 from odeform.identification.pushed.views import CloudView
+from odeform.loads.registry import PUSH, get_load
 from odeform.models.base import Predictor
 from odeform.models.conformal import conformal_factor
 from odeform.progress import Progress
@@ -21,6 +26,8 @@ from odeform.simulation.errors import SimulationError
 __all__ = ["NOMINAL", "TINY", "identify_drawn", "report_drawn"]
 
 NOMINAL = 0.9
+DRAWN = 4
+"""Falls of which the first that lands in time is made."""
 TINY = 1e-9  # of an interval; an error of zero has no logarithm
 
 
@@ -34,13 +41,17 @@ def identify_drawn(
     from_simulator: bool = False,
     known: Sequence[str] = (),
     simulations: int = 0,
+    falls: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Scores, and a row for each of `count` drawn bodies of each object.
 
     Their motion is that of the model itself, whose error is then zero, or that of the simulator. `known` are those of
     mass, young, friction and push that the search is told. With `simulations`, the model is corrected by so many of
-    each body.
+    each body. With `falls`, "drop" or "throw", each body also falls so, and it is identified from a known push and
+    these together.
     """
+    if falls and PUSHED not in known:
+        raise InputError("identify: drops and throws are known; expected the push to be known beside them")
     if simulations and not from_simulator:
         raise InputError("identify: simulations correct the model for bodies that the simulator moves, not the model")
     rows: list[dict[str, Any]] = []
@@ -48,15 +59,25 @@ def identify_drawn(
     for name in objects:
         forward = forward_of(predictor, name)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
+            made = _made(forward, state, falls, seed + index)
+            each = Together(forward.model, made, forward.named)
             try:
-                surface = simulator_of(forward, name)(state) if from_simulator else forward.motions([state])[0]
+                if from_simulator:
+                    surface = simulated_together(each, experiment_simulator(forward, name))(state)
+                else:
+                    surface = each.motions([state])[0]
             except SimulationError as error:  # too strong a push of too soft a body; the others count
                 progress.advance(1, f"{name}: {error}")
                 continue
-            evidence = seen(forward, surface, view, noise_mm, seed + index)
-            errors = None if from_simulator else np.zeros(len(forward.times))
+            evidence = seen(each, surface, view, noise_mm, seed + index)
+            errors = None if from_simulator else np.zeros(len(each.times))
             given = _given(name, state, known)
-            rows.append(_row(name, state, identify_push(predictor, evidence, given, errors, simulations=simulations)))
+            if falls:
+                of_body = {key: value for key, value in given.items() if key not in PUSH_NAMES}
+                found = identify_body(predictor, made, evidence, of_body, errors, simulations=simulations)
+            else:
+                found = identify_push(predictor, evidence, given, errors, simulations=simulations)
+            rows.append(_row(name, state, found))
             progress.advance(1, _note(rows[-1]))
     progress.close()
     if not rows:
@@ -67,12 +88,22 @@ def identify_drawn(
         "view": "all points" if view is None else f"{view.points} points a frame of half of the surface",
         "noise_mm": noise_mm,
         "simulations": simulations,
+        "falls": list(falls),
         "seconds": float(np.median([row["seconds"] for row in rows])),
         "bodies": len(rows),
         "parameters": {name: _scores(name, rows) for name in names},
         "factor_90": _factor(rows),
         "rows": rows,
     }
+
+
+def _made(forward: Forward, state: PushState, falls: Sequence[str], seed: int) -> list[Made]:
+    """The push of a state, and one fall under each load, of which it is known when the body lands."""
+    made = [Made(Experiment(PUSH, state.parameters()), forward.times)]
+    for load in falls:
+        drawn = Falls(forward, state.body, get_load(load), DRAWN, seed)
+        made += [Made(one, times) for one, times in zip(drawn.experiments[:1], drawn.times, strict=False)]
+    return made
 
 
 def _given(name: str, state: PushState, known: Sequence[str]) -> dict[str, Any]:
@@ -135,8 +166,9 @@ def _scores(name: str, rows: Sequence[dict[str, Any]]) -> dict[str, float | None
 
 def report_drawn(result: dict[str, Any]) -> str:
     """Returns the result as a text table."""
+    made = " and ".join(["push", *result["falls"]])
     lines = [
-        f"{result['bodies']} bodies moved by the {result['truth']}, {result['view']}, "
+        f"{result['bodies']} bodies moved by the {result['truth']}, {made}, {result['view']}, "
         f"{result['noise_mm']:g} mm of noise, {result['simulations']} simulations; "
         f"{result['seconds']:.1f} s each (median)",
         f"{'':<12}{'MAE':>10}{'median':>10}{'in 90 %':>10}{'identifiable':>14}   of",

@@ -8,24 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from odeform.errors import InputError
-from odeform.geometry.shape import surface_weights
 from odeform.identification.pushed.experiment import Experiment
-from odeform.identification.pushed.forward import Forward, with_friction
+from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.state import BODY, FRICTION, PushState
 from odeform.loads.load import Load
-from odeform.loads.measured import error_after_contact
 from odeform.loads.registry import PUSH
-from odeform.models.modal.model import ModalModel
 from odeform.models.modal.training.impact_fit import FRAMES, first_contact
 from odeform.simulation.contact_draws import contact_draws
 from odeform.simulation.scene import evenly
-from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Times
 
 __all__ = ["Falls", "Pushes", "Trials"]
 
-LANDING = SolverSettings("limex", tolerance=3e-5, dtype="float64")
-"""Bodies hit the floor faster than a sphere pushes them: steps that suit pushes leave differences of the chip rough."""
 Surfaces = Float[np.ndarray, "experiments times points 3"]
 
 
@@ -84,9 +78,7 @@ class Falls:
     def __init__(self, forward: Forward, body: Floats, load: Load, count: int, seed: int) -> None:
         """Draws `count` evenly from the ranges of a load, and leaves out what lands too late. `body` (3,) is as it is
         estimated; others fly alike, and land at the same time."""
-        falling = forward.model.under(load.name)
-        assert isinstance(falling, ModalModel)
-        self._forward, self._model = forward, falling
+        self._forward, self._load = forward, load
         self._drawn, self._solved_at = evenly(load.parameters, count, seed), load.window.times
         moved = self._solved(body)
         firsts = np.array([first_contact(motion, load, row) for motion, row in zip(moved, self._drawn, strict=True)])
@@ -97,18 +89,11 @@ class Falls:
         self._solved_at = self._solved_at[: int(self._seen.max(initial=0)) + 1]
         self.experiments = [Experiment(load.name, {**row, **self._of(body)}) for row in self._drawn]
         self._body, self._base = body, self._observed(moved[kept])
-        self.errors_mm = self._errors_mm(self._base)
+        self.errors_mm = np.stack([forward.fall_errors(one) for one in self._base])
 
     def surfaces(self, body: Floats) -> Surfaces:
         """(E, T, S, 3) m of a body (3,): see `Trials`."""
         return self._base if np.array_equal(body, self._body) else self._observed(self._solved(body))
-
-    def _errors_mm(self, moved: Surfaces) -> Float[np.ndarray, "experiments times"]:
-        """The same at all times: nothing else was measured, and in proportion to the displacement at each time, which
-        is small at first, it would promise far too much."""
-        away = ((moved - moved[:, :1]) ** 2).sum(axis=3) @ surface_weights(self._model.rest)
-        share = error_after_contact(next(iter(self._model.schema.objects), ""))
-        return np.tile(1e3 * share * np.sqrt(away.mean(axis=1, keepdims=True)), (1, FRAMES + 1))
 
     def _of(self, body: Floats) -> dict[str, float]:
         """Mass and stiffness of a body (3,)."""
@@ -116,12 +101,7 @@ class Falls:
         return {name: one.denormalise(float(unit)) for name, one, unit in pairs if name != FRICTION}
 
     def _solved(self, body: Floats) -> Surfaces:
-        at = BODY.index(FRICTION)
-        ratio = self._forward.ranges[at].denormalise(float(body[at])) / self._forward.friction
-        model = with_friction(self._model.changed(self._of(body)), ratio)
-        drawn = {name: np.array([row[name] for row in self._drawn]) for name in self._drawn[0]}
-        sets = {**self._forward.named, **drawn, **self._of(body)}
-        return model.solve_batch(sets, quality=LANDING, until=float(self._solved_at[-1])).vertices(self._solved_at)
+        return self._forward.fallen(self._load, self._drawn, body, self._solved_at)
 
     def _observed(self, moved: Float[np.ndarray, "experiments frames points 3"]) -> Surfaces:
         return moved[np.arange(len(moved))[:, None], self._seen].astype(float)

@@ -1,0 +1,102 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from odeform.errors import InputError
+from odeform.identification.pushed.drawn import drawn_states, forward_of
+from odeform.identification.pushed.experiment import Experiment
+from odeform.identification.pushed.forward import Forward
+from odeform.identification.pushed.identify import identify_body
+from odeform.identification.pushed.state import PushState
+from odeform.identification.pushed.table import identify_drawn
+from odeform.identification.pushed.together import Made, Together, simulated_together
+from odeform.identification.pushed.trials import Falls
+from odeform.identification.pushed.views import points_of
+from odeform.loads.registry import get_load
+from odeform.models.registry import load
+from odeform.types import Frames, Times
+
+
+@pytest.fixture(scope="module")
+def forward() -> Forward:
+    return forward_of(load("contact-force"), "donut")
+
+
+@pytest.fixture(scope="module")
+def state() -> PushState:
+    return drawn_states(load("contact-force"), "donut", 1, seed=0)[0]
+
+
+@pytest.fixture(scope="module")
+def made(forward: Forward, state: PushState) -> list[Made]:
+    """A push of a few frames, and a throw."""
+    drawn = Falls(forward, state.body, get_load("throw"), 1, seed=0)
+    return [
+        Made(Experiment("push", state.parameters()), forward.times[:4]),
+        Made(drawn.experiments[0], drawn.times[0]),
+    ]
+
+
+def test_frames_of_experiments_follow_each_other(forward: Forward, state: PushState, made: list[Made]) -> None:
+    together = Together(forward.model, made)
+    (moved,) = together.motions([state])
+    assert moved.shape == (4 + 13, *forward.model.rest.points.shape)
+    np.testing.assert_allclose(moved[:4], Forward(forward.model, forward.times[:4]).motions([state])[0], atol=1e-9)
+    alone = Falls(forward, state.body, get_load("throw"), 1, seed=0).surfaces(state.body)[0]
+    np.testing.assert_allclose(moved[4:], alone, atol=1e-6)
+    softer = replace(state, body=state.body - np.array([0.0, 0.3, 0.0]), force=np.zeros(3))
+    other = together.motions([softer])[0]
+    assert np.abs(other[1:4] - moved[1:4]).max() > 1e-4, "the push is that of the experiment"
+    assert np.abs(other[5:] - moved[5:]).max() > 1e-4
+
+
+def test_all_experiments_are_simulated_with_the_body_of_a_state(
+    forward: Forward, state: PushState, made: list[Made]
+) -> None:
+    asked: list[tuple[Experiment, float]] = []
+
+    def simulate(experiment: Experiment, friction: float, times: Times) -> Frames:
+        asked.append((experiment, friction))
+        return np.zeros((len(times), 5, 3))
+
+    heavier = replace(state, body=np.array([0.5, -0.5, 1.0]))
+    surface = simulated_together(Together(forward.model, made), simulate)(heavier)
+    assert surface.shape == (17, 5, 3)
+    assert [one.load for one, _ in asked] == ["push", "throw"]
+    for one, friction in asked:
+        assert one.parameters["mass"] == heavier.value("mass")
+        assert one.parameters["young"] == heavier.value("young")
+        assert friction == heavier.value("friction")
+    assert asked[1][0].parameters["height"] == made[1].experiment.parameters["height"]
+
+
+def test_what_is_no_experiment_is_refused(forward: Forward, made: list[Made]) -> None:
+    predictor, known = load("contact-force"), {"object": "donut"}
+    times = made[0].times
+    seen = points_of(times, np.zeros((4, *forward.model.rest.points.shape)), forward.model.rest.faces)
+    with pytest.raises(InputError, match="at least one experiment"):
+        identify_body(predictor, [], seen, known)
+    with pytest.raises(InputError, match="points at the times of all experiments"):
+        identify_body(predictor, made, seen, known)
+    with pytest.raises(InputError, match="pushes, drops and throws, got kick"):
+        identify_body(predictor, [Made(Experiment("kick", {}), times)], seen, known)
+    with pytest.raises(InputError, match="half to twice"):
+        identify_body(predictor, made[:1], seen, {**known, "mass": 100.0})
+    with pytest.raises(InputError, match="expected the push to be known"):
+        identify_drawn(predictor, ["donut"], 1, falls=["throw"])
+
+
+def test_a_throw_tells_the_friction_that_a_push_does_not(forward: Forward, state: PushState, made: list[Made]) -> None:
+    predictor, known = load("contact-force"), {"object": "donut", "mass": state.value("mass")}
+    halves = []
+    for some in (made[:1], made):
+        together = Together(forward.model, some)
+        moved = together.motions([state])[0]
+        seen = points_of(together.times, moved, forward.model.rest.faces, noise_mm=1.0)
+        found = identify_body(predictor, some, seen, known, np.zeros(len(together.times)))
+        assert set(found.parameters) == {"young", "friction"}
+        halves.append(found.parameters["friction"].half_width)
+        off = found.parameters["friction"].unit - state.body[2]
+        assert abs(off) < 1.5 * halves[-1]
+    assert halves[1] < 0.3 * halves[0]
