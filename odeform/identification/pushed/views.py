@@ -71,5 +71,6 @@ def _drawn(corners: Floats, axis: Floats | None, count: int, rng: np.random.Gene
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = np.linalg.norm(normals, axis=1)
     if axis is not None:
-        areas = np.where(normals @ axis > 0.0, areas, 0.0)
+        facing = normals @ axis > 0.0
+        areas = np.where(facing, areas, 0.0) if facing.any() else areas  # of a shell the back is seen as well
     return rng.choice(len(areas), count, p=areas / areas.sum())
