@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
+from odeform.identification.pushed.recorded import Recorded
 from odeform.locks import Lock
 from odeform.models.titles import subject_of
 from odeform_viz.browser.scripts import run_scripts
@@ -70,6 +71,7 @@ class App:
             stop_server(self.server)
             raise
         self._panels, self._workspace, self._switching = panels, workspace, Lock()
+        self._experiments = list[Recorded]()
         self._build(columns)
 
     def _build(self, columns: Sequence[Column], parameters: Mapping[str, Any] | None = None) -> None:
@@ -89,6 +91,7 @@ class App:
             self._worker.wake,
             Layout(self.server),
             Workspace.of(self._workspace, columns),
+            self._experiments,
         )
         self.page.controls.show_load = self.show_load
         build_panels(self.page, self._panels)

@@ -6,6 +6,7 @@ from typing import Any
 
 import viser
 
+from odeform.identification.pushed.recorded import Recorded
 from odeform.schema import Schema
 from odeform.types import Mesh, Vector
 from odeform_viz.columns import Column, Columns
@@ -99,6 +100,8 @@ class Page:
     """Asks the worker to read the newest request."""
     layout: Layout
     workspace: Workspace
+    experiments: list[Recorded] = field(default_factory=list)
+    """Motions of known pushes, drops and throws that were fitted, whatever happened on the page since."""
     shown: Callable[[], Frame | None] = lambda: None
     """The frame on screen, if there is one."""
     controls: Controls = field(default_factory=Controls)

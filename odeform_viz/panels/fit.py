@@ -3,21 +3,28 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
 
 from odeform.errors import InputError
 from odeform.identification.identify import Identification
 from odeform.identification.known import why_not_identifiable
 from odeform.identification.observation import View, observe
 from odeform.identification.pushed.experiment import Experiment
-from odeform.identification.pushed.identify import PUSH_NAMES, identifies_pushes, recorded_points
+from odeform.identification.pushed.forward import pushed_model
+from odeform.identification.pushed.identify import identifies_pushes
+from odeform.identification.pushed.recorded import Recorded, recorded_experiment, recorded_points
 from odeform.identification.pushed.simulator import can_simulate
-from odeform.loads.registry import PUSH
+from odeform.identification.pushed.state import BODY
+from odeform.loads.measured import FALLS
+from odeform.loads.registry import PUSH, load_of_scene
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import Parameters, Schema
+from odeform.schema import OBJECT, Parameters, Schema
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
-from odeform_viz.runtime.jobs import Job, fit_parameters, fit_push
+from odeform_viz.runtime.jobs import Job, fit_body, fit_parameters, fit_push
 from odeform_viz.words import parameter_title, plain
 
 __all__ = ["FitPanel", "describe_identification"]
@@ -27,8 +34,11 @@ CORRECTIONS = 3  # simulations; more of them tell little
 NEXT = "Set sliders to the next {}"
 NEXT_HINT = (
     "what would tell most of what is least known of the body; a drop or a throw changes what happens (Explore leads "
-    "back to the push), and cannot be fitted yet"
+    "back to the push). Simulate or open its motion there, and fit it together with this one"
 )
+TOGETHER = "together with those before"
+TOGETHER_HINT = "fit one body to all its pushes, drops and throws that are known and were fitted since the page opened"
+MADE = "From {} experiments together: {}."
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
@@ -92,8 +102,9 @@ class FitPanel(Panel):
         with gui.add_folder("Fit"):
             self._text = gui.add_markdown(NO_TRUTH)
             self._how = gui.add_dropdown("by", [ALONE, CORRECTED], hint=HOW) if _corrects(page) else None
-            pushes = page.model.predictor is not None and identifies_pushes(page.model.predictor)
+            pushes = _mechanical(page) is not None and _load(page) == PUSH
             self._known = gui.add_checkbox(KNOWN, False, hint=KNOWN_HINT) if pushes else None
+            self._together = gui.add_checkbox(TOGETHER, True, hint=TOGETHER_HINT, visible=False)
             self._start = gui.add_button(
                 "Fit to the truth", hint="find the parameters that reproduce the visible truth"
             )
@@ -110,7 +121,7 @@ class FitPanel(Panel):
     @classmethod
     def needed(cls, page: Page) -> bool:
         predictor = page.model.predictor
-        return predictor is not None and (identifies_pushes(predictor) or not why_not_identifiable(predictor))
+        return predictor is not None and (_mechanical(page) is not None or not why_not_identifiable(predictor))
 
     def close(self) -> None:
         """Cancel the search in progress, if any."""
@@ -128,6 +139,7 @@ class FitPanel(Panel):
             self._truth = truth
             self.close()
             self._show("" if truth else NO_TRUTH)
+            self._together.visible = bool(self._before())
 
     def _show(
         self, text: str, found: Parameters | None = None, working: bool = False, proposed: Experiment = NOTHING
@@ -145,8 +157,8 @@ class FitPanel(Panel):
             if truth is None or model.predictor is None or (self._job is not None and self._job.running):
                 return
             schema, predictor = self._page.schema, model.predictor
-            if identifies_pushes(predictor):
-                self._begin_push(predictor, truth, model)
+            if (mechanical := _mechanical(self._page)) is not None:
+                self._begin_body(mechanical, truth, model)
                 return
             try:
                 # an azimuth that is not known is the sliders'
@@ -166,23 +178,40 @@ class FitPanel(Panel):
             self._job = Job(fit_parameters, arguments, search.done, search.failed, search.progress)
             self._job.start()
 
-    def _begin_push(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
-        """Searches the body and the push of a recorded motion."""
+    def _begin_body(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
+        """Searches the body of a recorded motion, and the push if it is not known."""
+        load, true = _load(self._page), _true(predictor, truth)
         named = {name: value for name, value in truth.setting.items() if isinstance(value, str)}
-        if self._known is not None and self._known.value:
-            named |= {name: truth.setting[name] for name in PUSH_NAMES if name in truth.setting}
+        corrects = self._how is not None and self._how.value == CORRECTED
+        simulations = CORRECTIONS if corrects else 0
         try:
-            seen = recorded_points(predictor, truth.sequence, named)
+            if self._known is not None and not self._known.value:
+                seen = recorded_points(predictor, truth.sequence, named)
+                note = PUSH_OPEN if corrects else CALIBRATED
+                search = _Search(self._page, model, true, named, self._show, note)
+                work, arguments = fit_push, (predictor, seen, named, simulations)
+            else:
+                now = recorded_experiment(predictor, load, truth.sequence, true)
+                before = self._before() if self._together.value else []
+                fixed = {key: value for key, value in truth.setting.items() if key not in BODY}
+                search = _Search(self._page, model, true, fixed, self._show, CALIBRATED, [*before, now])
+                work, arguments = fit_body, (predictor, search.experiments, named, simulations)
         except InputError as error:
             self._show(FAILED.format(error))
             return
-        corrects = self._how is not None and self._how.value == CORRECTED
-        note = CALIBRATED if set(PUSH_NAMES) <= set(named) or not corrects else PUSH_OPEN
-        search = _Search(self._page, model, truth.setting, named, self._show, note)
         self._show("starting", working=True)
-        arguments = predictor, seen, named, CORRECTIONS if corrects else 0
-        self._job = Job(fit_push, arguments, search.done, search.failed, search.progress)
+        self._job = Job(work, arguments, search.done, search.failed, search.progress)
         self._job.start()
+
+    def _before(self) -> list[Recorded]:
+        """Experiments that were fitted before with the body of the visible truth."""
+        truth, predictor = self._truth, _mechanical(self._page)
+        if truth is None or predictor is None:
+            return []
+        own = _body_of(_true(predictor, truth))
+        same = [one for one in self._page.experiments if _body_of(one.made.experiment.parameters) == own]
+        same = [one for one in same if np.array_equal(one.faces, truth.sequence.faces)]
+        return [one for one in same if one.made.experiment.parameters != _true(predictor, truth)]
 
     def _use_proposed(self) -> None:
         """Set the sliders, on this page or on that of another load."""
@@ -201,10 +230,35 @@ class FitPanel(Panel):
         self._page.wake()
 
 
+def _load(page: Page) -> str:
+    load = load_of_scene(page.schema.scene)
+    return PUSH if load is None else load.name
+
+
+def _mechanical(page: Page) -> Predictor | None:
+    """The page's model of pushed bodies, if pushes or falls of them can be fitted."""
+    predictor, load = page.model.predictor, _load(page)
+    if predictor is None or load not in (PUSH, *FALLS):
+        return None
+    root = predictor if load == PUSH else predictor.under(PUSH)
+    return root if identifies_pushes(root) else None
+
+
 def _corrects(page: Page) -> bool:
     """Whether simulations can correct the model."""
-    predictor = page.model.predictor
-    return predictor is not None and identifies_pushes(predictor) and can_simulate(predictor)
+    predictor = _mechanical(page)
+    return predictor is not None and can_simulate(predictor)
+
+
+def _true(predictor: Predictor, truth: RecordedMotion) -> dict[str, Any]:
+    """What is known of a truth. Motions of the scene that name no mass and no stiffness are of the object as it is."""
+    model = pushed_model(predictor, truth.setting)
+    own = {} if model is None or truth.unknown else model.own_values
+    return {**own, **truth.setting}
+
+
+def _body_of(parameters: Parameters) -> dict[str, Any]:
+    return {name: value for name, value in parameters.items() if name in (*BODY, OBJECT)}
 
 
 @dataclass
@@ -219,6 +273,8 @@ class _Search:
     show: Callable[..., None]
     note: str = ""
     """Says what has to be known of the estimates."""
+    experiments: list[Recorded] = field(default_factory=list)
+    """All that are fitted, the newest last, where they are known."""
     misfits: list[str] = field(default_factory=list)
     last: str = ""
     """The last step in words."""
@@ -250,10 +306,14 @@ class _Search:
         self._place(estimate)
         text = describe_identification(found, self.page.schema, self.truth)
         body = {name: value for name, value in self.fixed.items() if isinstance(value, str)}
-        proposed = Experiment(found.proposed_load, {**body, **found.proposed})
+        # what is made next is made with the body that is there
+        proposed = Experiment(found.proposed_load, {**body, **found.proposed, **_body_of(self.truth)})
+        made = [one.made.experiment.load for one in self.experiments]
+        together = MADE.format(len(made), ", ".join(made)) if len(made) > 1 else ""
+        self.page.experiments += self.experiments[-1:]
         further = FURTHER.format(proposed.load, found.narrowed) if proposed.load else ""
         stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
-        lines = "\n\n".join(filter(None, (text, stopped, further, self.note, self.hidden)))
+        lines = "\n\n".join(filter(None, (text, together, stopped, further, self.note, self.hidden)))
         self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
 
     def failed(self, message: str) -> None:

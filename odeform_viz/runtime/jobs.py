@@ -22,6 +22,7 @@ from odeform.types import Geometry, MotionSequence, Times
 if TYPE_CHECKING:
     from odeform.figure import Source
     from odeform.identification.pushed.evidence import Evidence
+    from odeform.identification.pushed.recorded import Recorded
     from odeform.motion.recorded import RecordedMotion
     from odeform.stress.stability import StabilityMap
 
@@ -30,6 +31,7 @@ __all__ = [
     "Job",
     "Lesson",
     "Report",
+    "fit_body",
     "fit_parameters",
     "fit_push",
     "make_figure",
@@ -283,6 +285,20 @@ def fit_push(
         report((parameters, misfit))
 
     return identify_push(predictor, seen, known, None, step, propose=True, simulations=simulations, note=report)
+
+
+def fit_body(
+    report: Report, predictor: Predictor, experiments: "Sequence[Recorded]", known: dict[str, Any], simulations: int
+) -> Identification:
+    """Estimates how a body is made from experiments that are known; reports as `fit_push`."""
+    from odeform.identification.pushed.identify import identify_body
+    from odeform.identification.pushed.recorded import together_points
+
+    def step(parameters: dict[str, float], misfit: float) -> None:
+        report((parameters, misfit))
+
+    made, seen = [one.made for one in experiments], together_points(experiments)
+    return identify_body(predictor, made, seen, known, None, step, propose=True, simulations=simulations, note=report)
 
 
 def map_stability(report: Report, checkpoint: str) -> "StabilityMap":

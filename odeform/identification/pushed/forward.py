@@ -32,7 +32,9 @@ FRICTION_RANGE = 2.0  # factor by which friction may differ from that of the mod
 
 def pushed_model(predictor: Predictor, parameters: Parameters) -> ModalModel | None:
     """The model of the one body that parameters select, if it can be identified by pushes; otherwise None."""
-    part = predictor.model_of(parameters) if predictor.schema.objects or parameters else predictor
+    named = {name: value for name, value in parameters.items() if isinstance(value, str)}
+    named = named or dict(getattr(predictor, "parameters_like", dict)())
+    part = predictor.model_of(named) if predictor.schema.objects or named else predictor
     if not isinstance(part, ModalModel) or part.load is not None or set(part.own_values) != {"mass", "young"}:
         return None
     return part

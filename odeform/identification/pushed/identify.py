@@ -12,20 +12,19 @@ from odeform.identification.identify import Identification
 from odeform.identification.pushed.candidates import candidates
 from odeform.identification.pushed.corrected import Correction, corrected_search
 from odeform.identification.pushed.estimates import estimates_of, posterior_of
-from odeform.identification.pushed.evidence import Evidence, Known
+from odeform.identification.pushed.evidence import Evidence
 from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.simulator import experiment_simulator, simulator_of
 from odeform.identification.pushed.state import BODY, PUSH_STEPS, PushState
 from odeform.identification.pushed.together import Made, Together, simulated_together
-from odeform.identification.pushed.views import points_of, window_of
 from odeform.loads.registry import PUSH
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
 from odeform.schema import OBJECT
 from odeform.simulation.contacts import vector_of
-from odeform.types import Floats, Frames, MotionSequence, Times
+from odeform.types import Floats, Frames, Times
 
 __all__ = [
     "PUSHED",
@@ -35,7 +34,6 @@ __all__ = [
     "identify_body",
     "identify_push",
     "model_errors",
-    "recorded_points",
 ]
 
 PUSHED = "push"
@@ -191,15 +189,6 @@ def identifies_pushes(predictor: Predictor) -> bool:
     named = dict(getattr(predictor, "parameters_like", dict)())
     first = {OBJECT: predictor.schema.objects[0]} if predictor.schema.objects else {}
     return pushed_model(predictor, named or first) is not None
-
-
-def recorded_points(predictor: Predictor, recorded: MotionSequence, named: Mapping[str, Any]) -> Known:
-    """Observes a recorded motion of the body that `named` selects. `InputError` where it is one of another surface."""
-    model = pushed_model(predictor, named)
-    if model is None or not np.array_equal(recorded.faces, model.rest.faces):
-        raise InputError("identify: expected a motion of the body that the model knows, vertex by vertex")
-    times, surface = window_of(recorded, model.schema.window.stop, model.schema.window.rate)
-    return points_of(times, surface, recorded.faces)
 
 
 def model_errors(predictor: Predictor, given: Mapping[str, Any], times: Times) -> Times:

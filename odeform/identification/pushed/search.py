@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
+from scipy.stats.qmc import LatinHypercube
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
@@ -22,6 +23,7 @@ PRIOR = 0.58
 """Standard deviation of each of `BODY` before anything is seen: that of a uniform draw from [-1, 1]."""
 FORCE_PRIOR = 1.0  # of each component, in strongest forces
 DRAWS, COMPARED = 128, 5  # pushes that are tried, and frames on which
+BODIES = 24  # that are tried where the push is known
 CAMERAS = 6  # places of the camera; a round body looks alike from many, and each is tried with all pushes
 TRIED, BRIEF, REFINED = (
     8,
@@ -176,7 +178,7 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
 
 
 def search(problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None) -> Found:
-    """Compares drawn pushes, if the push is unknown; refines the best briefly, by the push if it is unknown, and all
+    """Compares drawn pushes, if the push is unknown, or bodies, if the camera is; refines the best briefly, by the push if it is unknown, and all
     that is unknown of those that are best then, until one explains the observation."""
     found: list[Found] = []
     with threadpool_limits(1):  # products are small
@@ -205,21 +207,43 @@ def _apart(states: list[PushState]) -> list[PushState]:
 
 
 def _starts(problem: Problem, start: PushState) -> list[PushState]:
+    """The start as it is, where only the body is unknown; pushes that are drawn, or bodies where the camera is unknown,
+    the nearest first."""
     cameras = [start.camera]
     if isinstance(problem.evidence, Cloud) and problem.camera_free:
         cameras = cameras_of(problem.evidence.points[0], problem.forward.model.rest, CAMERAS)
-    if set(problem.free).isdisjoint(range(len(BODY), len(BODY) + PUSH_STEPS)):
-        return [replace(start, camera=camera) for camera in cameras]
-    rest, strongest = problem.forward.model.rest, start.strongest
-    drawn = contact_draws(rest, (0.2 * strongest, strongest), DRAWS, [0])
-    states = [replace(start, contact=contact, force=force) for contact, force in drawn]
     frames = np.unique(np.linspace(0, len(problem.evidence.times) - 1, COMPARED).round().astype(int))
-    surfaces = problem.forward.motions(states)[:, frames]
+    if not set(problem.free).isdisjoint(range(len(BODY), len(BODY) + PUSH_STEPS)):
+        drawn = contact_draws(problem.forward.model.rest, (0.2 * start.strongest, start.strongest), DRAWS, [0])
+        states = [replace(start, contact=contact, force=force) for contact, force in drawn]
+        surfaces = problem.forward.motions(states)[:, frames]
+    elif problem.camera_free:
+        # another body moves so differently that its cloud is matched with wrong faces, from which no slope leads back
+        states = [start, *_bodies(problem, start)]
+        surfaces = [problem.forward.motions([state])[0, frames] for state in states]
+    else:
+        return [start]
     ranked = []
     for camera in cameras:
         for state, surface in zip(states, surfaces, strict=True):
             ranked.append((_distance(problem.evidence, surface, frames, camera), replace(state, camera=camera)))
     return [state for _, state in sorted(ranked, key=lambda one: one[0])]
+
+
+def _bodies(problem: Problem, start: PushState) -> list[PushState]:
+    """Bodies all over the ranges of what is unknown of them."""
+    free = [index for index in problem.free if index < len(BODY)]
+    found = []
+    for row in LatinHypercube(len(free), seed=0).random(BODIES):
+        body = start.body.copy()
+        body[free] = 2.0 * row - 1.0
+        state = replace(start, body=body)
+        try:
+            problem.forward.check(state)
+        except InputError:
+            continue
+        found.append(state)
+    return found
 
 
 def _distance(evidence: Evidence, surface: Floats, frames: Ints, camera: Camera) -> float:

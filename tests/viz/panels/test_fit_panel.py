@@ -13,6 +13,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.identification.identify import Identification, Identified
 from odeform.identification.pushed.evidence import Known
+from odeform.identification.pushed.recorded import Recorded, together_points
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
@@ -184,6 +185,14 @@ def telling(report: Report, predictor: Predictor, seen: Known, known: dict[str, 
     time.sleep(60.0)
 
 
+def telling_of_the_body(
+    report: Report, predictor: Predictor, experiments: list[Recorded], known: dict[str, Any], simulations: int
+) -> None:
+    """The same of a fit of experiments that are known."""
+    (one,) = experiments
+    telling(report, predictor, together_points([one]), dict(one.made.experiment.parameters), simulations)
+
+
 @pytest.fixture
 def pushed() -> Iterator[LoopbackClient]:
     """A client of a page with a push as truth, which a fit is to correct by simulations."""
@@ -204,6 +213,7 @@ def test_a_fit_of_a_push_can_be_corrected_by_simulations(
     pushed: LoopbackClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(fit, "fit_push", telling)
+    monkeypatch.setattr(fit, "fit_body", telling_of_the_body)
     for known in (True, False):
         pushed.set(fit.KNOWN, known)
         pushed.click(START)
