@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
-from scipy.stats.qmc import LatinHypercube
 from threadpoolctl import threadpool_limits
 
 from odeform.errors import InputError
@@ -178,8 +177,8 @@ def _tried(problem: Problem, state: PushState, step: Floats) -> tuple[PushState 
 
 
 def search(problem: Problem, start: PushState, progress: Callable[[PushState, float], None] = lambda *_: None) -> Found:
-    """Compares drawn pushes, if the push is unknown, or bodies, if the camera is; refines the best briefly, by the push if it is unknown, and all
-    that is unknown of those that are best then, until one explains the observation."""
+    """Compares drawn pushes, if the push is unknown, or bodies, if the camera is; refines the best briefly, by the push
+    if it is unknown, and all that is unknown of those that are best then, until one explains the observation."""
     found: list[Found] = []
     with threadpool_limits(1):  # products are small
         starts = _apart(_starts(problem, start))[:TRIED]
@@ -234,9 +233,9 @@ def _bodies(problem: Problem, start: PushState) -> list[PushState]:
     """Bodies all over the ranges of what is unknown of them."""
     free = [index for index in problem.free if index < len(BODY)]
     found = []
-    for row in LatinHypercube(len(free), seed=0).random(BODIES):
+    for row in np.random.default_rng(0).uniform(-1.0, 1.0, (BODIES, len(free))):
         body = start.body.copy()
-        body[free] = 2.0 * row - 1.0
+        body[free] = row
         state = replace(start, body=body)
         try:
             problem.forward.check(state)
