@@ -11,11 +11,12 @@ __all__ = ["cameras_of"]
 
 TURNS, ROUNDS, REFINED = 96, 6, 12
 LONGER = 24  # rounds for the best
+APART = 0.05  # of the cloud's size, RMS, between cameras that are not the same
 SAMPLES = 80  # points of the cloud while turns are compared
 
 
 def cameras_of(cloud: Points, rest: Mesh, count: int, seed: int = 0) -> list[Camera]:
-    """The `count` best cameras for a cloud (N, 3) m that shows some of a body at rest, best first.
+    """At most `count` cameras, apart from each other, for a cloud (N, 3) m of some of a body at rest, best first.
 
     A shape with symmetries has several that are alike.
     """
@@ -28,9 +29,20 @@ def cameras_of(cloud: Points, rest: Mesh, count: int, seed: int = 0) -> list[Cam
     few = cloud[:: max(len(cloud) // SAMPLES, 1)]
     centre = middles.mean(axis=0)
     tried = [_refined(Camera(turn, centre - turn @ cloud.mean(axis=0)), few, surface, ROUNDS) for turn in turns]
-    best = sorted(tried, key=lambda one: one[0])[:REFINED]
-    longer = [_refined(camera, cloud, surface, LONGER) for _, camera in best]
-    return [camera for _, camera in sorted(longer, key=lambda one: one[0])[:count]]
+    longer = [_refined(camera, cloud, surface, LONGER) for camera in _apart(tried, few)[:REFINED]]
+    return _apart(longer, few)[:count]
+
+
+def _apart(found: list[tuple[float, Camera]], cloud: Points) -> list[Camera]:
+    """Those that see a cloud elsewhere than all better ones do: most turns lead to the same few places."""
+    kept, places = list[Camera](), list[Points]()
+    size = float(np.ptp(cloud, axis=0).max())
+    for _, camera in sorted(found, key=lambda one: one[0]):
+        seen = camera.points(cloud)
+        if all(np.sqrt(((seen - one) ** 2).sum(axis=1).mean()) > APART * size for one in places):
+            kept.append(camera)
+            places.append(seen)
+    return kept
 
 
 def _refined(
