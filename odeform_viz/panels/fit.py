@@ -1,5 +1,6 @@
 """Fits the parameters of the model to the visible truth, step by step before the user's eyes."""
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -60,6 +61,7 @@ KNOWN_HINT = (
     "give the fit the contact and the force of the visible truth; mass, stiffness and friction are then found better"
 )
 NOTHING = Experiment("", {})
+ROUNDED = 0.01  # of masses and stiffnesses, by sliders
 EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
 
 
@@ -208,10 +210,10 @@ class FitPanel(Panel):
         truth, predictor = self._truth, _mechanical(self._page)
         if truth is None or predictor is None:
             return []
-        own = _body_of(_true(predictor, truth))
-        same = [one for one in self._page.experiments if _body_of(one.made.experiment.parameters) == own]
-        same = [one for one in same if np.array_equal(one.faces, truth.sequence.faces)]
-        return [one for one in same if one.made.experiment.parameters != _true(predictor, truth)]
+        true = _true(predictor, truth)
+        found = [one for one in self._page.experiments if np.array_equal(one.faces, truth.sequence.faces)]
+        found = [one for one in found if one.made.experiment.parameters != true]
+        return [one for one in found if _same_body(one.made.experiment.parameters, true)]
 
     def _use_proposed(self) -> None:
         """Set the sliders, on this page or on that of another load."""
@@ -259,6 +261,17 @@ def _true(predictor: Predictor, truth: RecordedMotion) -> dict[str, Any]:
 
 def _body_of(parameters: Parameters) -> dict[str, Any]:
     return {name: value for name, value in parameters.items() if name in (*BODY, OBJECT)}
+
+
+def _same_body(one: Parameters, other: Parameters) -> bool:
+    """Whether what is known of two bodies is the same, to what a slider rounds."""
+    first, second = _body_of(one), _body_of(other)
+    numbers = [name for name, value in first.items() if not isinstance(value, str)]
+    return (
+        first.keys() == second.keys()
+        and first.get(OBJECT) == second.get(OBJECT)
+        and all(math.isclose(first[name], second[name], rel_tol=ROUNDED) for name in numbers)
+    )
 
 
 @dataclass

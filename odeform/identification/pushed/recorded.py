@@ -42,7 +42,7 @@ def recorded_experiment(
     """Reads a motion under a load, with parameters `setting` that select the body and say what happened to it.
 
     Of a push the frames of its window are taken, of a drop or a throw those of 120 ms from the first contact on.
-    `InputError` for a motion of another surface, or a fall that ends before that.
+    `InputError` for a motion of another surface, and for a fall of which a parameter is not known, or that ends before.
     """
     model = pushed_model(predictor, setting)
     if model is None or not np.array_equal(recorded.faces, model.rest.faces):
@@ -51,6 +51,8 @@ def recorded_experiment(
         times, surface = window_of(recorded, model.schema.window.stop, model.schema.window.rate)
     else:
         falling = get_load(load)
+        if unknown := [p.name for p in falling.parameters if p.name not in setting]:
+            raise InputError(f"identify: expected a {load} that is known; {', '.join(unknown)} are not")
         known = recorded.frames(float(recorded.times[-1]), falling.window.rate)
         first = first_contact(known.vertices, falling, setting)
         if not 0 < first < len(known.times) - FRAMES:

@@ -72,6 +72,24 @@ def test_a_camera_is_found_from_half_of_the_surface() -> None:
     assert np.sqrt((away**2).mean()) < 0.005
 
 
+def test_cameras_that_are_tried_stand_apart() -> None:
+    mesh = egg()
+    cloud = cloud_of(TIMES, surfaces(mesh), mesh.faces, CloudView(points=400, noise_mm=1.0, seed=3)).points[0]
+    places = [camera.points(cloud) for camera in cameras_of(cloud, mesh, 4)]
+    assert len(places) > 1, "an egg looks alike from places about its axis"
+    for index, one in enumerate(places):
+        for other in places[:index]:
+            assert np.sqrt(((one - other) ** 2).sum(axis=1).mean()) > 0.05 * np.ptp(cloud, axis=0).max()
+
+
+def test_the_back_of_a_shell_is_seen() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    faces = np.array([[0, 1, 2]])
+    for turn in (1.0, -1.0):
+        (seen,) = cloud_of(np.zeros(1), (points * [1.0, turn, 1.0])[None], faces, CloudView(points=9)).points
+        assert np.isfinite(seen).all()
+
+
 def test_half_of_the_surface_is_seen() -> None:
     mesh = egg()
     whole, half = (

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
+from odeform.geometry.shape import surface_weights
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.identify import identify_body
+from odeform.identification.pushed.recorded import recorded_experiment, together_points
 from odeform.identification.pushed.state import PushState
 from odeform.identification.pushed.table import identify_drawn
 from odeform.identification.pushed.together import Made, Together, simulated_together
@@ -15,7 +17,7 @@ from odeform.identification.pushed.trials import Falls
 from odeform.identification.pushed.views import points_of
 from odeform.loads.registry import get_load
 from odeform.models.registry import load
-from odeform.types import Frames, Times
+from odeform.types import Frames, MotionSequence, Times
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +71,27 @@ def test_all_experiments_are_simulated_with_the_body_of_a_state(
         assert one.parameters["young"] == heavier.value("young")
         assert friction == heavier.value("friction")
     assert asked[1][0].parameters["height"] == made[1].experiment.parameters["height"]
+
+
+def test_recorded_falls_are_looked_at_for_120_ms_from_their_first_contact(forward: Forward, made: list[Made]) -> None:
+    predictor, given = load("contact-force"), {"object": "donut", **made[1].experiment.parameters}
+    rate = get_load("throw").window.rate
+    times = np.arange(round(0.5 * rate)) / rate
+    vertices = predictor.under("throw").solve(None, given).vertices(times)
+    rest = forward.model.rest
+    recorded = MotionSequence(times, vertices, rest.faces, surface_weights(rest), given)
+    one = recorded_experiment(predictor, "throw", recorded, given)
+    np.testing.assert_allclose(one.made.times, made[1].times)
+    assert one.surface[0, :, 2].min() < 5e-4 < vertices[:3, :, 2].min()
+    push = recorded_experiment(predictor, "push", recorded, given)
+    assert push.made.times[0] == 0.0
+    both = together_points([push, one])
+    assert both.times.tolist() == [*push.made.times, *one.made.times]
+    assert np.array_equal(both._on(np.concatenate([push.surface, one.surface])), both.positions)
+    with pytest.raises(InputError, match="recorded for 120 ms from its first contact on"):
+        recorded_experiment(predictor, "throw", recorded.until(float(one.made.times[3])), given)
+    with pytest.raises(InputError, match="vertex by vertex"):
+        recorded_experiment(predictor, "throw", replace(recorded, faces=rest.faces[:-1]), given)
 
 
 def test_what_is_no_experiment_is_refused(forward: Forward, made: list[Made]) -> None:

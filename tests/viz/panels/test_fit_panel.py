@@ -11,19 +11,22 @@ import pytest
 
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
+from odeform.geometry.shape import surface_weights
 from odeform.identification.identify import Identification, Identified
 from odeform.identification.pushed.evidence import Known
 from odeform.identification.pushed.recorded import Recorded, together_points
+from odeform.loads.registry import get_load
 from odeform.models.base import Predictor
 from odeform.models.registry import load
 from odeform.simulation.scenes.registry import get_scene
+from odeform.types import MotionSequence
 from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import MOST, Column
 from odeform_viz.panels import fit
 from odeform_viz.panels.fit import FitPanel, describe_identification
 from odeform_viz.panels.parameters import ParameterPanel
-from odeform_viz.panels.truth import NONE, entry_label
+from odeform_viz.panels.truth import NONE, TruthPanel, entry_label
 from odeform_viz.runtime.jobs import Report
 
 View = tuple[App, LoopbackClient]
@@ -194,8 +197,8 @@ def telling_of_the_body(
 
 
 @pytest.fixture
-def pushed() -> Iterator[LoopbackClient]:
-    """A client of a page with a push as truth, which a fit is to correct by simulations."""
+def pushed_page() -> Iterator[View]:
+    """A page with a push as truth, which a fit is to correct by simulations."""
     model = load("contact-force")
     app = App([Column("odeform", model, model.rest)], port=0)
     try:
@@ -204,9 +207,15 @@ def pushed() -> Iterator[LoopbackClient]:
             client.set("test sequence", entry_label(entry, app.session.schema))
             assert client.until(lambda: not client.controls[START].props["disabled"])
             client.set("by", fit.CORRECTED)
-            yield client
+            yield app, client
     finally:
         app.close()
+
+
+@pytest.fixture
+def pushed(pushed_page: View) -> LoopbackClient:
+    """The client of that page."""
+    return pushed_page[1]
 
 
 def test_a_fit_of_a_push_can_be_corrected_by_simulations(
@@ -265,3 +274,51 @@ def test_the_next_experiment_is_one_click_away_under_its_own_load(
 
 def test_only_pushes_are_corrected_by_simulations(dropped: View) -> None:
     assert not {"by", fit.KNOWN} & set(dropped[1].controls)
+
+
+def found_together(
+    report: Report, predictor: Predictor, experiments: list[Recorded], known: dict[str, Any], _: int
+) -> Identification:
+    """A fit of experiments that are known, after which a throw would tell most."""
+    seen = together_points(experiments)
+    throw = {p.name: p.default for p in get_load("throw").parameters}
+    estimates = {"mass": Identified(0.06, 0.05, 0.07, True, 0.0, 0.2)}
+    return Identification(
+        estimates, 0.5, float(len(seen.times)), {**throw, "mass": 0.06, "young": 30.0}, 0.4, proposed_load="throw"
+    )
+
+
+def test_a_throw_is_fitted_together_with_the_push_before(pushed_page: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fit, "fit_body", found_together)
+    app, client = pushed_page
+    client.set(fit.KNOWN, True)
+    assert not client.controls[fit.TOGETHER].visible, "nothing was fitted before"
+    client.click(START)
+    assert client.until(lambda: "The search took 20.0 s" in client.text())
+    mass = client.controls["mass (kg)"].value
+    assert f"| {mass:.3g} |" in client.text(), "the truth is of the object as it is"
+    client.click(fit.NEXT.format("throw"))
+    assert client.until(lambda: {"height (m)", "mass (kg)", fit.TOGETHER, START} <= set(client.controls))
+    assert client.until(lambda: client.controls["mass (kg)"].value == pytest.approx(mass)), "the body that is there"
+    assert fit.KNOWN not in client.controls, "what falls is known"
+    model = app.page.model.predictor
+    assert model is not None
+    given = app.page.controls.parameters()
+    times = np.arange(100) / 100.0
+    rest = model.rest_of(given)
+    vertices = model.solve(None, given).vertices(times)
+    thrown = MotionSequence(times, vertices, rest.faces, surface_weights(rest), given)
+    app.panel(TruthPanel).open(thrown)
+    assert client.until(lambda: fit.TOGETHER in client.controls and client.controls[fit.TOGETHER].visible)
+    client.click(START)
+    assert client.until(lambda: "The search took 33.0 s" in client.text())
+    assert fit.MADE.format(2, "push, throw") in client.text()
+    client.set(fit.TOGETHER, False)
+    client.click(START)
+    assert client.until(lambda: "The search took 13.0 s" in client.text())
+    app.panel(TruthPanel).open(
+        MotionSequence(times, vertices, rest.faces, surface_weights(rest), {"object": given["object"]})
+    )
+    assert client.until(lambda: not client.controls[fit.TOGETHER].visible), "it may be another body"
+    client.click(START)
+    assert client.until(lambda: "expected a throw that is known; height" in client.text())
