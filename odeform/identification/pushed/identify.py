@@ -117,8 +117,8 @@ def identify_body(
         Estimates of `mass`, `young` and `friction`.
 
     Raises:
-        InputError: A model of another kind, another load, no experiment, as many times as frames not, or a body that
-            cannot be simulated but should be.
+        InputError: A model of another kind, another load, no experiment, points at other times, or a body that cannot
+            be simulated but should be.
     """
     begin = time.perf_counter()
     given = dict(known or {})
