@@ -6,11 +6,13 @@ import pytest
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
 from odeform.identification.pushed.drawn import drawn_states, forward_of
+from odeform.identification.pushed.evidence import Cloud, Known
 from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.forward import Forward
-from odeform.identification.pushed.identify import identify_body
+from odeform.identification.pushed.identify import CLOUDED, CORRECTED, WIDENED, identify_body, widening
 from odeform.identification.pushed.recorded import recorded_experiment, together_points
-from odeform.identification.pushed.state import PushState
+from odeform.identification.pushed.search import Problem
+from odeform.identification.pushed.state import BODY, PUSH_STEPS, PushState
 from odeform.identification.pushed.table import identify_drawn
 from odeform.identification.pushed.together import Made, Together, simulated_together
 from odeform.identification.pushed.trials import Falls
@@ -123,3 +125,15 @@ def test_a_throw_tells_the_friction_that_a_push_does_not(forward: Forward, state
         off = found.parameters["friction"].unit - state.body[2]
         assert abs(off) < 1.5 * halves[-1]
     assert halves[1] < 0.3 * halves[0]
+
+
+def test_intervals_in_clouds_of_known_motions_are_as_wide_as_drawn_bodies_took(forward: Forward) -> None:
+    cloud = Cloud(np.zeros(1), [np.zeros((1, 3))], forward.model.rest.faces, 2.0)
+    known = Known(cloud.times, np.zeros((1, 1, 3)), cloud.faces, np.zeros(1, dtype=int), np.eye(3)[:1], 2.0)
+    every = range(len(BODY) + PUSH_STEPS)
+    problem = Problem(forward, cloud, np.zeros(1), (0, 1, 2))
+    assert widening(problem, corrected=False, unknown=False) == CLOUDED
+    assert widening(replace(problem, evidence=known), corrected=False, unknown=False) == 1.0
+    assert widening(replace(problem, free=tuple(every)), corrected=False, unknown=False) == 1.0, "not measured"
+    assert widening(problem, corrected=False, unknown=True) == WIDENED
+    assert widening(problem, corrected=True, unknown=True) == CORRECTED
