@@ -323,11 +323,18 @@ class _Search:
         proposed = Experiment(found.proposed_load, {**body, **found.proposed, **_body_of(self.truth)})
         made = [one.made.experiment.load for one in self.experiments]
         together = MADE.format(len(made), ", ".join(made)) if len(made) > 1 else ""
-        self.page.experiments += self.experiments[-1:]
+        self._remember()
         further = FURTHER.format(proposed.load, found.narrowed) if proposed.load else ""
         stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
         lines = "\n\n".join(filter(None, (text, together, stopped, further, self.note, self.hidden)))
         self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
+
+    def _remember(self) -> None:
+        """Keep the newest experiment for fits to come, once."""
+        for now in self.experiments[-1:]:
+            given = now.made.experiment.parameters
+            others = [one for one in self.page.experiments if one.made.experiment.parameters != given]
+            self.page.experiments[:] = [*others, now]
 
     def failed(self, message: str) -> None:
         """Say why there are none."""

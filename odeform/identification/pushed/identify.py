@@ -17,7 +17,7 @@ from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
 from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.simulator import experiment_simulator, simulator_of
-from odeform.identification.pushed.state import BODY, PUSH_STEPS, PushState
+from odeform.identification.pushed.state import BODY, PUSH_NAMES, PUSH_STEPS, PushState
 from odeform.identification.pushed.together import Made, Together, simulated_together
 from odeform.loads.registry import PUSH
 from odeform.models.base import Predictor
@@ -28,7 +28,6 @@ from odeform.types import Floats, Frames, Times
 
 __all__ = [
     "PUSHED",
-    "PUSH_NAMES",
     "WIDENED",
     "identifies_pushes",
     "identify_body",
@@ -39,7 +38,6 @@ __all__ = [
 
 PUSHED = "push"
 """Contact and force, in lists of what is known."""
-PUSH_NAMES = tuple(f"{kind}_{axis}" for kind in ("contact", "force") for axis in "xyz")
 CERTAIN = 1e-4
 """Standard deviation of what is known of the body, in halves of its range."""
 WIDENED = 7.8

@@ -13,7 +13,7 @@ from odeform.geometry.rigid import rotation_from_vector
 from odeform.schema import Parameter
 from odeform.types import Floats, Mesh, Points, Rotations, Vector
 
-__all__ = ["BODY", "BODY_STEP", "FRICTION", "POSE", "PUSH_STEPS", "Camera", "PushState", "body_steps"]
+__all__ = ["BODY", "BODY_STEP", "FRICTION", "POSE", "PUSH_NAMES", "PUSH_STEPS", "Camera", "PushState", "body_steps"]
 
 FRICTION = "friction"
 BODY = ("mass", "young", FRICTION)
@@ -22,6 +22,8 @@ BODY_STEP = 0.05
 """Of differences, in halves of the ranges of `BODY`."""
 PUSH_STEPS = 5
 """Unknowns of a push: two of the contact's place on the surface, three of the force."""
+PUSH_NAMES = tuple(f"{kind}_{axis}" for kind in ("contact", "force") for axis in "xyz")
+"""Parameters of a push."""
 POSE = 6
 """Unknowns of a camera."""
 

@@ -10,9 +10,9 @@ from odeform.identification.identify import Identification
 from odeform.identification.pushed.drawn import drawn_states, forward_of, seen
 from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.forward import Forward
-from odeform.identification.pushed.identify import PUSH_NAMES, PUSHED, identify_body, identify_push
+from odeform.identification.pushed.identify import PUSHED, identify_body, identify_push
 from odeform.identification.pushed.simulator import experiment_simulator
-from odeform.identification.pushed.state import BODY, PushState
+from odeform.identification.pushed.state import BODY, PUSH_NAMES, PushState
 from odeform.identification.pushed.together import Made, Together, simulated_together
 from odeform.identification.pushed.trials import Falls
 from odeform.identification.pushed.views import CloudView

@@ -89,7 +89,7 @@ class Falls:
         self._solved_at = self._solved_at[: int(self._seen.max(initial=0)) + 1]
         self.experiments = [Experiment(load.name, {**row, **self._of(body)}) for row in self._drawn]
         self._body, self._base = body, self._observed(moved[kept])
-        self.errors_mm = np.stack([forward.fall_errors(one) for one in self._base])
+        self.errors_mm = np.array([forward.fall_errors(one) for one in self._base]).reshape(self.times.shape)
 
     def surfaces(self, body: Floats) -> Surfaces:
         """(E, T, S, 3) m of a body (3,): see `Trials`."""

@@ -85,7 +85,7 @@ def test_recorded_falls_are_looked_at_for_120_ms_from_their_first_contact(forwar
     one = recorded_experiment(predictor, "throw", recorded, given)
     np.testing.assert_allclose(one.made.times, made[1].times)
     assert one.surface[0, :, 2].min() < 5e-4 < vertices[:3, :, 2].min()
-    push = recorded_experiment(predictor, "push", recorded, given)
+    push = recorded_experiment(predictor, "push", recorded, {**given, **made[0].experiment.parameters})
     assert push.made.times[0] == 0.0
     both = together_points([push, one])
     assert both.times.tolist() == [*push.made.times, *one.made.times]
