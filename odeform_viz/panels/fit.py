@@ -71,12 +71,12 @@ def describe_identification(found: Identification, schema: Schema, truth: Parame
     rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
     for name, one in found.parameters.items():
         true = truth.get(name)
-        estimate = f"**{one.value:.3g}**" if one.identifiable else "not identifiable"
-        known = "" if true is None else f"{true:.3g}"
+        estimate = f"**{_figure(one.value)}**" if one.identifiable else "not identifiable"
+        known = "" if true is None else _figure(true)
         title = titles.get(name, name.replace("_", " "))
-        rows.append(f"| {title} | {estimate} | {one.low:.3g} to {one.high:.3g} | {known} |")
+        rows.append(f"| {title} | {estimate} | {_figure(one.low)} to {_figure(one.high)} | {known} |")
     for parameter in (p for p in schema.parameters if p.role == "azimuth"):
-        known = f"{float(truth[parameter.name]):.3g}" if parameter.name in truth else ""
+        known = _figure(float(truth[parameter.name])) if parameter.name in truth else ""
         rows.append(f"| {titles[parameter.name]} | *as given* | | {known} |")
     explained = (
         "model and noise explain the motion"
@@ -85,6 +85,11 @@ def describe_identification(found: Identification, schema: Schema, truth: Parame
     )
     apart = f"Mean square difference from the motion: {found.misfit:.2g} of what is expected"
     return "\n".join([*rows, "", f"{apart}; {explained}. The search took {found.seconds:.1f} s."])
+
+
+def _figure(value: float) -> str:
+    """Three digits, without an exponent where people need none: a chip's stiffness is 1570 kPa."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 class FitPanel(Panel):

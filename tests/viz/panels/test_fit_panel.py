@@ -130,11 +130,13 @@ def test_a_search_that_fails_says_why(dropped: View, monkeypatch: pytest.MonkeyP
 
 def test_what_is_not_determined_is_not_given_as_a_number() -> None:
     sure, vague = Identified(0.7, 0.69, 0.71, True, 0.1, 0.01), Identified(0.3, 0.1, 0.9, False, 0.0, 1.3)
-    found = Identification({"mass": sure, "bending": vague, "friction": sure}, 3.0, 1.0)
+    large = Identified(1571.0, 1080.0, 22700.0, True, 0.1, 0.3)
+    found = Identification({"mass": sure, "bending": vague, "friction": sure, "young": large}, 3.0, 1.0)
     text = describe_identification(found, get_scene("kick").schema, {"mass": 0.72})
     assert "| mass (kg) | **0.7** | 0.69 to 0.71 | 0.72 |" in text
     assert "| bending (N m) | not identifiable | 0.1 to 0.9 |  |" in text
     assert "| friction | **0.7** | 0.69 to 0.71 |  |" in text
+    assert "| young | **1570** | 1080 to 22700 |  |" in text
     assert "| azimuth (rad) | *as given* | |  |" in text
     assert "the model does not explain this motion" in text
 
