@@ -53,6 +53,8 @@ class Worker:
             try:
                 pause = self._serve()
             except Exception:
+                if not self._running:  # a call that outlasted `stop`: what it serves may be closed
+                    return
                 # the session goes on with the last good frame; printed once, not 30 times a second
                 error = traceback.format_exc()
                 if error != printed:

@@ -10,6 +10,7 @@ import odeform
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 
+pytestmark = pytest.mark.usefixtures("unchecked")  # programs pass what annotations would refuse first
 SLOW = ("kick", "mass-elastic/odeform-rolling", "mass-elastic/direct")
 CASES = {
     "mass-elastic": ({"mass": 0.25, "bending": 1.3}, 1e-5),

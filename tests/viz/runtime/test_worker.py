@@ -68,3 +68,24 @@ def test_a_returned_pause_asks_for_another_round() -> None:
     assert done.wait(DEADLINE)
     worker.stop()
     assert len(rounds) == 5
+
+
+def test_an_error_of_a_call_that_outlasts_the_stop_is_not_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def serve() -> None:
+        begun.set()
+        assert go_on.wait(DEADLINE)
+        raise RuntimeError("the server is closed")
+
+    worker = Worker(serve)
+    worker.start()
+    assert begun.wait(DEADLINE)
+    stopping = threading.Thread(target=worker.stop)
+    stopping.start()
+    while worker.up_to_date:  # until it is told to stop
+        threading.Event().wait(0.001)
+    go_on.set()
+    stopping.join(DEADLINE)
+    assert not stopping.is_alive()
+    assert capsys.readouterr().err == ""
