@@ -37,7 +37,7 @@ NEXT_HINT = (
     "what would tell most of what is least known of the body; a drop or a throw changes what happens (Explore leads "
     "back to the push). Simulate or open its motion there, and fit it together with this one"
 )
-TOGETHER = "together with those before"
+TOGETHER = "with earlier experiments"
 TOGETHER_HINT = "fit one body to all its pushes, drops and throws that are known and were fitted since the page opened"
 MADE = "From {} experiments together: {}."
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
@@ -45,6 +45,10 @@ SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends a
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
 PUSH_OPEN = (
     "⚠ **Intervals were calibrated on pushes that are known**: this one is estimated, and they may be too narrow."
+)
+FALLEN = (
+    "⚠ **Intervals were calibrated on single pushes**: of several experiments, and of drops and throws, they may be too "
+    "narrow, above all those of friction."
 )
 ALONE = "the model"
 CORRECTED = f"model + {CORRECTIONS} simulations"
@@ -201,7 +205,9 @@ class FitPanel(Panel):
                 now = recorded_experiment(predictor, load, truth.sequence, true)
                 before = self._before() if self._together.value else []
                 fixed = {key: value for key, value in truth.setting.items() if key not in BODY}
-                search = _Search(self._page, model, true, fixed, self._show, CALIBRATED, [*before, now])
+                every = [*before, now]
+                note = CALIBRATED if len(every) == 1 and load == PUSH else FALLEN
+                search = _Search(self._page, model, true, fixed, self._show, note, every)
                 work, arguments = fit_body, (predictor, search.experiments, named, simulations)
         except InputError as error:
             self._show(FAILED.format(error))

@@ -274,6 +274,11 @@ def fit_parameters(report: Report, model: type[Predictor], checkpoint: Checkpoin
     return identify(predictor, seen, discrepancy, lambda theta: report((theta, misfits[-1])), misfits.append)
 
 
+def _steps(report: Report) -> Callable[[dict[str, float], float], None]:
+    """What reports the parameters and the misfit of each step."""
+    return lambda parameters, misfit: report((parameters, misfit))
+
+
 def fit_push(
     report: Report, predictor: Predictor, seen: "Evidence", known: dict[str, Any], simulations: int
 ) -> Identification:
@@ -281,10 +286,9 @@ def fit_push(
     before each of up to `simulations` a sentence."""
     from odeform.identification.pushed.identify import identify_push
 
-    def step(parameters: dict[str, float], misfit: float) -> None:
-        report((parameters, misfit))
-
-    return identify_push(predictor, seen, known, None, step, propose=True, simulations=simulations, note=report)
+    return identify_push(
+        predictor, seen, known, None, _steps(report), propose=True, simulations=simulations, note=report
+    )
 
 
 def fit_body(
@@ -294,11 +298,10 @@ def fit_body(
     from odeform.identification.pushed.identify import identify_body
     from odeform.identification.pushed.recorded import together_points
 
-    def step(parameters: dict[str, float], misfit: float) -> None:
-        report((parameters, misfit))
-
     made, seen = [one.made for one in experiments], together_points(experiments)
-    return identify_body(predictor, made, seen, known, None, step, propose=True, simulations=simulations, note=report)
+    return identify_body(
+        predictor, made, seen, known, None, _steps(report), propose=True, simulations=simulations, note=report
+    )
 
 
 def map_stability(report: Report, checkpoint: str) -> "StabilityMap":

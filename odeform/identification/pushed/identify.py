@@ -195,9 +195,8 @@ def widening(problem: Problem, corrected: bool, unknown: bool) -> float:
 
 def identifies_pushes(predictor: Predictor) -> bool:
     """Whether `identify_push` knows a model: a mechanical one of pushed bodies that have a mass and a stiffness."""
-    named = dict(getattr(predictor, "parameters_like", dict)())
     first = {OBJECT: predictor.schema.objects[0]} if predictor.schema.objects else {}
-    return pushed_model(predictor, named or first) is not None
+    return pushed_model(predictor, first) is not None
 
 
 def model_errors(predictor: Predictor, given: Mapping[str, Any], times: Times) -> Times:

@@ -315,6 +315,8 @@ def test_a_throw_is_fitted_together_with_the_push_before(pushed_page: View, monk
     client.click(START)
     assert client.until(lambda: "The search took 33.0 s" in client.text())
     assert fit.MADE.format(2, "push, throw") in client.text()
+    assert fit.FALLEN in client.text()
+    assert fit.CALIBRATED not in client.text(), "it was measured of single pushes"
     client.click(START)
     assert client.until(lambda: app.panel(FitPanel)._job is not None and not app.panel(FitPanel)._job.running)
     assert [one.made.experiment.load for one in app.page.experiments] == ["push", "throw"], "each once"
