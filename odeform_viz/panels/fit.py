@@ -47,8 +47,8 @@ PUSH_OPEN = (
     "⚠ **Intervals were calibrated on pushes that are known**: this one is estimated, and they may be too narrow."
 )
 FALLEN = (
-    "⚠ **Intervals were calibrated on single pushes**: of several experiments, and of drops and throws, they may be too "
-    "narrow, above all those of friction."
+    "⚠ **Intervals were calibrated on single pushes**: of several experiments, and of drops and throws, they may be "
+    "too narrow, above all those of friction."
 )
 ALONE = "the model"
 CORRECTED = f"model + {CORRECTIONS} simulations"
