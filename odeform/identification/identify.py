@@ -47,7 +47,7 @@ class Identification:
     Attributes:
         parameters: Estimates by name.
         misfit: Mean square residual relative to its expectation; at most 1 where model and noise explain the data.
-        seconds: Elapsed time.
+        seconds: Elapsed time until the estimates were known.
         proposed: Parameters of the next experiment, which would narrow the widest interval most; empty where none was
             asked for.
         narrowed: Half the width that this interval is expected to have afterwards, relative to that it has now.

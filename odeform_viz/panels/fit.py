@@ -106,6 +106,7 @@ class FitPanel(Panel):
         self._page, self._columns = page, page.columns
         self._lock = threading.Lock()
         self._job: Job | None = None
+        self._search: _Search | None = None
         self._truth: RecordedMotion | None = None
         self._found: Parameters = {}
         self._proposed = NOTHING
@@ -135,11 +136,16 @@ class FitPanel(Panel):
         return predictor is not None and (_mechanical(page) is not None or not why_not_identifiable(predictor))
 
     def close(self) -> None:
-        """Cancel the search in progress, if any."""
+        """Cancel the search in progress, if any; estimates that it has told stay."""
         with self._lock:
             if self._job is not None and self._job.running:
                 self._job.cancel()
-                self._show("")
+                self._show(*self._known_so_far())
+
+    def _known_so_far(self) -> tuple[str, Parameters]:
+        """The estimates of the search, if there are any yet."""
+        search = self._search
+        return (search.last, search.estimate) if search is not None and search.estimate else ("", {})
 
     def _refresh(self) -> None:
         """Follow the visible truth: another one has no estimate yet."""
@@ -183,11 +189,8 @@ class FitPanel(Panel):
             ends = float(observation.times[-1])
             note = SHORT.format(window.stop, ends) if ends < window.stop - 1.0 / window.rate else ""
             search = _Search(self._page, model, truth.setting, fixed, self._show, note)
-            arguments = type(predictor), predictor.checkpoint, observation
-            self._show("starting", working=True)
             self._page.controls.set_overlay(True)
-            self._job = Job(fit_parameters, arguments, search.done, search.failed, search.progress)
-            self._job.start()
+            self._run(search, fit_parameters, (type(predictor), predictor.checkpoint, observation))
 
     def _begin_body(self, predictor: Predictor, truth: RecordedMotion, model: Column) -> None:
         """Searches the body of a recorded motion, and the push if it is not known."""
@@ -212,6 +215,10 @@ class FitPanel(Panel):
         except InputError as error:
             self._show(FAILED.format(error))
             return
+        self._run(search, work, arguments)
+
+    def _run(self, search: "_Search", work: Callable[..., Identification], arguments: tuple[Any, ...]) -> None:
+        self._search = search
         self._show("starting", working=True)
         self._job = Job(work, arguments, search.done, search.failed, search.progress)
         self._job.start()
@@ -301,15 +308,21 @@ class _Search:
     """All that are fitted, the newest last, where they are known."""
     misfits: list[str] = field(default_factory=list)
     last: str = ""
-    """The last step in words."""
+    """The last step in words, or the estimates."""
+    estimate: Parameters = field(default_factory=dict)
+    """For the sliders, once it is known."""
     key: int | None = None
     hidden: str = ""
     """Why there is no column for it; the search goes on without one."""
 
-    def progress(self, report: float | str | tuple[dict[str, float], float]) -> None:
-        """Show a step, how far a calibration is, or what is simulated."""
+    def progress(self, report: float | str | tuple[dict[str, float], float] | Identification) -> None:
+        """Show a step, how far a calibration is, what is simulated, or the estimates before the next experiment."""
+        if isinstance(report, Identification):
+            self._estimated(report)
+            self.show(self.last, self.estimate, working=True)
+            return
         if isinstance(report, str):
-            self.show("\n\n".join(filter(None, (report, self.last))), working=True)
+            self.show("\n\n".join(filter(None, (report, self.last))), self.estimate, working=True)
             return
         if not isinstance(report, tuple):
             self.show(f"Measuring the model's own error first: {100.0 * report:.0f} %", working=True)
@@ -324,21 +337,29 @@ class _Search:
         self._place(parameters)
 
     def done(self, found: Identification) -> None:
-        """Show the estimates."""
-        known = self.page.schema.names  # friction has no slider
-        estimate = {name: one.value for name, one in found.parameters.items() if name in known}
-        self._place(estimate)
-        text = describe_identification(found, self.page.schema, self.truth)
+        """Show the estimates, and the next experiment."""
+        self._estimated(found)
         body = {name: value for name, value in self.fixed.items() if isinstance(value, str)}
         # what is made next is made with the body that is there
         proposed = Experiment(found.proposed_load, {**body, **found.proposed, **_body_of(self.truth)})
+        self.show(self.last, self.estimate, proposed=proposed)
+
+    def _estimated(self, found: Identification) -> None:
+        """Keep the estimates, and show their motion."""
+        known = self.page.schema.names  # friction has no slider
+        self.estimate = {**self.fixed, **{name: one.value for name, one in found.parameters.items() if name in known}}
+        self._place(self.estimate)
+        self.last = self._describe(found)
+        self._remember()
+
+    def _describe(self, found: Identification) -> str:
+        """Markdown of the estimates, and of what has to be known of them."""
+        text = describe_identification(found, self.page.schema, self.truth)
         made = [one.made.experiment.load for one in self.experiments]
         together = MADE.format(len(made), ", ".join(made)) if len(made) > 1 else ""
-        self._remember()
-        further = FURTHER.format(proposed.load, found.narrowed) if proposed.load else ""
         stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
-        lines = "\n\n".join(filter(None, (text, together, stopped, further, self.note, self.hidden)))
-        self.show(lines, {**self.fixed, **estimate}, proposed=proposed)
+        further = FURTHER.format(found.proposed_load, found.narrowed) if found.proposed_load else ""
+        return "\n\n".join(filter(None, (text, together, stopped, further, self.note, self.hidden)))
 
     def _remember(self) -> None:
         """Keep the newest experiment for fits to come, once."""

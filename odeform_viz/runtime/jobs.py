@@ -279,16 +279,19 @@ def _steps(report: Report) -> Callable[[dict[str, float], float], None]:
     return lambda parameters, misfit: report((parameters, misfit))
 
 
+def _asked(report: Report, simulations: int) -> dict[str, Any]:
+    """What is asked of a search beside the estimates: everything that it can tell is reported."""
+    return {"propose": True, "simulations": simulations, "note": report, "estimated": report}
+
+
 def fit_push(
     report: Report, predictor: Predictor, seen: "Evidence", known: dict[str, Any], simulations: int
 ) -> Identification:
     """Estimates how a pushed body is made and how it was pushed; reports the parameters and misfit of each step, and
-    before each of up to `simulations` a sentence."""
+    before each of up to `simulations` a sentence, and the estimates, before the next experiment is looked for."""
     from odeform.identification.pushed.identify import identify_push
 
-    return identify_push(
-        predictor, seen, known, None, _steps(report), propose=True, simulations=simulations, note=report
-    )
+    return identify_push(predictor, seen, known, None, _steps(report), **_asked(report, simulations))
 
 
 def fit_body(
@@ -299,9 +302,7 @@ def fit_body(
     from odeform.identification.pushed.recorded import together_points
 
     made, seen = [one.made for one in experiments], together_points(experiments)
-    return identify_body(
-        predictor, made, seen, known, None, _steps(report), propose=True, simulations=simulations, note=report
-    )
+    return identify_body(predictor, made, seen, known, None, _steps(report), **_asked(report, simulations))
 
 
 def map_stability(report: Report, checkpoint: str) -> "StabilityMap":

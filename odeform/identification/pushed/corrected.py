@@ -57,6 +57,10 @@ class Corrected(Forward):
             return moved
         return moved + np.stack([self._missed(state.vector) for state in states])
 
+    def check(self, state: PushState) -> None:
+        """`InputError` where the model cannot move a body."""
+        self._model.check(state)
+
     def _missed(self, vector: Floats) -> Frames:
         """(T, S, 3) m at a state: what was missed last, and its change along the way from the estimates before it."""
         *before, last = self._known

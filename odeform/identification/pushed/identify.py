@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,7 @@ def identify_push(
     propose: bool = False,
     simulations: int = 0,
     note: Callable[[str], None] = lambda _: None,
+    estimated: Callable[[Identification], None] = lambda _: None,
 ) -> Identification:
     """Estimate how a pushed body is made and how it was pushed, all jointly, each with a 90 % interval.
 
@@ -74,6 +75,7 @@ def identify_push(
         simulations: How often at most to simulate the estimate, to correct the model by what it misses there, and to
             estimate again: some ten seconds each.
         note: Called with what is done, before each simulation and before experiments are compared.
+        estimated: Called with the estimates as soon as they are known, before the next experiment is looked for.
 
     Returns:
         Estimates of `mass`, `young`, `friction`, and of the push where it is not known. A parameter whose interval
@@ -82,13 +84,11 @@ def identify_push(
     Raises:
         InputError: A model of another kind, only a part of a push, or a body that cannot be simulated but should be.
     """
-    begin = time.perf_counter()
+    asked = _Asked(errors_mm is None, simulations, propose, progress, note, estimated)
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
     simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
-    correcting = _Correcting(simulate, simulations, progress, note)
-    found = _searched(predictor, problem, start, given, correcting, errors_mm is None, propose)
-    return replace(found, seconds=time.perf_counter() - begin)
+    return _searched(predictor, problem, start, given, simulate, asked)
 
 
 def identify_body(
@@ -101,6 +101,7 @@ def identify_body(
     propose: bool = False,
     simulations: int = 0,
     note: Callable[[str], None] = lambda _: None,
+    estimated: Callable[[Identification], None] = lambda _: None,
 ) -> Identification:
     """Estimate mass, stiffness and friction of a body from several experiments that are known, each with a 90 %
     interval.
@@ -113,7 +114,7 @@ def identify_body(
         known: The object, and any of `mass` (kg), `young` (kPa) and `friction`.
         errors_mm: (T,) how wrong the model is, as of `identify_push`; by default as the error band says of pushes, and
             as was measured of drops and throws.
-        progress: As of `identify_push`, as are `propose`, `simulations` and `note`.
+        progress: As of `identify_push`, as are `propose`, `simulations`, `note` and `estimated`.
 
     Returns:
         Estimates of `mass`, `young` and `friction`.
@@ -122,7 +123,7 @@ def identify_body(
         InputError: A model of another kind, another load, no experiment, points at other times, or a body that cannot
             be simulated but should be.
     """
-    begin = time.perf_counter()
+    asked = _Asked(errors_mm is None, simulations, propose, progress, note, estimated)
     given = dict(known or {})
     model, named = _model_of(predictor, given)
     if not made:
@@ -137,19 +138,21 @@ def identify_body(
     simulate = None
     if simulations:
         simulate = simulated_together(forward, experiment_simulator(forward, given.get(OBJECT)))
-    correcting = _Correcting(simulate, simulations, progress, note)
-    found = _searched(predictor, problem, start, given, correcting, errors_mm is None, propose)
-    return replace(found, seconds=time.perf_counter() - begin)
+    return _searched(predictor, problem, start, given, simulate, asked)
 
 
 @dataclass(frozen=True)
-class _Correcting:
-    """By what the model is corrected, how often at most, and who is told."""
+class _Asked:
+    """What is asked of a search, and who is told."""
 
-    simulate: Callable[[PushState], Frames] | None
-    most: int
+    unknown: bool
+    """Whether nobody says by how much the model is wrong."""
+    simulations: int
+    propose: bool
     progress: Callable[[dict[str, float], float], None]
     note: Callable[[str], None]
+    estimated: Callable[[Identification], None]
+    begin: float = field(default_factory=time.perf_counter)
 
 
 def _searched(
@@ -157,33 +160,37 @@ def _searched(
     problem: Problem,
     start: PushState,
     given: dict[str, Any],
-    correcting: _Correcting,
-    unknown: bool,
-    propose: bool,
+    simulate: Callable[[PushState], Frames] | None,
+    asked: _Asked,
 ) -> Identification:
-    """Searches, corrects and proposes; `unknown` is by how much the model is wrong."""
+    """Searches, corrects the model by what simulates it, estimates, and proposes."""
     names = [*BODY, *(PUSH_NAMES if len(BODY) in problem.free else ())]
 
     def report(state: PushState, misfit: float) -> None:
         every = {**{name: state.value(name) for name in BODY}, **state.parameters()}
-        correcting.progress({name: every[name] for name in names}, misfit)
+        asked.progress({name: every[name] for name in names}, misfit)
 
     found = search(problem, start, report)
     correction = Correction(problem, found, np.zeros(0), 0)
-    if correcting.simulate is not None:
-        correction = corrected_search(problem, found, correcting.simulate, correcting.most, report, correcting.note)
+    if simulate is not None:
+        correction = corrected_search(problem, found, simulate, asked.simulations, report, asked.note)
         problem, found = correction.problem, correction.found
     corrected = correction.simulations > 0
-    widened = widening(problem, corrected, unknown)
+    widened = widening(problem, corrected, asked.unknown)
     estimates = estimates_of(problem, found, widened, correction.last if corrected else None)
-    proposed, narrowed = Experiment("", {}), 1.0
-    if propose and set(problem.free) & set(range(len(BODY))):
-        correcting.note("Looking for the experiment that would tell most next")
-        proposed, narrowed = _proposed(predictor, problem, found, given)
-    came_to = correction.simulations, correction.stopped
-    return Identification(
-        estimates, found.misfit, 0.0, dict(proposed.parameters), narrowed, *came_to, proposed_load=proposed.load
+    out = Identification(
+        estimates,
+        found.misfit,
+        time.perf_counter() - asked.begin,
+        simulations=correction.simulations,
+        stopped=correction.stopped,
     )
+    if not asked.propose or set(problem.free).isdisjoint(range(len(BODY))):
+        return out
+    asked.estimated(out)
+    asked.note("Looking for the experiment that would tell most next")
+    proposed, narrowed = _proposed(predictor, problem, found, given)
+    return replace(out, proposed=dict(proposed.parameters), narrowed=narrowed, proposed_load=proposed.load)
 
 
 def widening(problem: Problem, corrected: bool, unknown: bool) -> float:

@@ -9,13 +9,16 @@ import pytest
 from odeform.errors import InputError
 from odeform.identification.pushed.corrected import Corrected, corrected_search
 from odeform.identification.pushed.drawn import drawn_states, forward_of
+from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.identify import identify_push
 from odeform.identification.pushed.search import Problem, search
 from odeform.identification.pushed.simulator import can_simulate, simulator_of
 from odeform.identification.pushed.state import PushState
 from odeform.identification.pushed.table import identify_drawn, report_drawn
+from odeform.identification.pushed.together import Made, Together
 from odeform.identification.pushed.views import points_of
+from odeform.loads.registry import PUSH
 from odeform.models.registry import load
 from odeform.simulation.errors import SimulationError
 from odeform.types import Frames
@@ -56,7 +59,8 @@ def test_the_corrected_model_is_exact_where_it_was_simulated_and_along_the_way()
 
 
 @pytest.mark.slow
-def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
+@pytest.mark.parametrize("together", [False, True])
+def test_the_body_is_found_by_a_model_that_is_wrong(together: bool) -> None:
     predictor = load("contact-force")
     forward, state = forward_of(predictor, "dog"), drawn_states(predictor, "dog", 1, seed=0)[0]
     # in the world that is observed, bodies lie and rebound on another floor
@@ -64,10 +68,17 @@ def test_the_body_is_found_by_a_model_that_is_wrong() -> None:
     floor = replace(law, stiffness=0.6 * law.stiffness, damping=0.5 * law.damping)
     world = Forward(forward.model.with_contact_parameters(floor), forward.times)
     seen = points_of(forward.times, world.motions([state])[0], forward.model.rest.faces)
+    start = replace(state, body=np.zeros(3))
+    if together:  # what was made is known to the model, and not of the state
+        made = [Made(Experiment(PUSH, state.parameters()), forward.times)]
+        forward = Together(forward.model, made)
+        start = forward.state(np.zeros(3), np.zeros(3))
     problem = Problem(forward, seen, np.full(len(forward.times), 2.0), (0, 1, 2))
-    found = search(problem, replace(state, body=np.zeros(3)))
+    found = search(problem, start)
     told: list[str] = []
-    better = corrected_search(problem, found, lambda one: world.motions([one])[0], 4, note=told.append)
+    better = corrected_search(
+        problem, found, lambda one: world.motions([replace(state, body=one.body)])[0], 4, note=told.append
+    )
     off, left = (np.abs(one.state.body - state.body) for one in (found, better.found))
     assert better.simulations == len(told) > 0
     assert 0.0 < np.abs(better.last).max() < off.max(), "steps grow shorter"
