@@ -1,6 +1,7 @@
 """Identification of drawn bodies that are pushed, of which all is known, as a table."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -54,31 +55,18 @@ def identify_drawn(
         raise InputError("identify: drops and throws are known; expected the push to be known beside them")
     if simulations and not from_simulator:
         raise InputError("identify: simulations correct the model for bodies that the simulator moves, not the model")
+    asked = _Asked(view, noise_mm, from_simulator, known, simulations, falls)
     rows: list[dict[str, Any]] = []
     progress = Progress("identify", count * len(objects))
     for name in objects:
         forward = forward_of(predictor, name)
         for index, state in enumerate(drawn_states(predictor, name, count, seed)):
-            made = _made(forward, state, falls, seed + index)
-            each = Together(forward.model, made, forward.named)
             try:
-                if from_simulator:
-                    surface = simulated_together(each, experiment_simulator(forward, name))(state)
-                else:
-                    surface = each.motions([state])[0]
+                rows.append(_row(name, state, asked.identified(predictor, name, forward, state, seed + index)))
             except SimulationError as error:  # too strong a push of too soft a body; the others count
                 progress.advance(1, f"{name}: {error}")
-                continue
-            evidence = seen(each, surface, view, noise_mm, seed + index)
-            errors = None if from_simulator else np.zeros(len(each.times))
-            given = _given(name, state, known)
-            if falls:
-                of_body = {key: value for key, value in given.items() if key not in PUSH_NAMES}
-                found = identify_body(predictor, made, evidence, of_body, errors, simulations=simulations)
             else:
-                found = identify_push(predictor, evidence, given, errors, simulations=simulations)
-            rows.append(_row(name, state, found))
-            progress.advance(1, _note(rows[-1]))
+                progress.advance(1, _note(rows[-1]))
     progress.close()
     if not rows:
         raise InputError("identify: expected a body that can be simulated; none of those drawn could")
@@ -95,6 +83,36 @@ def identify_drawn(
         "factor_90": _factor(rows),
         "rows": rows,
     }
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """How bodies are moved and seen, and what the search is told: see `identify_drawn`."""
+
+    view: CloudView | None
+    noise_mm: float
+    from_simulator: bool
+    known: Sequence[str]
+    simulations: int
+    falls: Sequence[str]
+
+    def identified(
+        self, predictor: Predictor, name: str, forward: Forward, state: PushState, seed: int
+    ) -> Identification:
+        """Moves one body, and estimates it. `SimulationError` for one that cannot be simulated."""
+        made = _made(forward, state, self.falls, seed)
+        each = Together(forward.model, made, forward.named)
+        if self.from_simulator:
+            surface = simulated_together(each, experiment_simulator(forward, name))(state)
+        else:
+            surface = each.motions([state])[0]
+        evidence = seen(each, surface, self.view, self.noise_mm, seed)
+        errors = None if self.from_simulator else np.zeros(len(each.times))
+        given = _given(name, state, self.known)
+        if not self.falls:
+            return identify_push(predictor, evidence, given, errors, simulations=self.simulations)
+        of_body = {key: value for key, value in given.items() if key not in PUSH_NAMES}
+        return identify_body(predictor, made, evidence, of_body, errors, simulations=self.simulations)
 
 
 def _made(forward: Forward, state: PushState, falls: Sequence[str], seed: int) -> list[Made]:
