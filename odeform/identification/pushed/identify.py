@@ -15,7 +15,7 @@ from odeform.identification.pushed.estimates import estimates_of, posterior_of
 from odeform.identification.pushed.evidence import Evidence
 from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
-from odeform.identification.pushed.search import Found, Problem, search
+from odeform.identification.pushed.search import Problem, search
 from odeform.identification.pushed.simulator import experiment_simulator, simulator_of
 from odeform.identification.pushed.state import BODY, PUSH_NAMES, PUSH_STEPS, PushState
 from odeform.identification.pushed.together import Made, Together, simulated_together
@@ -174,10 +174,10 @@ def _searched(
     correction = Correction(problem, found, np.zeros(0), 0)
     if simulate is not None:
         correction = corrected_search(problem, found, simulate, asked.simulations, report, asked.note)
-        problem, found = correction.problem, correction.found
+        found = correction.found
     corrected = correction.simulations > 0
     widened = widening(problem, corrected, asked.unknown)
-    estimates = estimates_of(problem, found, widened, correction.last if corrected else None)
+    estimates = estimates_of(correction.problem, found, widened, correction.last if corrected else None)
     out = Identification(
         estimates,
         found.misfit,
@@ -189,7 +189,9 @@ def _searched(
         return out
     asked.estimated(out)
     asked.note("Looking for the experiment that would tell most next")
-    proposed, narrowed = _proposed(predictor, problem, found, given)
+    posterior = posterior_of(correction.problem, found)[0]
+    # what corrects these experiments says nothing of others
+    proposed, narrowed = _proposed(predictor, problem, found.state, posterior, given)
     return replace(out, proposed=dict(proposed.parameters), narrowed=narrowed, proposed_load=proposed.load)
 
 
@@ -263,17 +265,21 @@ def _free(given: Collection[str]) -> tuple[int, ...]:
     return (*body, *(() if parts <= set(given) else range(len(BODY), len(BODY) + PUSH_STEPS)))
 
 
-def _proposed(predictor: Predictor, problem: Problem, found: Found, given: dict[str, Any]) -> tuple[Experiment, float]:
-    """The experiment that narrows the widest interval of the body most, and to which fraction."""
+def _proposed(
+    predictor: Predictor, problem: Problem, state: PushState, posterior: Floats, given: dict[str, Any]
+) -> tuple[Experiment, float]:
+    """The experiment that narrows the widest interval of the body most, and to which fraction.
+
+    The covariance `posterior` (F, F) is that of what is unknown of the estimate `state`.
+    """
     covariance = CERTAIN**2 * np.eye(len(BODY))
     open_ = [index for index in problem.free if index < len(BODY)]
-    posterior = posterior_of(problem, found)[0]
     covariance[np.ix_(open_, open_)] = posterior[: len(open_), : len(open_)]
     forward, errors = problem.forward, problem.errors_mm
     if isinstance(forward, Together):
         forward = Forward(forward.model, forward.model.schema.window.times, forward.named)
-        errors = model_errors(predictor, given, forward.times)
+        errors = model_errors(predictor, forward.named, forward.times)
     forces = predictor.force_range(given)
-    tried = candidates(forward, found.state.body, forces, problem.evidence.noise_mm, errors)
+    tried = candidates(forward, state.body, forces, problem.evidence.noise_mm, errors)
     best = tried.best(covariance)
     return tried.experiments[best], widest(tried.after(covariance, best)) / widest(covariance)

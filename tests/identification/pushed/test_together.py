@@ -1,13 +1,15 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
+from odeform.identification.pushed import candidates, identify
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.evidence import Cloud, Known
-from odeform.identification.pushed.experiment import Experiment
+from odeform.identification.pushed.experiment import Candidates, Experiment
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.identify import CLOUDED, CORRECTED, WIDENED, identify_body, widening
 from odeform.identification.pushed.recorded import recorded_experiment, together_points
@@ -137,3 +139,44 @@ def test_intervals_in_clouds_of_known_motions_are_as_wide_as_drawn_bodies_took(f
     assert widening(replace(problem, free=tuple(every)), corrected=False, unknown=False) == 1.0, "not measured"
     assert widening(problem, corrected=False, unknown=True) == WIDENED
     assert widening(problem, corrected=True, unknown=True) == CORRECTED
+
+
+@pytest.mark.slow
+def test_simulations_correct_the_estimate_and_not_the_next_experiment(
+    forward: Forward, state: PushState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the world that is observed, bodies lie and rebound on another floor."""
+    predictor, made = load("contact-force"), [Made(Experiment("push", state.parameters()), forward.times)]
+    law = forward.model.contact_parameters
+    floor = replace(law, stiffness=0.6 * law.stiffness, damping=0.5 * law.damping)
+    world = Together(forward.model.with_contact_parameters(floor), made)
+
+    def simulate(one: Experiment, friction: float, times: Times) -> Frames:
+        values = {**one.parameters, "friction": friction}
+        body = np.array([r.normalise(values[r.name]) for r in forward.ranges])
+        alone = Together(world.model, [Made(one, times)])
+        return alone.motions([alone.state(np.zeros(3), np.zeros(3), body)])[0]
+
+    asked: list[Forward] = []
+
+    def looked_for(forward: Forward, *arguments: Any) -> Candidates:
+        asked.append(forward)
+        return candidates.candidates(forward, *arguments)
+
+    monkeypatch.setattr(identify, "experiment_simulator", lambda *_: simulate)
+    monkeypatch.setattr(identify, "candidates", looked_for)
+    monkeypatch.setattr(candidates, "PUSHED", 2)
+    monkeypatch.setattr(candidates, "FALLING", 1)
+    seen = points_of(world.times, world.motions([state])[0], forward.model.rest.faces)
+    known = {"object": "donut", "friction": state.value("friction")}
+    misses = np.full(len(world.times), 2.0)
+    found = [identify_body(predictor, made, seen, known, misses, propose=most > 0, simulations=most) for most in (0, 3)]
+    off, left = (
+        np.abs([one.parameters[name].unit - unit for name, unit in zip(BODY[:2], state.body, strict=False)])
+        for one in found
+    )
+    assert left.max() < 0.3 * off.max()
+    assert found[1].proposed_load
+    (one,) = asked
+    assert type(one) is Forward, "what corrects these experiments says nothing of others"
+    np.testing.assert_allclose(one.times, forward.times)
