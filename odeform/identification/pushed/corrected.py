@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.search import Found, Problem, misfit_of, refined
-from odeform.identification.pushed.state import PushState
+from odeform.identification.pushed.state import BODY, PushState
 from odeform.simulation.errors import SimulationError
 from odeform.types import Floats, Frames, Times
 
@@ -26,6 +26,8 @@ UNSURE = 0.01
 misses changes."""
 LEFT = 0.5
 """Of what the last correction missed at its own estimate, what the next one is expected to miss."""
+END = 0.98
+"""Of a range, from which on an estimate lies at its end."""
 ENOUGH_MM = 0.02
 """RMS distance of a simulation from what was expected there, below which another one tells nothing more."""
 
@@ -97,28 +99,38 @@ def corrected_search(
 ) -> Correction:
     """Estimates again with up to `most` simulations (T, S, 3) m, each at the estimate before it, and mechanics alone.
 
+    The first is in the middle of a range at whose end the estimate lies.
+
     It ends at a body that cannot be simulated, or where a simulation was as expected.
     """
     model, tried = Corrected(problem.forward.without_residual()), list[tuple[PushState, Frames]]()
     last = np.zeros(len(found.state.vector))
     for count in range(most):
         note(f"Simulating the estimate ({count + 1} of at most {most})")
+        at = found.state if tried else _inside(problem, found.state)
         try:
-            surface = simulate(found.state)
+            surface = simulate(at)
         except SimulationError as error:
             return Correction(problem, found, last, count, str(error))
-        missed = _rms_mm(surface - model.motions([found.state])[0])
-        model = model.with_simulated(found.state, surface)
+        missed = _rms_mm(surface - model.motions([at])[0])
+        model = model.with_simulated(at, surface)
         # at first, what the model itself is expected to miss bounds it
         errors = np.minimum(LEFT * missed, problem.errors_mm) if count == 0 else LEFT * missed
         problem = replace(problem, forward=model, errors_mm=errors)
-        tried.append((found.state, surface))
+        tried.append((at, surface))
         misfits = [misfit_of(problem, *one) for one in tried]
         before, found = found, refined(problem, tried[int(np.argmin(misfits))][0], progress)
         last = found.state.vector - before.state.vector
         if float(np.sqrt((missed**2).mean())) < ENOUGH_MM:
             return Correction(problem, found, last, count + 1)
     return Correction(problem, found, last, most)
+
+
+def _inside(problem: Problem, state: PushState) -> PushState:
+    """The state with the middle of each range of the body at whose end it lies. There a model that is wrong leads, and
+    what it misses there leads back no more."""
+    free = np.isin(np.arange(len(BODY)), problem.free)
+    return replace(state, body=np.where(free & (np.abs(state.body) > END), 0.0, state.body))
 
 
 def _rms_mm(away: Frames) -> Times:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from odeform.errors import InputError
+from odeform.identification.pushed import corrected
 from odeform.identification.pushed.corrected import Corrected, corrected_search
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.experiment import Experiment
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.identify import identify_push
-from odeform.identification.pushed.search import Problem, search
+from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.simulator import can_simulate, simulator_of
 from odeform.identification.pushed.state import PushState
 from odeform.identification.pushed.table import identify_drawn, report_drawn
@@ -119,3 +120,20 @@ def test_what_cannot_be_simulated_is_not() -> None:
     )
     with pytest.raises(InputError, match="mechanical"):
         identify_push(load("mass-elastic"), seen, state.parameters(), simulations=1)
+
+
+def test_an_estimate_at_the_end_of_a_range_is_first_simulated_in_its_middle(monkeypatch: pytest.MonkeyPatch) -> None:
+    forward, state = forward_of(load("contact-force"), "dog"), drawn_states(load("contact-force"), "dog", 1, seed=0)[0]
+    forward = Forward(forward.model, forward.times[:3])
+    state = replace(state, body=np.array([0.2, -1.0, 1.0]))
+    surface = forward.motions([state])[0]
+    problem = Problem(forward, points_of(forward.times, surface, forward.model.rest.faces), np.ones(3), (0, 2))
+    found, simulated = Found(state, np.eye(2), 1.0, True), list[list[float]]()
+
+    def simulate(one: PushState) -> Frames:
+        simulated.append(one.body.tolist())
+        return surface + 0.01
+
+    monkeypatch.setattr(corrected, "refined", lambda *_: found)
+    corrected_search(problem, found, simulate, 2)
+    assert simulated == [[0.2, -1.0, 0.0], [0.2, -1.0, 1.0]], "stiffness is known"
