@@ -43,7 +43,7 @@ class Corrected(Forward):
 
     def __init__(self, forward: Forward) -> None:
         """Misses nothing yet."""
-        vars(self).update(vars(forward))
+        super().__init__(forward.model, forward.times, forward.named)
         self._model, self._known = forward, tuple[_Simulated, ...]()
 
     def with_simulated(self, state: PushState, surface: Frames) -> "Corrected":
