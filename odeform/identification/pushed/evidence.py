@@ -1,10 +1,10 @@
 """What was observed of a pushed body, compared with predicted surfaces: points that are known, or clouds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
 from odeform.errors import InputError
@@ -50,6 +50,10 @@ class Evidence(Protocol):
         """Compares predicted surfaces (T, S, 3) m and their slopes (F, T, S, 3) m."""
         ...
 
+    def at(self, kept: Bool[np.ndarray, " times"]) -> "Evidence":
+        """The observation of some of the frames."""
+        ...
+
 
 def _causes(points: Floats, lever: float) -> Floats:
     """(N, 3) m -> (N, 3, 6): displacements by a shift and by a turn of 1 mm at `lever` m from the centre."""
@@ -88,6 +92,10 @@ class Known:
     def __post_init__(self) -> None:
         _check(self.times, list(self.positions), self.noise_mm)
 
+    def at(self, kept: Bool[np.ndarray, " times"]) -> "Known":
+        """The observation of some of the frames."""
+        return replace(self, times=self.times[kept], positions=self.positions[kept])
+
     def _on(self, surface: Floats) -> Floats:
         return np.einsum("nc,...nci->...ni", self.barycentric, surface[..., self.faces[self.face], :])
 
@@ -115,6 +123,10 @@ class Cloud:
 
     def __post_init__(self) -> None:
         _check(self.times, self.points, self.noise_mm)
+
+    def at(self, kept: Bool[np.ndarray, " times"]) -> "Cloud":
+        """The observation of some of the frames."""
+        return replace(self, times=self.times[kept], points=[self.points[index] for index in np.flatnonzero(kept)])
 
     def compared(self, surface: Frames, slopes: Floats, camera: Camera) -> Residuals:
         """Compares clouds, along normals of the nearest faces, with surfaces (T, S, 3) m and slopes (F, T, S, 3) m."""

@@ -15,7 +15,7 @@ from odeform.identification.pushed.estimates import estimates_of, posterior_of
 from odeform.identification.pushed.evidence import Evidence
 from odeform.identification.pushed.experiment import Experiment, widest
 from odeform.identification.pushed.forward import Forward, pushed_model
-from odeform.identification.pushed.search import Problem, search
+from odeform.identification.pushed.search import Found, Problem, search
 from odeform.identification.pushed.simulator import experiment_simulator, simulator_of
 from odeform.identification.pushed.state import BODY, PUSH_NAMES, PUSH_STEPS, PushState
 from odeform.identification.pushed.together import Made, Together, simulated_together
@@ -88,7 +88,8 @@ def identify_push(
     given = dict(known or {})
     problem, start = _problem(predictor, evidence, given, errors_mm)
     simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
-    return _searched(predictor, problem, start, given, simulate, asked)
+    found = search(problem, start, asked.step(problem))
+    return _searched(predictor, problem, found, given, simulate, asked)
 
 
 def identify_body(
@@ -114,7 +115,9 @@ def identify_body(
         known: The object, and any of `mass` (kg), `young` (kPa) and `friction`.
         errors_mm: (T,) how wrong the model is, as of `identify_push`; by default as the error band says of pushes, and
             as was measured of drops and throws.
-        progress: As of `identify_push`, as are `propose`, `simulations`, `note` and `estimated`.
+        simulations: As of `identify_push`; of falls beside pushes, these are corrected alone at first, and again as often
+            with all.
+        progress: As of `identify_push`, as are `propose`, `note` and `estimated`.
 
     Returns:
         Estimates of `mass`, `young` and `friction`.
@@ -134,11 +137,12 @@ def identify_body(
     start = forward.state(np.zeros(3), np.zeros(3), _known_body(forward, given))
     errors = _errors_of(predictor, forward, start, named) if errors_mm is None else errors_mm
     free = tuple(index for index, name in enumerate(BODY) if name not in given)
-    problem = Problem(forward, evidence, errors, free)
-    simulate = None
+    problem, found, simulate = Problem(forward, evidence, errors, free), None, None
     if simulations:
-        simulate = simulated_together(forward, experiment_simulator(forward, given.get(OBJECT)))
-    return _searched(predictor, problem, start, given, simulate, asked)
+        simulate_one = experiment_simulator(forward, given.get(OBJECT))
+        simulate = simulated_together(forward, simulate_one)
+        found = _by_pushes(problem, forward, start, simulate_one, asked)
+    return _searched(predictor, problem, found or search(problem, start, asked.step(problem)), given, simulate, asked)
 
 
 @dataclass(frozen=True)
@@ -154,26 +158,55 @@ class _Asked:
     estimated: Callable[[Identification], None]
     begin: float = field(default_factory=time.perf_counter)
 
+    def step(self, problem: Problem) -> Callable[[PushState, float], None]:
+        """What tells of a step."""
+        names = [*BODY, *(PUSH_NAMES if len(BODY) in problem.free else ())]
+
+        def report(state: PushState, misfit: float) -> None:
+            every = {**{name: state.value(name) for name in BODY}, **state.parameters()}
+            self.progress({name: every[name] for name in names}, misfit)
+
+        return report
+
+
+def _by_pushes(
+    problem: Problem,
+    forward: Together,
+    start: PushState,
+    simulate: Callable[[Experiment, float, Times], Frames],
+    asked: _Asked,
+) -> Found | None:
+    """What the pushes say alone, with simulations that correct the model; None where there are no falls beside them.
+
+    Where bodies land decides about all that follows, so that slopes of falls are right only near the body, and lead
+    astray from far away.
+    """
+    pushes = [one for one in forward.made if one.experiment.load == PUSH]
+    if not 0 < len(pushes) < len(forward.made):
+        return None
+    kept = np.concatenate([np.full(len(one.times), one.experiment.load == PUSH) for one in forward.made])
+    alone = Together(forward.model, pushes, forward.named)
+    part = Problem(alone, problem.evidence.at(kept), problem.errors_mm[kept], problem.free)
+    step, moved = asked.step(part), simulated_together(alone, simulate)
+
+    def note(text: str) -> None:
+        asked.note(f"By the pushes alone, at first. {text}")
+
+    return corrected_search(part, search(part, start, step), moved, asked.simulations, step, note).found
+
 
 def _searched(
     predictor: Predictor,
     problem: Problem,
-    start: PushState,
+    found: Found,
     given: dict[str, Any],
     simulate: Callable[[PushState], Frames] | None,
     asked: _Asked,
 ) -> Identification:
-    """Searches, corrects the model by what simulates it, estimates, and proposes."""
-    names = [*BODY, *(PUSH_NAMES if len(BODY) in problem.free else ())]
-
-    def report(state: PushState, misfit: float) -> None:
-        every = {**{name: state.value(name) for name in BODY}, **state.parameters()}
-        asked.progress({name: every[name] for name in names}, misfit)
-
-    found = search(problem, start, report)
+    """Corrects the model by what simulates it, estimates, and proposes."""
     correction = Correction(problem, found, np.zeros(0), 0)
     if simulate is not None:
-        correction = corrected_search(problem, found, simulate, asked.simulations, report, asked.note)
+        correction = corrected_search(problem, found, simulate, asked.simulations, asked.step(problem), asked.note)
         found = correction.found
     corrected = correction.simulations > 0
     widened = widening(problem, corrected, asked.unknown)
