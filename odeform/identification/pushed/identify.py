@@ -115,8 +115,8 @@ def identify_body(
         known: The object, and any of `mass` (kg), `young` (kPa) and `friction`.
         errors_mm: (T,) how wrong the model is, as of `identify_push`; by default as the error band says of pushes, and
             as was measured of drops and throws.
-        simulations: As of `identify_push`; of falls beside pushes, these are corrected alone at first, and again as often
-            with all.
+        simulations: As of `identify_push`. Where there are falls beside pushes, these are corrected alone at first, and
+            again as often with all.
         progress: As of `identify_push`, as are `propose`, `note` and `estimated`.
 
     Returns:

@@ -7,13 +7,14 @@ import pytest
 from odeform.errors import InputError
 from odeform.geometry.shape import surface_weights
 from odeform.identification.pushed import candidates, identify
+from odeform.identification.pushed.corrected import Correction
 from odeform.identification.pushed.drawn import drawn_states, forward_of
 from odeform.identification.pushed.evidence import Cloud, Known
 from odeform.identification.pushed.experiment import Candidates, Experiment
 from odeform.identification.pushed.forward import Forward
 from odeform.identification.pushed.identify import CLOUDED, CORRECTED, WIDENED, identify_body, widening
 from odeform.identification.pushed.recorded import recorded_experiment, together_points
-from odeform.identification.pushed.search import Problem
+from odeform.identification.pushed.search import Found, Problem
 from odeform.identification.pushed.state import BODY, PUSH_STEPS, PushState
 from odeform.identification.pushed.table import identify_drawn
 from odeform.identification.pushed.together import Made, Together, simulated_together
@@ -180,3 +181,38 @@ def test_simulations_correct_the_estimate_and_not_the_next_experiment(
     (one,) = asked
     assert type(one) is Forward, "what corrects these experiments says nothing of others"
     np.testing.assert_allclose(one.times, forward.times)
+
+
+def test_falls_are_fitted_from_where_the_pushes_lead(
+    forward: Forward, state: PushState, made: list[Made], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is simulated of falls is far off where the body is, and leads astray."""
+    middle = Found(replace(state, body=np.zeros(3)), np.eye(3), 1.0, True)
+    led = replace(middle, state=state)
+    asked: list[tuple[int, Found]] = []
+
+    def corrected(problem: Problem, found: Found, *_: object) -> Correction:
+        asked.append((len(problem.evidence.times), found))
+        return Correction(problem, led, np.zeros(9), 2)
+
+    monkeypatch.setattr(identify, "experiment_simulator", lambda *_: None)
+    monkeypatch.setattr(identify, "search", lambda *_: middle)
+    monkeypatch.setattr(identify, "corrected_search", corrected)
+    together = Together(forward.model, made)
+    seen = points_of(together.times, together.motions([state])[0], forward.model.rest.faces)
+    for some, parts in ((made, [(4, middle), (17, led)]), (made[:1], [(4, middle)])):
+        asked.clear()
+        kept = np.arange(17) < sum(len(one.times) for one in some)
+        found = identify_body(load("contact-force"), some, seen.at(kept), {"object": "donut"}, simulations=2)
+        assert asked == parts
+        assert found.parameters["mass"].unit == state.body[0]
+
+
+def test_some_frames_of_an_observation(forward: Forward) -> None:
+    surface = np.random.default_rng(0).normal(size=(3, *forward.model.rest.points.shape))
+    known = points_of(np.arange(3.0), surface, forward.model.rest.faces, noise_mm=1.0)
+    cloud = Cloud(known.times, [*known.positions], known.faces, 2.0)
+    kept = np.array([True, False, True])
+    for one, positions in ((known, known.at(kept).positions), (cloud, cloud.at(kept).points)):
+        assert one.at(kept).times.tolist() == [0.0, 2.0]
+        np.testing.assert_array_equal(positions, known.positions[kept])
