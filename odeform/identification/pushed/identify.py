@@ -89,7 +89,7 @@ def identify_push(
     problem, start = _problem(predictor, evidence, given, errors_mm)
     simulate = simulator_of(problem.forward, given.get(OBJECT)) if simulations else None
     found = search(problem, start, asked.step(problem))
-    return _searched(predictor, problem, found, given, simulate, asked)
+    return _identified(predictor, problem, found, given, simulate, asked)
 
 
 def identify_body(
@@ -142,7 +142,7 @@ def identify_body(
         simulate_one = experiment_simulator(forward, given.get(OBJECT))
         simulate = simulated_together(forward, simulate_one)
         found = _by_pushes(problem, forward, start, simulate_one, asked)
-    return _searched(predictor, problem, found or search(problem, start, asked.step(problem)), given, simulate, asked)
+    return _identified(predictor, problem, found or search(problem, start, asked.step(problem)), given, simulate, asked)
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def _by_pushes(
     return corrected_search(part, search(part, start, step), moved, asked.simulations, step, note).found
 
 
-def _searched(
+def _identified(
     predictor: Predictor,
     problem: Problem,
     found: Found,
