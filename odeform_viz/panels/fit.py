@@ -54,7 +54,7 @@ ALONE = "the model"
 CORRECTED = f"model + {CORRECTIONS} simulations"
 HOW = (
     "what the model misses looks like another body; simulations of the estimate say what it misses, and take some ten "
-    "seconds each"
+    "seconds each. With falls beside pushes, 3 are of the pushes alone, and 3 of all"
 )
 FAILED = "⚠ **The fit failed**: {}"
 FURTHER = "After the next {}, the widest interval of the body is expected to be {:.0%} as wide."
