@@ -195,9 +195,10 @@ class ColumnFrame:
     def error_band(self, times: Times) -> Floats | None:
         """(T, 2) mm at (T,) seconds: the RMS distance that half, and 90 %, of motions stay below; None if not known."""
         predictor = self.column.predictor
-        if predictor is None or (self.untrained and not predictor.knows_untrained_errors):
+        unknown = predictor is None or (self.untrained and not predictor.knows_untrained_errors)
+        if unknown or not isinstance(self.motion, Motion):
             return None
-        band = predictor.error_band(self.motion.parameters, times)
+        band = self.motion.error_band(times)
         return None if band is None else DISTANCE * band
 
     def stop_at(self, time: float) -> Stop | None:

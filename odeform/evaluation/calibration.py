@@ -9,8 +9,10 @@ from odeform.dataset.index import Dataset
 from odeform.errors import InputError
 from odeform.models.base import Predictor
 from odeform.models.conformal import FEWEST, SCORES, motion_score
+from odeform.models.error_band import SIZES
 from odeform.models.registry import observations
-from odeform.types import Floats, MotionSequence
+from odeform.schema import OBJECT
+from odeform.types import Arrays, Floats, MotionSequence
 
 __all__ = ["attach", "whole_motion_scores"]
 
@@ -33,11 +35,11 @@ def _score(predictor: Predictor, dataset: Dataset, recorded: MotionSequence) -> 
         on_frames &= whole.times > window.stop - 0.5 / window.rate
     truth = replace(whole, times=whole.times[on_frames], vertices=whole.vertices[on_frames])
     parameters = {**predictor.schema.known(dataset.fixed), **truth.parameters}
-    band = predictor.error_band(parameters, truth.times)
-    if band is None:
-        raise InputError(f"{predictor.model}: expected a model that has an error band")
     rest = predictor.to_body_frame(whole.rest, parameters)
     motion = predictor.solve(rest, parameters, observed=observations(predictor.schema, whole))
+    band = predictor.error_band(parameters, truth.times, lambda: motion.size_mm)
+    if band is None:
+        raise InputError(f"{predictor.model}: expected a model that has an error band")
     difference = motion.vertices(truth.times).astype(float) - truth.vertices
     return motion_score(1e3 * np.sqrt((difference**2).mean(axis=(1, 2))), band[:, 1])
 
@@ -52,6 +54,7 @@ def attach(predictor: Predictor, dataset: Dataset, split: str, path: str | Path,
     """
     checkpoint = predictor.checkpoint
     without = {name: array for name, array in checkpoint.arrays.items() if name.rpartition("/")[2] != SCORES}
+    without |= _sizes(predictor)
     plain = predictor.of_same_kind(replace(checkpoint, arrays=without))
     if predictor.schema.objects:
         known = [name for name in predictor.schema.objects if name in dataset.objects]
@@ -61,6 +64,23 @@ def attach(predictor: Predictor, dataset: Dataset, split: str, path: str | Path,
     scored = {f"{prefix}{SCORES}": _enough(plain, part, split) for prefix, part in each.items()}
     provenance = {**checkpoint.provenance, "band": source}
     plain.of_same_kind(replace(checkpoint, arrays={**without, **scored}, provenance=provenance)).save(path)
+
+
+def _sizes(predictor: Predictor) -> Arrays:
+    """How far the validation sequences of each object are predicted to move, which older checkpoints do not say."""
+    schema = predictor.schema
+    if schema.needs_observations:
+        return {}
+    out = {}
+    for name in schema.objects or ("",):
+        prefix, body = (f"{name}/", {OBJECT: name}) if name else ("", {})
+        theta = predictor.checkpoint.arrays.get(f"{prefix}val.theta", np.zeros((0, 0)))
+        sets = [
+            {p.name: p.denormalise(float(unit)) for p, unit in zip(schema.learned, row, strict=True)} for row in theta
+        ]
+        sizes = [predictor.size_mm(predictor.complete({**body, **one})) for one in sets]
+        out |= {f"{prefix}{SIZES}": np.array(sizes, dtype=np.float32)} if sizes else {}
+    return out
 
 
 def _enough(predictor: Predictor, dataset: Dataset, split: str) -> Floats:

@@ -12,6 +12,7 @@ from odeform.evaluation.bootstrap import mean_interval
 from odeform.evaluation.scores import Comparison, Mask, Scores, mean_of
 from odeform.models.base import Predictor
 from odeform.models.registry import observations
+from odeform.motion.base import Motion
 from odeform.schema import OBJECT, Schema, Window
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Frames, MotionSequence
@@ -149,7 +150,7 @@ def _compared(
     predicted = motion.vertices(clock + truth.times)
     on_frames = _on_frames(truth.times, window)
     between = ~_on_frames(clock + truth.times, trained) & (clock + truth.times < trained.stop)
-    covered, out = _covered(predictor, predicted, truth), {}
+    covered, out = _covered(predictor, motion, predicted, truth), {}
     for name, span in spans.items():
         inside = _within(truth.times, span)
         part = replace(truth, times=truth.times[inside], vertices=truth.vertices[inside])
@@ -195,9 +196,9 @@ def _within(times: Floats, *spans: tuple[float, float]) -> Mask:
     return kept
 
 
-def _covered(predictor: Predictor, predicted: Frames, truth: MotionSequence) -> Floats:
+def _covered(predictor: Predictor, motion: Motion, predicted: Frames, truth: MotionSequence) -> Floats:
     """(T,) 1 where the RMSE is within the model's 90 % error band, otherwise 0; NaN for a model without a band."""
-    band = predictor.error_band(truth.parameters, truth.times)
+    band = predictor.error_band(truth.parameters, truth.times, lambda: motion.size_mm)
     if band is None:
         return np.full(len(predicted), np.nan)
     rmse = 1e3 * np.sqrt(((predicted.astype(float) - truth.vertices) ** 2).mean(axis=(1, 2)))

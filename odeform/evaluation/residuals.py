@@ -6,6 +6,7 @@ import numpy as np
 
 from odeform.dataset.index import Dataset
 from odeform.models.base import Predictor
+from odeform.models.error_band import SIZES
 from odeform.models.reduced_model import ReducedModel
 from odeform.models.registry import observations
 from odeform.types import Arrays
@@ -16,9 +17,12 @@ SEQUENCES, FEW = 64, 8  # training sequences whose depth is looked up; few for m
 
 
 def validation_residuals(predictor: Predictor, dataset: Dataset, split: str = "val") -> Arrays:
-    """Returns the arrays of a checkpoint: `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, and
-    `val.rmse_mm` (S, T), the RMSE over all coordinates of each frame of each sequence; of several objects each, as
-    OBJECT/val.theta."""
+    """Returns the arrays of a checkpoint, of several objects each, as OBJECT/val.theta.
+
+    These are `val.theta` (S, P) parameters in [-1, 1], `val.times` (T,) s, `val.rmse_mm` (S, T), the RMSE over all
+    coordinates of each frame of each sequence, and `val.size_mm` (S,), how far each is predicted to move, unless that
+    needs observed frames.
+    """
     if len(dataset.objects) < 2:
         return _residuals(predictor, dataset, split)
     each = {name: _residuals(predictor, dataset.of(name), split) for name in dataset.objects}
@@ -31,7 +35,7 @@ def _residuals(predictor: Predictor, dataset: Dataset, split: str) -> Arrays:
     rate = dataset.schema.window.rate if predictor.schema.needs_observations else window.rate
     times = np.linspace(window.start, window.stop, round((window.stop - window.start) * rate) + 1)
     times = times[[0, -1]] if predictor.final_only else times
-    theta, errors = [], []
+    theta, errors, sizes = [], [], []
     for recorded in dataset.sequences(split):
         truth = recorded.until(window.stop)
         at = np.searchsorted(truth.times, times - 1e-6)
@@ -40,10 +44,13 @@ def _residuals(predictor: Predictor, dataset: Dataset, split: str) -> Arrays:
         difference = predicted.astype(float) - truth.vertices[at]
         theta.append(predictor.schema.vector(truth.parameters))
         errors.append(1e3 * np.sqrt((difference**2).mean(axis=(1, 2))))
+        if not predictor.schema.needs_observations:
+            sizes.append(predictor.size_mm({**predictor.schema.known(dataset.fixed), **truth.parameters}))
     return {
         "val.theta": np.array(theta, dtype=np.float32),
         "val.times": times.astype(np.float32),
         "val.rmse_mm": np.array(errors, dtype=np.float32),
+        **({SIZES: np.array(sizes, dtype=np.float32)} if sizes else {}),
     }
 
 

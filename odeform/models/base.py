@@ -1,7 +1,7 @@
 """The base class of all models: parameters and a shape in, a motion out."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -23,9 +23,10 @@ from odeform.models.solve import solved, solved_batch
 from odeform.motion.base import Motion
 from odeform.motion.limits import DEPTH, Limits
 from odeform.motion.motion_batch import MotionBatch
+from odeform.motion.recent import Recent
 from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, SHOWN, Parameters
-from odeform.simulation.contacts import CONTACT, FORCE, complete_push, vector_of
+from odeform.simulation.contacts import CONTACT, FORCE, complete_push, vector_of, weaker
 from odeform.simulation.scenes.registry import surroundings_of
 from odeform.solver.integrate import SolverSettings
 from odeform.types import Floats, Geometry, Mesh, MotionSequence, Times
@@ -40,6 +41,7 @@ __all__ = ["QUALITIES", "Predictor", "check_finite"]
 QUALITIES = ("draft", "balanced", "reference")
 """The names of solver settings, from cheap to fine; models that do not integrate accept them as well."""
 
+SIZES = 8  # motions whose size is kept
 DEEPER = 1.25  # times the depth below the floor of trained motions, where that is more than other bodies may have
 
 
@@ -146,6 +148,7 @@ class Predictor(ABC):
         """A shallow copy shares everything that was read."""
         out = object.__new__(type(self))
         vars(out).update(vars(self))
+        vars(out).pop("_sizes", None)  # the copy may move otherwise
         return out
 
     @abstractmethod
@@ -316,14 +319,35 @@ class Predictor(ABC):
         meets a twin of itself."""
         return geometry
 
-    def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
+    def error_band(
+        self, parameters: Parameters, times: Times, size: Callable[[], float] | None = None
+    ) -> Floats | None:
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
-        within. None where the checkpoint holds errors of too few validation sequences for that, and for a body of
-        another mass or stiffness than its own."""
+        within.
+
+        `size` tells `Motion.size_mm` of the motion; where it does not, and the band follows it, it is solved as
+        *draft*. None where the checkpoint holds errors of too few validation sequences for that, and for a body of
+        another mass or stiffness than its own.
+        """
         if self.model_of(parameters).is_changed(parameters):
             return None
         band = self._bands.get(parameters.get(OBJECT, ""), self._bands.get(""))
-        return None if band is None else band.at(self.schema.vector(parameters), times, self.stronger(parameters))
+        if band is None:
+            return None
+        stronger, moved = self.stronger(parameters), 0.0
+        if band.follows_size:
+            # beyond the strongest push, the band is that of this one, and grows with how much stronger it is
+            moved = size() if size and not stronger else self.size_mm(weaker(parameters, 1.0 + 0.5 * stronger))
+        return band.at(self.schema.vector(parameters), times, stronger, moved)
+
+    @cached_property
+    def _sizes(self) -> Recent[float]:
+        return Recent(SIZES)
+
+    def size_mm(self, parameters: Parameters) -> float:
+        """`Motion.size_mm` of the trained body, by the settings *draft*; the last few are kept."""
+        given = self.complete(parameters)
+        return self._sizes.get(tuple(given.items()), lambda: self.solve(None, given, "draft").size_mm)
 
     def stronger(self, parameters: Parameters) -> float:
         """By how much a push is stronger than all in training (`Contacts.stronger`); 0 in scenes without a sphere."""

@@ -9,7 +9,7 @@ from odeform.types import Floats
 
 __all__ = ["FEWEST", "SCORES", "conformal_factor", "motion_score"]
 
-SCORES = "val.whole"
+SCORES = "val.motions"
 """(S,) scores of motions that neither chose the model nor its band; kept in the checkpoint beside it."""
 FEWEST = 9
 """Motions from which on there is a 90 % quantile: of fewer, no score is large enough."""

@@ -7,7 +7,7 @@ from odeform.models.conformal import SCORES, conformal_factor
 from odeform.models.continuation import LATER_ERRORS
 from odeform.types import Arrays, Floats, Times
 
-__all__ = ["FEWEST", "OUTSIDE", "STRONGER", "ErrorBand", "error_band", "excess_of"]
+__all__ = ["FEWEST", "OUTSIDE", "SIZES", "STRONGER", "ErrorBand", "error_band", "excess_of"]
 
 NOMINAL = 0.9
 FEWEST = 8
@@ -19,8 +19,12 @@ OUTSIDE = "val.outside"
 """(2, P): by how much the logarithm of errors grows, per half trained range below and above it."""
 STRONGER = "val.stronger"
 """(): by how much it grows where a push is stronger than all in training, per half of the strongest of these."""
+SIZES = "val.size_mm"
+"""(S,) mm: RMS displacement, over the times of the errors, of the motion that the model predicts of each sequence."""
+BETTER = 0.9
+"""Of the mean square that is left of the scale: a band follows the size of motions if less is left then."""
 FARTHEST = 10.0  # doublings outside the trained range, at which the band stops widening
-ABOUT = 0.05  # fraction of the frames, on either side, that the quantiles of a frame are taken over
+ABOUT = 0.05  # fraction of the frames, on either side, that scale and quantiles of a frame are taken over
 
 
 def error_band(arrays: Arrays) -> "ErrorBand | None":
@@ -33,13 +37,15 @@ class ErrorBand:
     """The RMSE over time that half, and a fraction `NOMINAL`, of unseen motions with given parameters stay within.
 
     A split conformal band (Lei et al. 2018) of locally scaled residuals: the errors of the validation sequences are the
-    product of a profile over time, a scale that is smooth over the parameters, and a residual, whose quantiles around
-    each time make the band; the scale of a sequence is estimated from the others alone. Outside of the trained ranges
-    it grows as errors on simulations there did (`OUTSIDE`, `STRONGER`); without, it doubles with each `width`. Beyond
-    the window it grows in proportion to the time, or as the errors of the continuation did when it predicted the last
-    third of the window, if that is more; after as long as that, with the square of the time that they were predicted
-    for. Where a checkpoint has scores of whole motions (`odeform.models.conformal`), the upper quantile is widened or
-    narrowed so that `NOMINAL` of them stay within it at all times.
+    product of a profile over time, a scale that is smooth over parameters and time, and a residual, whose quantiles
+    around each time make the band; the scale of a sequence is estimated from the others alone. Where that predicts the
+    scale better, it is a power of the size of the predicted motion besides (`SIZES`): what hardly moves is hardly
+    wrong. Outside of the trained ranges it grows as errors on simulations there did (`OUTSIDE`, `STRONGER`); without,
+    it doubles with each `width`. Beyond the window it grows in proportion to the time, or as the errors of the
+    continuation did when it predicted the last third of the window, if that is more; after as long as that, with the
+    square of the time that they were predicted for. Where a checkpoint has scores of whole motions
+    (`odeform.models.conformal`), the upper quantile is widened or narrowed so that `NOMINAL` of them stay within it at
+    all times.
     """
 
     def __init__(self, arrays: Arrays) -> None:
@@ -55,23 +61,49 @@ class ErrorBand:
         self._times = arrays["val.times"].astype(float)
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
         profile = np.median(logs, axis=0)
-        self._levels = (logs - profile).mean(axis=1)
-        residuals = {width: self._levels - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
-        self._width = min(WIDTHS, key=lambda width: float((residuals[width] ** 2).mean()))
-        residual = logs - profile - (self._levels - residuals[self._width])[:, None]
-        near, count = round(ABOUT * len(profile)), len(profile)
-        quantiles = [np.quantile(residual[:, max(i - near, 0) : i + near + 1], [0.5, NOMINAL]) for i in range(count)]
+        self._by_size, self._smallest = 0.0, TINY
+        self._fit_scale(logs - profile, arrays.get(SIZES))
+        residual = [row.ravel() for row in _around(self._left)]
+        quantiles = np.array([np.quantile(row, [0.5, NOMINAL]) for row in residual])
         self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
         later = arrays.get(LATER_ERRORS, np.zeros((1, 1)))
         self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
 
+    @property
+    def follows_size(self) -> bool:
+        """Whether it depends on the size of the predicted motion."""
+        return self._by_size > 0.0
+
+    def _fit_scale(self, logs: Floats, sizes: Floats | None) -> None:
+        """Chooses how the scale follows parameters, time and size, from the logarithms (S, T) of errors over their
+        profile."""
+        self._levels = np.stack([part.mean(axis=1) for part in _around(logs)], axis=1)
+        self._width, self._left = self._best_width(logs)
+        if sizes is None:
+            return
+        moved = np.log(np.maximum(sizes.astype(float), TINY))
+        power, without = float(np.polyfit(moved, logs.mean(axis=1), 1)[0]), self._levels
+        self._levels = without - power * moved[:, None]
+        width, left = self._best_width(logs - power * moved[:, None])
+        if power > 0.0 and _unexplained(left) < BETTER * _unexplained(self._left):
+            self._by_size, self._smallest = power, float(np.exp(moved.min()))
+            self._width, self._left = width, left
+        else:
+            self._levels = without
+
+    def _best_width(self, logs: Floats) -> tuple[float, Floats]:
+        """The width by which the others predict each sequence best, and what they leave (S, T) of its logarithms."""
+        left = {width: logs - self._smooth(self._theta, width, leave_out=True) for width in WIDTHS}
+        width = min(WIDTHS, key=lambda width: float((left[width] ** 2).mean()))
+        return width, left[width]
+
     def _smooth(self, theta: Floats, width: float, leave_out: bool = False) -> Floats:
-        """(M, P) -> (M,) the log scale there, a kernel mean over the validation sequences."""
+        """(M, P) -> (M, T) the log scale there, a kernel mean over the validation sequences."""
         squares = ((theta[:, None] - self._theta) ** 2).sum(axis=2) / (2.0 * width**2)
         if leave_out:
             np.fill_diagonal(squares, np.inf)
         weights = np.exp(squares.min(axis=1, keepdims=True) - squares)
-        return (weights @ self._levels) / weights.sum(axis=1)
+        return (weights @ self._levels) / weights.sum(axis=1, keepdims=True)
 
     def _outside(self, theta: Floats, stronger: float) -> float:
         excess, doubling = excess_of(theta), np.log(2.0) / self._width
@@ -79,14 +111,17 @@ class ErrorBand:
         grown += min(stronger, 1e3) * (doubling if self._stronger is None else self._stronger)
         return min(float(grown), np.log(2.0) * FARTHEST)
 
-    def at(self, theta: Floats, times: Times, stronger: float = 0.0) -> Floats:
+    def at(self, theta: Floats, times: Times, stronger: float = 0.0, size: float = 0.0) -> Floats:
         """Maps (P,) parameters in [-1, 1] and (T,) seconds to (T, 2) mm: the median, and the quantile `NOMINAL`.
 
-        `stronger` is `odeform.surroundings.Contacts.stronger` of a push.
+        `stronger` is `odeform.surroundings.Contacts.stronger` of a push, and `size` the RMS displacement in mm of the
+        predicted motion, for a band that follows it (`follows_size`).
         """
-        level = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0] + self._outside(theta, stronger)
+        there = self._smooth(np.clip(theta, -1.0, 1.0)[None], self._width)[0]
+        bounds = self._profile + np.concatenate([there[:1], there])[:, None]
+        level = self._outside(theta, stronger) + self._by_size * np.log(max(size, self._smallest))
         stop = self._times[-1]
-        profile = np.stack([np.interp(times, self._times, column) for column in self._profile.T], axis=1)
+        profile = np.stack([np.interp(times, self._times, column) for column in bounds.T], axis=1)
         grown = np.maximum(times / stop, 1.0)[:, None] * np.exp(profile + level)
         frames = (times - stop) / (self._times[1] - self._times[0])
         leads = np.arange(len(self._later) + 1.0)
@@ -97,6 +132,18 @@ class ErrorBand:
         band = np.where(times[:, None] > 0.0, np.maximum(grown, later), 0.0)
         # nine in ten are not fewer than half
         return np.stack([band[:, 0], np.maximum(self._whole * band[:, 1], band[:, 0])], axis=1)
+
+
+def _around(rows: Floats) -> list[Floats]:
+    """T of (S, N): the entries of (S, T) around each time."""
+    count = rows.shape[1]
+    near = round(ABOUT * count)
+    return [rows[:, max(index - near, 0) : index + near + 1] for index in range(count)]
+
+
+def _unexplained(left: Floats) -> float:
+    """Mean square of what is left of the scale of whole sequences."""
+    return float((left.mean(axis=1) ** 2).mean())
 
 
 def excess_of(theta: Float[np.ndarray, "*batch parameters"]) -> Float[np.ndarray, "*batch 2 parameters"]:

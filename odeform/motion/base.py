@@ -19,6 +19,7 @@ __all__ = ["LATEST", "Motion", "SolveStats", "checked_times"]
 
 LATEST = 10.0
 """Trained windows after which the clock of every model has stopped."""
+FEW = 20_000  # points whose frames are moved faster than a body is solved
 
 
 def checked_times(t: float | Times) -> Times:
@@ -169,7 +170,18 @@ class Motion(Remade, ABC):
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions stay within. None where it is
         not known, as for most shapes that were not trained."""
         known = not self.untrained or self.validity.knows_untrained_errors
-        return self.validity.error_band(self.parameters, times) if known else None
+        if not known:
+            return None
+        # solving the trained body as draft is faster than moving very many points
+        size = (lambda: self.size_mm) if len(self.geometry.points) <= FEW else None
+        return self.validity.error_band(self.parameters, times, size)
+
+    @cached_property
+    def size_mm(self) -> float:
+        """RMS displacement of the points in mm over the window, or at the only moment that is known."""
+        times = self.schema.window.times[1:] if self.only_at is None else np.array([self.only_at])
+        moved = self.vertices(times).astype(float) - self.geometry.points
+        return 1e3 * float(np.sqrt((moved**2).mean()))
 
     def stop_at(self, time: float) -> Stop | None:
         """Says what is shown in place of `time` in seconds, and why; None where that moment itself is shown."""

@@ -22,8 +22,11 @@ class Validity:
     limits: Limits = field(default_factory=Limits)
     untrained: str = "it moves as the trained body would, with an unknown error"
     """How a shape that was not trained moves, and how wrong that is."""
-    error_band: Callable[[Parameters, Times], Floats | None] = lambda parameters, times: None
-    """(T, 2) mm at (T,) seconds: the RMSE that half, and nine in ten, of unseen motions stay below, or None."""
+    error_band: Callable[[Parameters, Times, Callable[[], float] | None], Floats | None] = (
+        lambda parameters, times, size: None
+    )
+    """(T, 2) mm at (T,) seconds: the RMSE that half, and nine in ten, of unseen motions stay below, or None; of the
+    parameters and what tells the size of the motion (`Motion.size_mm`)."""
     knows_untrained_errors: bool = False
     """Whether `error_band` holds for shapes that were not trained."""
     _similarities: Recent[tuple[Geometry, ShapeSimilarity]] = field(

@@ -21,6 +21,7 @@ __all__ = [
     "forces_there",
     "push_from",
     "vector_of",
+    "weaker",
 ]
 
 Forces: TypeAlias = tuple[float, float] | Callable[[SurfacePoint], tuple[float, float]]
@@ -74,6 +75,11 @@ def _given(given: Mapping[str, Any], name: str) -> Vector | None:
 def vector_of(parameters: Parameters, name: str) -> Vector:
     """Computes (3,) the parameters NAME_x, NAME_y and NAME_z."""
     return np.array([float(parameters[f"{name}_{axis}"]) for axis in "xyz"])
+
+
+def weaker(parameters: Parameters, times: float) -> dict[str, Any]:
+    """Returns the same push with a force so many times weaker."""
+    return {name: value / times if name.startswith(f"{FORCE}_") else value for name, value in parameters.items()}
 
 
 def contact_parameters(push: Push) -> dict[str, float]:

@@ -45,7 +45,7 @@ def test_the_curves_of_a_motion(checkpoint: str, tmp_path: Path) -> None:
     assert np.allclose(column(rows, "deformation_rms_mm"), 1e3 * motion.deformation_rms(times), rtol=1e-5, atol=1e-6)
     trace = np.trace(motion.pose(times)[:, :3, :3], axis1=1, axis2=2)
     assert np.allclose(np.cos(np.radians(column(rows, "rotation_deg"))), 0.5 * (trace - 1.0), atol=1e-6)
-    band = predictor.error_band(motion.parameters, times)
+    band = motion.error_band(times)
     assert band is not None
     assert np.allclose(column(rows, "expected_error_median_mm"), band[:, 0], rtol=1e-6)
     assert np.allclose(column(rows, "expected_error_90_mm"), band[:, 1], rtol=1e-6)

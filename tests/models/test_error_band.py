@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from odeform.models.error_band import FEWEST, ErrorBand, error_band
+from odeform.models.error_band import FEWEST, SIZES, ErrorBand, error_band
 from odeform.types import Arrays
 
 TIMES = np.linspace(0.0, 1.0, 41)
@@ -35,6 +35,48 @@ def test_nine_in_ten_keep_to_the_band(expected: ErrorBand) -> None:
 def test_where_errors_are_larger_the_band_is_wider(expected: ErrorBand) -> None:
     small, large = (expected.at(np.array([x, 0.0]), TIMES)[20] for x in (-0.8, 0.8))
     assert (large > 3.0 * small).all()
+
+
+def test_what_grows_at_some_times_only_is_wider_there() -> None:
+    rng = np.random.default_rng(3)
+    theta = rng.uniform(-1.0, 1.0, (60, 2))
+    late = (TIMES > 0.5) * 1.5 * theta[:, :1]
+    arrays = {"val.theta": theta, "val.times": TIMES, "val.rmse_mm": np.exp(late + 0.1 * rng.normal(size=late.shape))}
+    small, large = (ErrorBand(arrays).at(np.array([x, 0.0]), TIMES)[:, 1] for x in (-0.8, 0.8))
+    assert (large[1:18] < 1.2 * small[1:18]).all()
+    assert (large[24:] > 5.0 * small[24:]).all()
+
+
+def sized(count: int, seed: int, power: float) -> Arrays:
+    """Errors that follow the size of motions, which the parameters hardly tell."""
+    rng = np.random.default_rng(seed)
+    sizes = np.exp(rng.normal(size=count))
+    scatter = 0.1 * rng.normal(size=(count, len(TIMES)))
+    rmse = TIMES * sizes[:, None] ** power * np.exp(scatter)
+    theta = rng.uniform(-1.0, 1.0, (count, 2))
+    return {"val.theta": theta, "val.times": TIMES, "val.rmse_mm": rmse, SIZES: sizes}
+
+
+def test_the_band_follows_the_size_of_motions_only_where_errors_do() -> None:
+    arrays = sized(40, 0, 0.7)
+    band, theta = ErrorBand(arrays), np.zeros(2)
+    assert band.follows_size
+    one, tenfold = (band.at(theta, TIMES, size=size)[20] for size in (0.5, 5.0))
+    np.testing.assert_allclose(tenfold / one, 10.0**0.7, rtol=0.05)
+    smallest = arrays[SIZES].min()
+    np.testing.assert_array_equal(
+        band.at(theta, TIMES, size=0.0), band.at(theta, TIMES, size=float(smallest))
+    )  # nothing is known of smaller ones
+    fresh = sized(300, 1, 0.7)
+    rows = zip(fresh["val.theta"], fresh[SIZES], strict=True)
+    bounds = np.stack([band.at(theta, TIMES, size=float(size))[1:, 1] for theta, size in rows])
+    assert (fresh["val.rmse_mm"][:, 1:] <= bounds).mean() == pytest.approx(0.9, abs=0.05)
+    for power in (0.0, -0.7):  # what moves less is not more wrong
+        assert not ErrorBand(sized(40, 0, power)).follows_size
+    without = {name: array for name, array in sized(40, 0, 0.0).items() if name != SIZES}
+    np.testing.assert_array_equal(
+        ErrorBand(without).at(theta, TIMES), ErrorBand(sized(40, 0, 0.0)).at(theta, TIMES, size=3.0)
+    )
 
 
 def test_nothing_is_off_at_rest_and_more_outside(expected: ErrorBand) -> None:

@@ -86,7 +86,7 @@ def compare_later(model: Predictor, later: Later) -> dict[str, Any]:
         motion = model.solve(Mesh(truth[0], later.faces), entry.parameters)
         predicted = motion.vertices(later.times)
         errors.append(1e3 * np.sqrt(((predicted - truth) ** 2).sum(axis=2).mean(axis=1) / 3.0))
-        band = model.error_band(motion.parameters, later.times)
+        band = motion.error_band(later.times)
         bands.append(np.full(len(later.times), np.nan) if band is None else band[:, 1])
         after = later.times > window.stop
         ends.append([_summary(one[after].mean(axis=1), window.rate) for one in (predicted, truth)])

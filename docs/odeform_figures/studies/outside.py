@@ -26,7 +26,7 @@ from odeform.models.registry import load
 from odeform.models.training.outside import growth_of_stronger, growth_outside
 from odeform.parallel import parallel_map
 from odeform.schema import OBJECT, Parameter, Parameters, Schema
-from odeform.simulation.contacts import FORCE
+from odeform.simulation.contacts import weaker
 from odeform.simulation.objects.catalog import get_object
 from odeform.simulation.scenes.contact_force import drawn_on, simulate_object
 from odeform.simulation.scenes.registry import get_scene
@@ -120,7 +120,7 @@ def _compared(model: Predictor, times: Floats, name: str, parameters: Parameters
     motion = model.solve(PointCloud(truth[0]), parameters)
     truth = truth[np.minimum(np.arange(len(times)), len(truth) - 1)]  # simulations end when the body lies still
     errors = 1e3 * np.sqrt(np.square(motion.vertices(times) - truth).mean(axis=(1, 2)))
-    band = model.error_band(motion.parameters, times)
+    band = motion.error_band(times)
     if band is None:
         raise InputError(f"{model.model}: expected a model with an error band")
     return Outside(name, parameters, errors[1:], band[1:])
@@ -151,7 +151,10 @@ def fitted(model: Predictor, motions: list[Outside]) -> Predictor:
     """The model with a band that widens as the errors of these motions do: of pushed bodies, all alike."""
     if model.schema.objects:
         stronger = np.array([model.stronger(each.parameters) for each in motions])
-        bands = [_of_nearest(model, _weakened(each.parameters, by)) for each, by in zip(motions, stronger, strict=True)]
+        bands = [
+            _of_nearest(model, weaker(each.parameters, 1.0 + 0.5 * by))
+            for each, by in zip(motions, stronger, strict=True)
+        ]
         scores = [motion_score(each.errors, band[:, 1]) for each, band in zip(motions, bands, strict=True)]
         growth = growth_of_stronger(stronger, np.array(scores))
         added = {f"{name}/{STRONGER}": growth for name in model.schema.objects}
@@ -171,13 +174,6 @@ def _of_nearest(model: Predictor, parameters: Parameters) -> Floats:
     if band is None:
         raise InputError(f"{model.model}: expected a model with an error band")
     return band[1:]
-
-
-def _weakened(parameters: Parameters, stronger: float) -> dict[str, Any]:
-    """The same push with the strongest force in training, of one that is so much stronger (`Contacts.stronger`)."""
-    return {
-        name: value / (1.0 + 0.5 * stronger) if name.startswith(FORCE) else value for name, value in parameters.items()
-    }
 
 
 def main() -> None:

@@ -1,6 +1,7 @@
 """One body in several experiments that were made with it, pushes, drops and throws, whose parameters are known."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,7 +84,13 @@ def _pushed(state: PushState, given: Parameters) -> PushState:
 def simulated_together(
     forward: Together, simulate: Callable[[Experiment, float, Times], Frames]
 ) -> Callable[[PushState], Frames]:
-    """Returns what simulates all experiments with the body of a state, by `experiment_simulator`."""
-    return lambda state: np.concatenate(
-        [simulate(one.of(state), state.value(FRICTION), one.times) for one in forward.made]
-    )
+    """Returns what simulates all experiments with the body of a state, at once, by `experiment_simulator`."""
+
+    def simulated(state: PushState) -> Frames:
+        # the simulator lets other threads run meanwhile
+        with ThreadPoolExecutor(len(forward.made)) as pool:
+            friction = state.value(FRICTION)
+            surfaces = pool.map(lambda one: simulate(one.of(state), friction, one.times), forward.made)
+            return np.concatenate([*surfaces])
+
+    return simulated

@@ -1,6 +1,6 @@
 """The mechanical model of a body that it was not trained on: a mesh, points or splats of the user's own."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -22,7 +22,6 @@ from odeform.models.modal.shape_band import SHAPE_BAND, ShapeBand
 from odeform.models.modal.transferred_residual import shape_distance, transfer_weight, transferred_residual
 from odeform.models.modal.user_part import forces_in
 from odeform.models.per_object import PerObject
-from odeform.motion.recent import Recent
 from odeform.motion.validity import Validity
 from odeform.schema import OBJECT, Parameters
 from odeform.simulation.objects.soft_object import SoftMaterial, SoftObject
@@ -30,7 +29,6 @@ from odeform.types import Floats, Geometry, Mesh, Points, Times
 
 __all__ = ["UserBody", "UserBodyPredictor", "resting_body", "takes_user_bodies", "user_body"]
 
-SIZES = 8  # motions whose size is kept
 ALONE = threadpool_limits.wrap(limits=1, user_api="blas")
 """Products here are small: two threads that wait for each other took three times as long on a busy machine."""
 NEIGHBOURS = 4  # nodes that carry a point of the shape
@@ -162,7 +160,6 @@ class UserBodyPredictor(ModalModel):
         band = trained.checkpoint.config.get(SHAPE_BAND)
         self._band = None if band is None else ShapeBand.from_json(band)
         self.knows_untrained_errors = self._band is not None
-        self._sizes: Recent[float] = Recent(SIZES)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return UserBodyPredictor, (self.trained, self.user_body)
@@ -192,19 +189,15 @@ class UserBodyPredictor(ModalModel):
     def bodies(self) -> tuple[Mesh, ...]:
         return self.trained.bodies
 
-    def error_band(self, parameters: Parameters, times: Times) -> Floats | None:
+    def error_band(
+        self, parameters: Parameters, times: Times, size: Callable[[], float] | None = None
+    ) -> Floats | None:
         """(T, 2) mm at `times` (T,) s, as that of trained bodies, from errors on other shapes that were not trained: it
         widens with `distance`. None where the checkpoint has no such errors."""
         if self._band is None or self.is_changed(parameters):
             return None
         given = self.complete({**self.parameters_like(), **parameters})
-        size = self._sizes.get(tuple(given.items()), lambda: self._size_of(given))
-        return self._band.at(size, self.distance, times)
-
-    def _size_of(self, parameters: Parameters) -> float:
-        """mm: RMS displacement of the whole motion."""
-        moved = self.solve(None, parameters, "draft").vertices(self.schema.window.times[1:]) - self.rest.points
-        return 1e3 * float(np.sqrt((moved.astype(float) ** 2).mean()))
+        return self._band.at(size() if size else self.size_mm(given), self.distance, times)
 
     def rest_of(self, parameters: Mapping[str, Any]) -> Mesh:
         return self.rest

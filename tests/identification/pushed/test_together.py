@@ -1,3 +1,4 @@
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -61,21 +62,22 @@ def test_frames_of_experiments_follow_each_other(forward: Forward, state: PushSt
 def test_all_experiments_are_simulated_with_the_body_of_a_state(
     forward: Forward, state: PushState, made: list[Made]
 ) -> None:
-    asked: list[tuple[Experiment, float]] = []
+    asked: dict[str, tuple[Experiment, float]] = {}
+    all_are_running = threading.Barrier(len(made), timeout=60.0)
 
     def simulate(experiment: Experiment, friction: float, times: Times) -> Frames:
-        asked.append((experiment, friction))
-        return np.zeros((len(times), 5, 3))
+        asked[experiment.load] = (experiment, friction)
+        all_are_running.wait()
+        return np.full((len(times), 5, 3), float(experiment.load == "throw"))
 
     heavier = replace(state, body=np.array([0.5, -0.5, 1.0]))
     surface = simulated_together(Together(forward.model, made), simulate)(heavier)
-    assert surface.shape == (17, 5, 3)
-    assert [one.load for one, _ in asked] == ["push", "throw"]
-    for one, friction in asked:
-        assert one.parameters["mass"] == heavier.value("mass")
-        assert one.parameters["young"] == heavier.value("young")
+    np.testing.assert_array_equal(surface[:, 0, 0], [0.0] * 4 + [1.0] * 13)
+    for experiment, friction in asked.values():
+        assert experiment.parameters["mass"] == heavier.value("mass")
+        assert experiment.parameters["young"] == heavier.value("young")
         assert friction == heavier.value("friction")
-    assert asked[1][0].parameters["height"] == made[1].experiment.parameters["height"]
+    assert asked["throw"][0].parameters["height"] == made[1].experiment.parameters["height"]
 
 
 def test_recorded_falls_are_looked_at_for_120_ms_from_their_first_contact(forward: Forward, made: list[Made]) -> None:
