@@ -325,8 +325,7 @@ class Predictor(ABC):
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
         within.
 
-        `size` tells `Motion.size_mm` of the motion; where it does not, and the band follows it, it is solved as
-        *draft*. None where the checkpoint holds errors of too few validation sequences for that, and for a body of
+        `size` tells `Motion.size_mm` of the motion; without it, a band that follows it solves the motion. None where the checkpoint holds errors of too few validation sequences for that, and for a body of
         another mass or stiffness than its own.
         """
         if self.model_of(parameters).is_changed(parameters):
@@ -345,9 +344,9 @@ class Predictor(ABC):
         return Recent(SIZES)
 
     def size_mm(self, parameters: Parameters) -> float:
-        """`Motion.size_mm` of the trained body, by the settings *draft*; the last few are kept."""
+        """`Motion.size_mm` of the trained body; the last few are kept."""
         given = self.complete(parameters)
-        return self._sizes.get(tuple(given.items()), lambda: self.solve(None, given, "draft").size_mm)
+        return self._sizes.get(tuple(given.items()), lambda: self.solve(None, given).size_mm)
 
     def stronger(self, parameters: Parameters) -> float:
         """By how much a push is stronger than all in training (`Contacts.stronger`); 0 in scenes without a sphere."""

@@ -172,7 +172,7 @@ class Motion(Remade, ABC):
         known = not self.untrained or self.validity.knows_untrained_errors
         if not known:
             return None
-        # solving the trained body as draft is faster than moving very many points
+        # solving the trained body is faster than moving very many points
         size = (lambda: self.size_mm) if len(self.geometry.points) <= FEW else None
         return self.validity.error_band(self.parameters, times, size)
 

@@ -12,6 +12,7 @@ from odeform.dataset.store import open_dataset
 from odeform.errors import InputError
 from odeform.evaluation.calibration import attach, whole_motion_scores
 from odeform.evaluation.metrics import evaluate
+from odeform.models.error_band import SIZES
 from odeform.models.registry import load
 
 
@@ -37,7 +38,7 @@ def test_a_band_holds_for_whole_motions_after_it_was_attached(tmp_path: Path) ->
     calibrated = evaluate(again, dataset.part(1, 2), "test", window=(0, 151))
     checked = evaluate(again, dataset.part(2, 2), "test", window=(0, 151))
     assert calibrated["motions_covered_90"] >= 0.9
-    assert checked["motions_covered_90"] >= 0.78
+    assert checked["motions_covered_90"] >= 0.72  # three standard deviations of 50 motions by 50 others
     # attached again, from what is attached already, the scores are the same
     attach(again, dataset.part(1, 2), "test", tmp_path / "again.safetensors", "half of them")
     for name, array in load(tmp_path / "again.safetensors").checkpoint.arrays.items():
@@ -50,6 +51,12 @@ def test_each_object_has_a_band_of_its_own(tmp_path: Path) -> None:
     again = load(out)
     for name in ("donut", "chip"):
         assert again.band_motions({"object": name}) == len(dataset.select("test", name))
+        sizes = again.checkpoint.arrays[f"{name}/{SIZES}"]
+        known = open_dataset("contact-force").of(name)
+        for size, entry in zip(sizes[:2], known.select("val"), strict=False):
+            moved = known.read(entry)
+            own = again.solve(parameters={"object": name, **moved.parameters}).size_mm
+            np.testing.assert_allclose(size, own, rtol=1e-3)
     with pytest.raises(InputError, match="at least 9 motions"):
         attach(load("contact-force/nearest"), dataset.part(1, 2), "test", out)
 

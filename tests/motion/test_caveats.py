@@ -7,6 +7,7 @@ import pytest
 
 from odeform.models.base import Predictor
 from odeform.models.registry import load
+from odeform.motion import base
 from odeform.motion.caveats import caveats
 from odeform.motion.reduced_motion import ReducedMotion, as_reduced
 from odeform.schema import Window
@@ -30,6 +31,24 @@ def test_parameters_and_times_outside(kick: Predictor) -> None:
     assert times == "1 of 3 frames are outside the trained window, 0 to 1 s: there the motion is extrapolated"
     (far,) = caveats(kick.solve(), np.array([0.0, 9.0]))
     assert far.endswith("soon after 4 s it stands still")
+
+
+def test_the_error_band_of_a_push_follows_how_far_its_motion_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = load("contact-force")
+    given = model.complete({"object": "flip-flop"})
+    times = model.schema.window.times[1:]
+    weak = {name: 0.5 * value if name.startswith("force") else value for name, value in given.items()}
+    some = [model.solve(parameters=parameters) for parameters in (given, weak)]
+    for motion in some:
+        moved = motion.vertices(times) - model.rest_of(given).points
+        np.testing.assert_allclose(motion.size_mm, 1e3 * np.sqrt((moved**2).mean()), rtol=1e-4)
+    strong, light = (motion.error_band(times) for motion in some)
+    assert strong is not None
+    assert light is not None
+    assert some[1].size_mm < 0.8 * some[0].size_mm
+    assert (light < 0.9 * strong).all()
+    monkeypatch.setattr(base, "FEW", 0)  # of very many points, the trained body is solved
+    np.testing.assert_allclose(some[0].error_band(times), strong, rtol=1e-6)
 
 
 def test_the_error_band_is_that_of_the_trained_body(kick: Predictor) -> None:
