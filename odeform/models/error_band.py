@@ -62,9 +62,8 @@ class ErrorBand:
         logs = np.log(np.maximum(arrays["val.rmse_mm"][:, 1:].astype(float), TINY))
         profile = np.median(logs, axis=0)
         self._by_size, self._smallest = 0.0, TINY
-        self._fit_scale(logs - profile, arrays.get(SIZES))
-        residual = [row.ravel() for row in _around(self._left)]
-        quantiles = np.array([np.quantile(row, [0.5, NOMINAL]) for row in residual])
+        left = self._fit_scale(logs - profile, arrays.get(SIZES))
+        quantiles = np.array([np.quantile(part, [0.5, NOMINAL]) for part in _around(left)])
         self._profile = np.concatenate([np.full((1, 2), np.log(TINY)), profile[:, None] + quantiles])
         later = arrays.get(LATER_ERRORS, np.zeros((1, 1)))
         self._later = np.maximum.accumulate(np.quantile(later, [0.5, NOMINAL], axis=0).T)
@@ -74,22 +73,23 @@ class ErrorBand:
         """Whether it depends on the size of the predicted motion."""
         return self._by_size > 0.0
 
-    def _fit_scale(self, logs: Floats, sizes: Floats | None) -> None:
+    def _fit_scale(self, logs: Floats, sizes: Floats | None) -> Floats:
         """Chooses how the scale follows parameters, time and size, from the logarithms (S, T) of errors over their
-        profile."""
+        profile; returns what it leaves (S, T) of them."""
         self._levels = np.stack([part.mean(axis=1) for part in _around(logs)], axis=1)
-        self._width, self._left = self._best_width(logs)
+        self._width, left = self._best_width(logs)
         if sizes is None:
-            return
+            return left
         moved = np.log(np.maximum(sizes.astype(float), TINY))
-        power, without = float(np.polyfit(moved, logs.mean(axis=1), 1)[0]), self._levels
+        away = moved - moved.mean()
+        power, without = float(away @ logs.mean(axis=1)) / max(float(away @ away), TINY), self._levels
         self._levels = without - power * moved[:, None]
-        width, left = self._best_width(logs - power * moved[:, None])
-        if power > 0.0 and _unexplained(left) < BETTER * _unexplained(self._left):
-            self._by_size, self._smallest = power, float(np.exp(moved.min()))
-            self._width, self._left = width, left
-        else:
-            self._levels = without
+        width, less = self._best_width(logs - power * moved[:, None])
+        if power > 0.0 and _unexplained(less) < BETTER * _unexplained(left):
+            self._by_size, self._smallest, self._width = power, float(np.exp(moved.min())), width
+            return less
+        self._levels = without
+        return left
 
     def _best_width(self, logs: Floats) -> tuple[float, Floats]:
         """The width by which the others predict each sequence best, and what they leave (S, T) of its logarithms."""

@@ -73,6 +73,8 @@ def test_the_band_follows_the_size_of_motions_only_where_errors_do() -> None:
     assert (fresh["val.rmse_mm"][:, 1:] <= bounds).mean() == pytest.approx(0.9, abs=0.05)
     for power in (0.0, -0.7):  # what moves less is not more wrong
         assert not ErrorBand(sized(40, 0, power)).follows_size
+    alike = {**sized(40, 0, 0.7), SIZES: np.full(40, 2.0)}
+    assert not ErrorBand(alike).follows_size
     without = {name: array for name, array in sized(40, 0, 0.0).items() if name != SIZES}
     np.testing.assert_array_equal(
         ErrorBand(without).at(theta, TIMES), ErrorBand(sized(40, 0, 0.0)).at(theta, TIMES, size=3.0)

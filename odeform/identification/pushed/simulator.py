@@ -12,6 +12,7 @@ from odeform.identification.pushed.state import FRICTION, PushState
 from odeform.loads.registry import PUSH, get_load
 from odeform.models.base import Predictor
 from odeform.models.modal.model import ModalModel
+from odeform.simulation.errors import SimulationError
 from odeform.types import Frames, Times
 
 __all__ = ["can_simulate", "experiment_simulator", "simulator_of"]
@@ -56,7 +57,10 @@ def experiment_simulator(forward: Forward, name: str | None) -> Callable[[Experi
         ratio = friction / forward.friction
         rougher = replace(item, material=replace(item.material, friction=ratio * item.material.friction))
         if experiment.load == PUSH:
-            moved = simulate_object(rougher, experiment.parameters)
+            try:
+                moved = simulate_object(rougher, experiment.parameters)
+            except InputError as error:  # the sphere fits beside the body of the model, and not of the simulator
+                raise SimulationError(str(error)) from error
         else:
             moved = simulate_load(get_load(experiment.load), rougher, experiment.parameters, until=float(times[-1]))
         return CubicSpline(moved.times, moved.vertices.astype(float))(times)

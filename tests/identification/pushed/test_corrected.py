@@ -122,6 +122,14 @@ def test_what_cannot_be_simulated_is_not() -> None:
         identify_push(load("mass-elastic"), seen, state.parameters(), simulations=1)
 
 
+def test_an_estimate_beside_which_no_sphere_fits_ends_the_corrections() -> None:
+    forward, state = forward_of(load("contact-force"), "dog"), drawn_states(load("contact-force"), "dog", 1, seed=0)[0]
+    points = forward.model.rest.points
+    below = replace(state, contact=points[points[:, 2].argmin()], force=np.array([0.0, 0.0, 1.0]))
+    with pytest.raises(SimulationError, match="does not fit"):
+        simulator_of(forward, "dog")(below)
+
+
 def test_an_estimate_at_the_end_of_a_range_is_first_simulated_in_its_middle(monkeypatch: pytest.MonkeyPatch) -> None:
     forward, state = forward_of(load("contact-force"), "dog"), drawn_states(load("contact-force"), "dog", 1, seed=0)[0]
     forward = Forward(forward.model, forward.times[:3])
