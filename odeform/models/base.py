@@ -325,9 +325,9 @@ class Predictor(ABC):
         """(T, 2) RMSE in mm at (T,) seconds that half, and nine in ten, of unseen motions of the trained body stay
         within.
 
-        `size` tells `Motion.size_mm` of the motion; without it, a band that follows it solves the motion. None where the
-        checkpoint holds errors of too few validation sequences for that, and for a body of another mass or stiffness
-        than its own.
+        `size` tells `Motion.size_mm` of the motion; without it, a band that follows it solves the motion. None where
+        the checkpoint holds errors of too few validation sequences for that, and for a body of another mass or
+        stiffness than its own.
         """
         if self.model_of(parameters).is_changed(parameters):
             return None
