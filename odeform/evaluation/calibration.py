@@ -78,7 +78,7 @@ def _sizes(predictor: Predictor) -> Arrays:
         sets = [
             {p.name: p.denormalise(float(unit)) for p, unit in zip(schema.learned, row, strict=True)} for row in theta
         ]
-        sizes = [predictor.size_mm(predictor.complete({**body, **one})) for one in sets]
+        sizes = [predictor.size_mm({**body, **one}) for one in sets]
         out |= {f"{prefix}{SIZES}": np.array(sizes, dtype=np.float32)} if sizes else {}
     return out
 
