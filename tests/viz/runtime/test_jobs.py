@@ -82,7 +82,9 @@ def test_a_failure_and_a_crash_are_one_line() -> None:
 def test_a_killed_process_says_so_at_any_moment() -> None:
     listeners = [_Listener(sleep), _Listener(die_in_a_message)]
     assert listeners[0].begun.wait(DEADLINE)
-    os.kill(listeners[0].job._process.pid or 0, signal.SIGKILL)
+    pid = listeners[0].job._process.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
     for listener in listeners:
         assert listener.ended.wait(DEADLINE)
         assert listener.results == ["the process was ended by SIGKILL, perhaps for lack of memory"]
