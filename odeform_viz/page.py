@@ -1,5 +1,6 @@
 """Defines what a panel is and what it is built from."""
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -147,9 +148,11 @@ class Page:
         """Call `action` soon, on the thread that handles the clients' messages.
 
         Controls that both the user and the viewer set are set there: another thread could overwrite a value that has
-        arrived before its callback reads it, and the user's change would be lost.
+        arrived before its callback reads it, and the user's change would be lost. Does nothing where the viewer has
+        ended meanwhile.
         """
-        self.server.get_event_loop().call_soon_threadsafe(action)
+        with contextlib.suppress(RuntimeError):  # the loop is closed
+            self.server.get_event_loop().call_soon_threadsafe(action)
 
     def on_columns_changed(self, action: Callable[[], None]) -> None:
         """Call `action` after each change of the columns, on the thread that changed them."""
