@@ -44,7 +44,7 @@ def test_a_predictor_and_its_motion_are_the_same_to_the_bit(name: str) -> None:
     predictor = load(name)
     given, shape, observed = parameters_of(predictor), PointCloud(predictor.rest.points[::40]), None
     if predictor.schema.needs_observations:
-        times, ball = predictor.schema.window.times, trimesh.creation.icosphere(1, 0.05)
+        times, ball = predictor.schema.window.times, trimesh.creation.icosphere(0, 0.05)
         ball.apply_translation([0.0, 0.0, predictor.rest.points[:, 2].mean()])
         still, shape = np.tile(ball.vertices, (len(times), 1, 1)), None
         observed = MotionSequence(times, still, ball.faces, np.full(len(ball.vertices), 1.0 / len(ball.vertices)))

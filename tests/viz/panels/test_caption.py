@@ -16,15 +16,15 @@ def test_scene_model_and_shape_are_named(stubbed: Stubbed) -> None:
 
 def test_exaggeration_and_the_scale_are_stated(stubbed: Stubbed) -> None:
     app, client = stubbed
-    assert "exaggerated" not in client.text()
-    assert "displacement" not in client.text()
+    assert client.until(lambda: "exaggerated" not in client.text())
+    assert client.until(lambda: "displacement" not in client.text())
     client.set("exaggerate", 3.0)
     assert client.until(lambda: "deformation exaggerated 3 times" in client.text())
     client.set("colour by", "displacement")
     assert client.until(lambda: "displacement from the rest shape, mm (scale of the whole motion)" in client.text())
     scale = app.presenter.scale
     assert scale is not None
-    assert f"≥ {scale.top:g}" in client.text()
+    assert client.until(lambda: f"≥ {scale.top:g}" in client.text())
     assert "<rect" in client.text().split('data-odeform-view="scale"')[1].split("</svg>")[0]  # the histogram
     client.set("scale of this moment", True)
     assert client.until(lambda: "displacement from the rest shape, mm (scale of this moment)" in client.text())

@@ -33,7 +33,7 @@ def test_a_model_is_added_as_a_column_of_its_own(kicked: Kicked) -> None:
     client.click("Add model")
     assert client.until(lambda: "/world/column_1/body/part_0" in client.nodes)
     assert _labels(app) == ["odeform", "POD + RBF"]
-    assert client.controls["POD + RBF"].value is True
+    assert client.until(lambda: client.controls["POD + RBF"].value is True)
     client.set("model", "nonsense")
     client.click("Add model")
     assert client.until(lambda: any("model: expected one of" in said for said in client.notifications))

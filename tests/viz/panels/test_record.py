@@ -129,7 +129,7 @@ def test_a_recording_starts_and_ends(dropped: View, tmp_path: Path) -> None:
     client.set("file", str(tmp_path / "page.rrd" / "below.rrd"))
     client.click("Start recording")
     assert client.until(lambda: "cannot be written" in client.text())
-    assert client.controls["Start recording"].visible
+    assert client.until(lambda: client.controls["Start recording"].visible)
     assert not app.recording.active
 
 

@@ -129,7 +129,7 @@ def test_a_lesson_that_is_cancelled_and_one_that_is_killed_go_on_where_they_were
     teaching = app.panel(UserBodyPanel)._teaching
     # before its process learns, the text that the last simulated motion left says the same
     assert client.until(lambda: teaching._bar.value > 50.0, PATIENCE)
-    assert "Learning from 10 motions" in client.text()
+    assert client.until(lambda: "Learning from 10 motions" in client.text())
     assert before.items() <= {entry.name: entry.sha256 for entry in open_dataset(folder).entries}.items()
     job = teaching._job
     assert job is not None

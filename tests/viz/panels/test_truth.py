@@ -65,14 +65,14 @@ def test_away_from_its_parameters_nothing_is_compared_and_there_is_a_way_back(dr
     back = "Set sliders to the truth"
     client.set("test sequence", entry_label(ENTRIES[0], app.session.schema))
     assert client.until(lambda: "error now:" in client.text())
-    assert not client.controls[back].visible
+    assert client.until(lambda: not client.controls[back].visible)
     client.set("mass (kg)", 0.9)
     assert client.until(lambda: "The truth was simulated with other parameters" in client.text())
     assert client.until(lambda: "error now:" not in client.text())
     assert client.until(lambda: client.controls[back].visible)
     client.click(back)
     assert client.until(lambda: "error now:" in client.text())
-    assert "The truth was simulated with other parameters" not in client.text()
+    assert client.until(lambda: "The truth was simulated with other parameters" not in client.text())
 
 
 def test_the_truth_goes_and_what_is_not_in_the_list_is_refused(dropped: View) -> None:
@@ -166,7 +166,7 @@ def test_other_physics_are_remarked_and_the_same_are_not(kick: Predictor, serve:
     made = kick.checkpoint.provenance
     other = replace(kick.checkpoint, provenance={**made, "fixed": {**made["fixed"], "young_pa": 1.7e5}})
     _, client = serve(Column("odeform", load_model(other), kick.rest))
-    assert "Young's modulus 130 kPa (trained with Young's modulus 170 kPa)" in client.text()
+    assert client.until(lambda: "Young's modulus 130 kPa (trained with Young's modulus 170 kPa)" in client.text())
     trained_with = load("mass-elastic").checkpoint.provenance["fixed"]
     assert physics_difference(trained_with, open_dataset("mass-elastic").fixed) == ""
     assert physics_difference({"b": 1.0}, {"b": 2.0}) == "b 2 (trained with b 1)"
@@ -203,7 +203,7 @@ def test_a_recording_of_markers_stands_beside_the_clamped_body(
     monkeypatch.setattr(notices.Notices, "show", lambda _, title, message: said.append(message))
     model = clamped_bar()
     app, client = serve(Column("beam", model, model.rest))
-    assert "nothing learned" in client.text()
+    assert client.until(lambda: "nothing learned" in client.text())
     client.upload("Open a motion...", "bar.npz", recording(model, model.schema.complete(None)))
     assert client.until(lambda: app.columns.truth is not None)
     assert client.until(lambda: "error now:" in client.text())
