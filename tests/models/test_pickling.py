@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 
 from odeform.checkpoint import bundled_checkpoints
 from odeform.models.base import Predictor
@@ -44,10 +43,10 @@ def test_a_predictor_and_its_motion_are_the_same_to_the_bit(name: str) -> None:
     predictor = load(name)
     given, shape, observed = parameters_of(predictor), PointCloud(predictor.rest.points[::40]), None
     if predictor.schema.needs_observations:
-        times, ball = predictor.schema.window.times, trimesh.creation.icosphere(0, 0.05)
-        ball.apply_translation([0.0, 0.0, predictor.rest.points[:, 2].mean()])
-        still, shape = np.tile(ball.vertices, (len(times), 1, 1)), None
-        observed = MotionSequence(times, still, ball.faces, np.full(len(ball.vertices), 1.0 / len(ball.vertices)))
+        times = predictor.schema.window.times
+        still = np.tile(predictor.rest.points, (len(times), 1, 1))
+        weights = np.full(len(predictor.rest.points), 1.0 / len(predictor.rest.points))
+        observed = MotionSequence(times, still, predictor.rest.faces, weights)
     until = 0.4 * predictor.schema.window.stop
     motion = predictor.solve(shape, given, "draft", until, observed=observed)
     read = again(predictor)
