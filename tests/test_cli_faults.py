@@ -136,12 +136,16 @@ def test_a_table_is_never_guessed_at(table: str, why: str, tmp_path: Path) -> No
 def test_an_early_interrupt_ends_the_command(module: str, delay: float) -> None:
     # a module that is being imported catches every exception, as trimesh does
     arguments = ["--port", "0"] if module == "odeform_viz.start" else ["stress", "kick"]
-    command = [sys.executable, "-m", module, *arguments]
+    # told when the interpreter is there, which takes seconds on a busy machine
+    code = f"import runpy; print(flush=True); runpy.run_module({module!r}, run_name='__main__', alter_sys=True)"
+    command = [sys.executable, "-c", code, *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
     try:
+        process.stdout.readline()
         time.sleep(delay)  # what is tested is the moment, on any machine
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=20.0)
+        _, errors = process.communicate(timeout=120.0)
     finally:
         process.kill()
     assert "Traceback" not in errors or delay < 0.3, errors

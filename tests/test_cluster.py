@@ -43,7 +43,7 @@ def dask(*command: str) -> subprocess.Popen[str]:
 def ended(process: subprocess.Popen[str]) -> None:
     process.send_signal(signal.SIGINT)
     try:
-        process.wait(timeout=20.0)
+        process.wait(timeout=120.0)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 __all__ = ["Control", "LoopbackClient"]
 
 PART = 1 << 19  # bytes of a file in one message
-DEADLINE = 60.0  # s, for a busy machine
+DEADLINE = 180.0  # s, for a busy machine
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (0.0, -3.0, 1.0),
