@@ -10,18 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from odeform.cli import main
 from odeform.dataset.importers.mesh_frames import mesh_source
 from odeform.dataset.store import open_dataset
 from odeform.errors import InputError, one_line
 from odeform.io import atomic_write, require_writable
 from odeform.training.train import train
+from tests.commands import run
 
 TIMES = ("--times", "0:0.02:0.01")
-
-
-def run(*arguments: object) -> int:
-    return main([str(argument) for argument in arguments])
 
 
 def _said(capsys: pytest.CaptureFixture[str]) -> str:

@@ -3,7 +3,7 @@
 import math
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,16 +22,14 @@ from odeform.loads.measured import FALLS
 from odeform.loads.registry import PUSH, load_of_scene
 from odeform.models.base import Predictor
 from odeform.motion.recorded import RecordedMotion
-from odeform.schema import OBJECT, Parameters, Schema
+from odeform.schema import OBJECT, Parameters
 from odeform_viz.columns import Column
 from odeform_viz.page import Page, Panel
+from odeform_viz.panels.fit_search import CORRECTIONS, FAILED, Search, body_of
 from odeform_viz.runtime.jobs import Job, fit_body, fit_parameters, fit_push
-from odeform_viz.words import parameter_title, plain
 
-__all__ = ["FitPanel", "describe_identification"]
+__all__ = ["FitPanel"]
 
-LABEL = "fit"
-CORRECTIONS = 3  # simulations; more of them tell little
 NEXT = "Set sliders to the next {}"
 NEXT_HINT = (
     "what would tell most of what is least known of the body; a drop or a throw changes what happens (Explore leads "
@@ -39,7 +37,6 @@ NEXT_HINT = (
 )
 TOGETHER = "with earlier experiments"
 TOGETHER_HINT = "fit one body to all its pushes, drops and throws that are known and were fitted since the page opened"
-MADE = "From {} experiments together: {}."
 NO_TRUTH = "Choose, open or simulate a motion above; this finds the parameters that reproduce it."
 SHORT = "⚠ **Intervals were calibrated on motions of {:g} s**; this one ends at {:.3g} s, and they may be too narrow."
 CALIBRATED = "Intervals are as wide as simulated bodies took for nine in ten to lie within."
@@ -56,44 +53,12 @@ HOW = (
     "what the model misses looks like another body; simulations of the estimate say what it misses, and take some ten "
     "seconds each. With falls beside pushes, 3 are of the pushes alone, and 3 of all"
 )
-FAILED = "⚠ **The fit failed**: {}"
-FURTHER = "After the next {}, the widest interval of the body is expected to be {:.0%} as wide."
-STOPPED = "⚠ **Corrected by {} of {} simulations**: the last estimate could not be simulated, {}."
-NO_COLUMN = "⚠ **The motion found is not shown**: {}"
 KNOWN = "the push is known"
 KNOWN_HINT = (
     "give the fit the contact and the force of the visible truth; mass, stiffness and friction are then found better"
 )
 NOTHING = Experiment("", {})
 ROUNDED = 0.01  # of masses and stiffnesses, by sliders
-EXPLAINED = 1.0  # mean square difference, of the expected one, up to which model and noise explain an observation
-
-
-def describe_identification(found: Identification, schema: Schema, truth: Parameters) -> str:
-    """Markdown of estimates with their 90 % intervals, beside the true parameters where they are known."""
-    titles = {p.name: f"{parameter_title(p)} ({p.unit})" if p.unit else parameter_title(p) for p in schema.parameters}
-    rows = ["| | estimate | 90 % interval | truth |", "| --- | --- | --- | --- |"]
-    for name, one in found.parameters.items():
-        true = truth.get(name)
-        estimate = f"**{_figure(one.value)}**" if one.identifiable else "not identifiable"
-        known = "" if true is None else _figure(true)
-        title = titles.get(name, name.replace("_", " "))
-        rows.append(f"| {title} | {estimate} | {_figure(one.low)} to {_figure(one.high)} | {known} |")
-    for parameter in (p for p in schema.parameters if p.role == "azimuth"):
-        known = _figure(float(truth[parameter.name])) if parameter.name in truth else ""
-        rows.append(f"| {titles[parameter.name]} | *as given* | | {known} |")
-    explained = (
-        "model and noise explain the motion"
-        if found.misfit <= EXPLAINED
-        else "⚠ **the model does not explain this motion**, and the intervals are wider for it"
-    )
-    apart = f"Mean square difference from the motion: {found.misfit:.2g} of what is expected"
-    return "\n".join([*rows, "", f"{apart}; {explained}. The search took {found.seconds:.1f} s."])
-
-
-def _figure(value: float) -> str:
-    """Three digits, without an exponent where people need none: a chip's stiffness is 1570 kPa."""
-    return f"{float(f'{value:.3g}'):g}"
 
 
 class FitPanel(Panel):
@@ -106,7 +71,7 @@ class FitPanel(Panel):
         self._page, self._columns = page, page.columns
         self._lock = threading.Lock()
         self._job: Job | None = None
-        self._search: _Search | None = None
+        self._search: Search | None = None
         self._truth: RecordedMotion | None = None
         self._found: Parameters = {}
         self._proposed = NOTHING
@@ -188,7 +153,7 @@ class FitPanel(Panel):
             window = schema.window
             ends = float(observation.times[-1])
             note = SHORT.format(window.stop, ends) if ends < window.stop - 1.0 / window.rate else ""
-            search = _Search(self._page, model, truth.setting, fixed, self._show, note)
+            search = Search(self._page, model, truth.setting, fixed, self._show, note)
             self._page.controls.set_overlay(True)
             self._run(search, fit_parameters, (type(predictor), predictor.checkpoint, observation))
 
@@ -202,7 +167,7 @@ class FitPanel(Panel):
             if self._known is not None and not self._known.value:
                 seen = recorded_points(predictor, truth.sequence, named)
                 note = PUSH_OPEN if corrects else CALIBRATED
-                search = _Search(self._page, model, true, named, self._show, note)
+                search = Search(self._page, model, true, named, self._show, note)
                 work, arguments = fit_push, (predictor, seen, named, simulations)
             else:
                 now = recorded_experiment(predictor, load, truth.sequence, true)
@@ -210,14 +175,14 @@ class FitPanel(Panel):
                 fixed = {key: value for key, value in truth.setting.items() if key not in BODY}
                 every = [*before, now]
                 note = CALIBRATED if len(every) == 1 and load == PUSH else FALLEN
-                search = _Search(self._page, model, true, fixed, self._show, note, every)
+                search = Search(self._page, model, true, fixed, self._show, note, every)
                 work, arguments = fit_body, (predictor, search.experiments, named, simulations)
         except InputError as error:
             self._show(FAILED.format(error))
             return
         self._run(search, work, arguments)
 
-    def _run(self, search: "_Search", work: Callable[..., Identification], arguments: tuple[Any, ...]) -> None:
+    def _run(self, search: Search, work: Callable[..., Identification], arguments: tuple[Any, ...]) -> None:
         self._search = search
         self._show("starting", working=True)
         self._job = Job(work, arguments, search.done, search.failed, search.progress)
@@ -277,120 +242,12 @@ def _true(predictor: Predictor, truth: RecordedMotion) -> dict[str, Any]:
     return {**own, **truth.setting}
 
 
-def _body_of(parameters: Parameters) -> dict[str, Any]:
-    return {name: value for name, value in parameters.items() if name in (*BODY, OBJECT)}
-
-
 def _same_body(one: Parameters, other: Parameters) -> bool:
     """Whether what is known of two bodies is the same, to what a slider rounds."""
-    first, second = _body_of(one), _body_of(other)
+    first, second = body_of(one), body_of(other)
     numbers = [name for name, value in first.items() if not isinstance(value, str)]
     return (
         first.keys() == second.keys()
         and first.get(OBJECT) == second.get(OBJECT)
         and all(math.isclose(first[name], second[name], rel_tol=ROUNDED) for name in numbers)
     )
-
-
-@dataclass
-class _Search:
-    """One search: shows each step in a column of its own."""
-
-    page: Page
-    model: Column
-    truth: Parameters
-    fixed: Parameters
-    """Known parameters, which are not searched."""
-    show: Callable[..., None]
-    note: str = ""
-    """Says what has to be known of the estimates."""
-    experiments: list[Recorded] = field(default_factory=list)
-    """All that are fitted, the newest last, where they are known."""
-    misfits: list[str] = field(default_factory=list)
-    last: str = ""
-    """The last step in words, or the estimates."""
-    estimate: Parameters = field(default_factory=dict)
-    """For the sliders, once it is known."""
-    key: int | None = None
-    hidden: str = ""
-    """Why there is no column for it; the search goes on without one."""
-
-    def progress(self, report: float | str | tuple[dict[str, float], float] | Identification) -> None:
-        """Show a step, how far a calibration is, what is simulated, or the estimates before the next experiment."""
-        if isinstance(report, Identification):
-            self._estimated(report)
-            self.show(self.last, self.estimate, working=True)
-            return
-        if isinstance(report, str):
-            self.show("\n\n".join(filter(None, (report, self.last))), self.estimate, working=True)
-            return
-        if not isinstance(report, tuple):
-            self.show(f"Measuring the model's own error first: {100.0 * report:.0f} %", working=True)
-            return
-        parameters, misfit = report
-        self.misfits.append(f"{misfit:.3g}")
-        body = {name: value for name, value in parameters.items() if "_" not in name}  # places are shown
-        values = plain(body, self.page.schema)
-        steps = " → ".join(self.misfits[-6:])
-        self.last = f"step {len(self.misfits)}: {values}  \ndifference, of what is expected: {steps}"
-        self.show(self.last, working=True)
-        self._place(parameters)
-
-    def done(self, found: Identification) -> None:
-        """Show the estimates, and the next experiment."""
-        self._estimated(found)
-        body = {name: value for name, value in self.fixed.items() if isinstance(value, str)}
-        # what is made next is made with the body that is there
-        proposed = Experiment(found.proposed_load, {**body, **found.proposed, **_body_of(self.truth)})
-        self.show(self.last, self.estimate, proposed=proposed)
-
-    def _estimated(self, found: Identification) -> None:
-        """Keep the estimates, and show their motion."""
-        known = self.page.schema.names  # friction has no slider
-        self.estimate = {**self.fixed, **{name: one.value for name, one in found.parameters.items() if name in known}}
-        self._place(self.estimate)
-        self.last = self._describe(found)
-        self._remember()
-
-    def _describe(self, found: Identification) -> str:
-        """Markdown of the estimates, and of what has to be known of them."""
-        text = describe_identification(found, self.page.schema, self.truth)
-        made = [one.made.experiment.load for one in self.experiments]
-        together = MADE.format(len(made), ", ".join(made)) if len(made) > 1 else ""
-        stopped = STOPPED.format(found.simulations, CORRECTIONS, found.stopped) if found.stopped else ""
-        further = FURTHER.format(found.proposed_load, found.narrowed) if found.proposed_load else ""
-        return "\n\n".join(filter(None, (text, together, stopped, further, self.note, self.hidden)))
-
-    def _remember(self) -> None:
-        """Keep the newest experiment for fits to come, once."""
-        for now in self.experiments[-1:]:
-            given = now.made.experiment.parameters
-            others = [one for one in self.page.experiments if one.made.experiment.parameters != given]
-            self.page.experiments[:] = [*others, now]
-
-    def failed(self, message: str) -> None:
-        """Say why there are none."""
-        self.show(FAILED.format(message))
-
-    def _place(self, parameters: Parameters) -> None:
-        """Show a step in the column of this search, else in that of an earlier one, else in a new one."""
-        columns, names = self.page.columns, self.page.schema.names
-        parameters = {name: value for name, value in parameters.items() if name in names}
-        column = replace(self.model, label=LABEL, pinned={**self.fixed, **parameters}, visible=True, fitted=True)
-        mine = [c for c in columns.all if c.key == self.key] or [c for c in columns.all if c.label == LABEL]
-        if mine:
-            self.key = mine[0].key
-            columns.change(lambda all_: [_moved(c, column) if c.key == self.key else c for c in all_])
-        else:
-            try:
-                columns.add(column)
-            except InputError as error:  # too many
-                self.hidden = NO_COLUMN.format(error)
-                return
-            self.hidden = ""
-            self.key = next(c.key for c in reversed(columns.all) if c.pinned == column.pinned)
-        self.page.columns_changed()
-
-
-def _moved(known: Column, column: Column) -> Column:
-    return replace(column, label=known.label, key=known.key, color_index=known.color_index)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -18,7 +18,6 @@ from odeform.loads.registry import load_of_scene
 from odeform.loads.situation import Situation
 from odeform.mechanics.body import Solid
 from odeform.mechanics.contact_parameters import ContactParameters
-from odeform.mechanics.flat import body_motion
 from odeform.mechanics.inside import Inside, inside_of
 from odeform.mechanics.pair import Pair
 from odeform.mechanics.push import make_push
@@ -34,7 +33,8 @@ from odeform.models.modal.energy_bound import LOOKED_AHEAD, BoundedBatch, Bounde
 from odeform.models.modal.loaded import ROOM, Beginning, LoadedBody, under_load
 from odeform.models.modal.loaded import SUPPORT as SIDES
 from odeform.models.modal.paired import Shapes, pair_motion, pair_problem
-from odeform.models.modal.release import before, released
+from odeform.models.modal.readout import Readout
+from odeform.models.modal.release import before
 from odeform.models.modal.settled import SettledBody, settled_body
 from odeform.models.modal.user_part import forces_in, item_in
 from odeform.models.model import Model
@@ -48,7 +48,7 @@ from odeform.motion.floor_projection import FloorProjection
 from odeform.motion.ground import Ground
 from odeform.motion.motion_batch import MotionBatch
 from odeform.motion.recent import Recent, geometry_key
-from odeform.motion.reduced_space import POSE, ReducedSpace
+from odeform.motion.reduced_space import ReducedSpace
 from odeform.motion.trajectory import Adjusted, Moving, Piecewise, Trajectory
 from odeform.motion.validity import Validity
 from odeform.schema import Parameters
@@ -81,33 +81,6 @@ LANDING = {**QUALITIES, "balanced": SolverSettings("limex", tolerance=2.5e-4, dt
 """Those of bodies that land: the solver is off by 0.6 % of the displacement in the mean, where the model is by 35 %."""
 EXACT = SolverSettings("limex", step=1.25e-4, dtype="float64")
 """The reference for solver errors."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Readout:
-    """Maps states of the mechanics to coordinates of a motion."""
-
-    coordinates: Coordinates
-    settled: SettledBody | None
-    scale: float
-    """Scales amplitudes: modes of a heavier body move less by each unit."""
-
-    def __call__(self, times: Times, states: Floats) -> Floats:
-        """(T,) s and states (T, 20 + 2 K) -> (T, 6 + K)."""
-        shift, rotation, modes = body_motion(states)
-        y = self.coordinates.reduced(shift, rotation, self.scale * modes)
-        return y if self.settled is None else self.settled.relative(y)
-
-    def poses(self, states: Floats) -> Float[np.ndarray, "times 6"]:
-        """The first (T, 6) coordinates of states (T, 20 + 2 K), without the deformation, which takes longest."""
-        shift, rotation, modes = body_motion(states)
-        y = self.coordinates.pose(shift, rotation, self.scale * modes)
-        return y if self.settled is None else self.settled.relative_pose(y)
-
-    def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
-        """Releases the body, see `odeform.models.modal.release.released`."""
-        pose = y[:, :POSE] if self.settled is None else self.settled.absolute(y[:, :POSE])
-        return released(self.coordinates, states, pose, self.scale)
 
 
 class ModalModel(Model):
@@ -395,9 +368,9 @@ class ModalModel(Model):
         """The right-hand side of two like bodies."""
         return Pair(self._loaded.mechanics, self._loaded.both, self._inside)
 
-    def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> _Readout:
+    def _readout(self, modes: Float[np.ndarray, "modes directions"]) -> Readout:
         """Reads out states in the directions of deformation of one push."""
-        return _Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
+        return Readout(self.coordinates.along(modes), self.settled_body, self._ratios[0] ** -0.5)
 
     def batch_inputs(self, sets: Sequence[Parameters]) -> Floats:
         # mechanics takes loads as they are asked for; what is regressed on pushes does not
@@ -417,7 +390,7 @@ class ModalModel(Model):
         return Problem(pushed, begun.start[0], read, at_rest=begun.at_rest)
 
     @cached_property
-    def _falling(self) -> _Readout:
+    def _falling(self) -> Readout:
         """Reads out a body that nothing but the floor and obstacles touches."""
         return self._readout(self._loaded.falling.modes[0])
 
@@ -430,7 +403,7 @@ class ModalModel(Model):
     ) -> Callable[[], BatchProblem]:
         return lambda: self._together(theta)[0]
 
-    def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[BatchProblem, list[_Readout]]:
+    def _together(self, theta: Float[np.ndarray, "batch parameters"]) -> tuple[BatchProblem, list[Readout]]:
         """The problem of many pushes, and the readout of each."""
         begun = self._begin(theta)
         bodies = pushed_bodies(self._moving, begun.push, begun.pulse)
@@ -448,7 +421,7 @@ class ModalModel(Model):
             assert settings is not None
             problem = self.problem(theta, evaluated)
             read = problem.readout
-            assert isinstance(read, _Readout)
+            assert isinstance(read, Readout)
             solved = self._solved(problem, lambda: problem, settings, until)
             return BoundedTrajectory(solved, read.poses, *self._bounds)
         motion = self._motion(theta, evaluated, settings, until)
@@ -473,7 +446,7 @@ class ModalModel(Model):
 
         def later() -> Trajectory:
             times, readout = before(free), problem.readout
-            assert isinstance(readout, _Readout)
+            assert isinstance(readout, Readout)
             onward = problem._replace(start=readout.released(first.states(times), corrected.reduced(times)), begin=free)
             solved = self._solved(onward, lambda: onward, settings, until)
             return Adjusted(solved, residual.deformation_adjustment(inputs))

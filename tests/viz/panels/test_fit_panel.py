@@ -24,7 +24,8 @@ from odeform_figures.viewer_benchmark.client import LoopbackClient
 from odeform_viz.app import App
 from odeform_viz.columns import MOST, Column
 from odeform_viz.panels import fit
-from odeform_viz.panels.fit import FitPanel, describe_identification
+from odeform_viz.panels.fit import FitPanel
+from odeform_viz.panels.fit_search import CORRECTIONS, MADE, STOPPED, describe_identification
 from odeform_viz.panels.parameters import ParameterPanel
 from odeform_viz.panels.truth import NONE, TruthPanel, entry_label
 from odeform_viz.runtime.jobs import Report
@@ -229,7 +230,7 @@ def test_a_fit_of_a_push_can_be_corrected_by_simulations(
         pushed.set(fit.KNOWN, known)
         pushed.click(START)
         # the last step stays while the estimate is simulated
-        told = f"{fit.CORRECTIONS} simulations of 20 frames, {known}"
+        told = f"{CORRECTIONS} simulations of 20 frames, {known}"
         assert pushed.until(lambda told=told: told in pushed.text())
         assert pushed.until(lambda: "step 1:" in pushed.text())
         pushed.click(CANCEL)
@@ -245,7 +246,7 @@ def unable(report: Report, *_: object) -> Identification:
 def test_a_simulation_that_failed_is_told(pushed: LoopbackClient, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fit, "fit_push", unable)
     pushed.click(START)
-    assert pushed.until(lambda: fit.STOPPED.format(1, fit.CORRECTIONS, "it is inside out") in pushed.text())
+    assert pushed.until(lambda: STOPPED.format(1, CORRECTIONS, "it is inside out") in pushed.text())
     assert pushed.until(lambda: fit.PUSH_OPEN in pushed.text())
 
 
@@ -346,7 +347,7 @@ def test_a_throw_is_fitted_together_with_the_push_before(pushed_page: View, monk
     assert client.until(lambda: fit.TOGETHER in client.controls and client.controls[fit.TOGETHER].visible)
     client.click(START)
     assert client.until(lambda: "The search took 33.0 s" in client.text())
-    assert client.until(lambda: fit.MADE.format(2, "push, throw") in client.text())
+    assert client.until(lambda: MADE.format(2, "push, throw") in client.text())
     assert client.until(lambda: fit.FALLEN in client.text())
     assert fit.CALIBRATED not in client.text(), "it was measured of single pushes"
     client.set("by", fit.CORRECTED)
