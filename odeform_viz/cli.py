@@ -121,7 +121,25 @@ def _parser() -> argparse.ArgumentParser:
         "--sequence", metavar="PATH", help="show a sequence of a data set, DATASET/NAME, as the truth beside the models"
     )
     add_plugin(show)
-    page = parser.add_argument_group("where to serve")
+    _add_page(parser.add_argument_group("where to serve"))
+    record = parser.add_argument_group("recordings")
+    record.add_argument("--record", metavar="FILE.rrd", help="record everything that is shown, for Rerun and --replay")
+    record.add_argument(
+        "--replay",
+        metavar="FILE.rrd",
+        help="compute every frame of a recording again, print the differences, and exit; serves no page",
+    )
+    record.add_argument(
+        "--tolerance",
+        type=float,
+        default=TOLERANCE,
+        metavar="M",
+        help="largest difference, in metres, that --replay accepts (default: 1e-5)",
+    )
+    return parser
+
+
+def _add_page(page: argparse._ActionsContainer) -> None:
     page.add_argument("--host", default="127.0.0.1", metavar="H", help="address to listen on (default: 127.0.0.1)")
     page.add_argument(
         "--port", type=int, default=8080, metavar="N", help="port to listen on; 0 takes a free one (default: 8080)"
@@ -146,21 +164,6 @@ def _parser() -> argparse.ArgumentParser:
         "current one)",
     )
     page.add_argument("--device", default="cpu", choices=("cpu", "cuda"), help="where to compute: only on the cpu")
-    record = parser.add_argument_group("recordings")
-    record.add_argument("--record", metavar="FILE.rrd", help="record everything that is shown, for Rerun and --replay")
-    record.add_argument(
-        "--replay",
-        metavar="FILE.rrd",
-        help="compute every frame of a recording again, print the differences, and exit; serves no page",
-    )
-    record.add_argument(
-        "--tolerance",
-        type=float,
-        default=TOLERANCE,
-        metavar="M",
-        help="largest difference, in metres, that --replay accepts (default: 1e-5)",
-    )
-    return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
