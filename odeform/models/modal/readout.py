@@ -37,7 +37,9 @@ class Readout:
         return y if self.settled is None else self.settled.relative_pose(y)
 
     def released(self, states: Float[np.ndarray, "3 state"], y: Float[np.ndarray, "3 y"]) -> Floats:
-        """The state (20 + 2 K,) from which a body goes on, of its states (3, 20 + 2 K) and coordinates (3, 6 + K) at the times
-        `before`: see `odeform.models.modal.release.released`."""
+        """Returns the state (20 + 2 K,) from which a body goes on, see `odeform.models.modal.release.released`.
+
+        `states` (3, 20 + 2 K) and coordinates `y` (3, 6 + K) are at the times `before`.
+        """
         pose = y[:, :POSE] if self.settled is None else self.settled.absolute(y[:, :POSE])
         return released(self.coordinates, states, pose, self.scale)
