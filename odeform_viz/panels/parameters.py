@@ -150,7 +150,7 @@ class ParameterPanel(Panel):
             marks=marks,
             hint=hint,
         )
-        slider.on_update(lambda _: self._wake())
+        slider.on_update(lambda _: self._moved())
         self._sliders[parameter.name] = slider
         if parameter.role == "physical":
             self._strips[parameter.name] = self._gui.add_html("")
@@ -221,6 +221,11 @@ class ParameterPanel(Panel):
     async def _reset(self, event: viser.GuiEvent) -> None:
         # likewise
         self.set({**{p.name: p.default for p in self._schema.parameters}, **self._own()})
+
+    def _moved(self) -> None:
+        """Show what the sliders say. Where they are back before a frame has followed them, none follows."""
+        self._wake()
+        self._on_event_loop(self._refresh_preset)
 
     def _refresh(self) -> None:
         """Let the preset and the marks below the sliders follow the sliders."""

@@ -68,6 +68,7 @@ class LoopbackClient:
             subprotocols=[f"viser-v{viser.__version__}"],  # pyright: ignore[reportArgumentType]
             max_size=None,
             compression=None,
+            ping_interval=None,  # what asks whether the server is alive gives up on a busy machine
         )
         self._controls: dict[str, Control] = {}
         self._commands: dict[str, str] = {}

@@ -27,6 +27,17 @@ def test_a_preset_moves_the_sliders_and_can_be_chosen_again(stubbed: View) -> No
         assert client.until(lambda: client.controls["preset"].value == NO_PRESET)
 
 
+def test_the_preset_follows_sliders_that_no_frame_follows(stubbed: View, monkeypatch: pytest.MonkeyPatch) -> None:
+    app, client = stubbed
+    panel = app.panel(ParameterPanel)
+    client.set("preset", PRESET)
+    assert client.until(lambda: (f := app.presenter.frame) is not None and f.request.parameters["mass"] == 1.0)
+    assert client.until(lambda: client.controls["mass (kg)"].value == 1.0 and app.presenter.settled)
+    monkeypatch.setattr(panel, "_wake", lambda: None)
+    client.set("mass (kg)", 0.7)
+    assert client.until(lambda: client.controls["preset"].value == NO_PRESET)
+
+
 def test_a_preset_chosen_while_frames_are_described_is_not_lost(stubbed: View) -> None:
     """The worker reads the sliders, a choice arrives, the worker shows what it has read."""
     app, client = stubbed
