@@ -142,6 +142,7 @@ class App:
         for panel in self.page.panels:
             panel.close()
         self._worker.stop()
+        self.page.ended = True
 
     def _play_first(self) -> None:
         """Play slowly through the first impact, then at the chosen speed."""

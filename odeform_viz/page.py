@@ -109,6 +109,8 @@ class Page:
     panels: list[Panel] = field(default_factory=list)
     hotkeys: dict[str, str] = field(default_factory=dict)
     """Says in words what each hot key does; see `add_hotkey`."""
+    ended: bool = False
+    """Whether another page has taken its place: what it still had to do is left."""
     _on_columns_changed: list[Callable[[], None]] = field(default_factory=list)
 
     @property
@@ -148,11 +150,16 @@ class Page:
         """Call `action` soon, on the thread that handles the clients' messages.
 
         Controls that both the user and the viewer set are set there: another thread could overwrite a value that has
-        arrived before its callback reads it, and the user's change would be lost. Does nothing where the viewer has
-        ended meanwhile.
+        arrived before its callback reads it, and the user's change would be lost. Does nothing where the page or the
+        viewer has ended meanwhile.
         """
+
+        def act() -> None:
+            if not self.ended:  # its controls are gone
+                action()
+
         with contextlib.suppress(RuntimeError):  # the loop is closed
-            self.server.get_event_loop().call_soon_threadsafe(action)
+            self.server.get_event_loop().call_soon_threadsafe(act)
 
     def on_columns_changed(self, action: Callable[[], None]) -> None:
         """Call `action` after each change of the columns, on the thread that changed them."""

@@ -17,7 +17,7 @@ from odeform_figures.opened_page import CHROMIUM, FLAGS
 from odeform_viz.app import App
 from odeform_viz.columns import Column
 
-__all__ = ["PHONE", "Tab", "needs_chromium", "open_tab", "until"]
+__all__ = ["PATIENCE", "PHONE", "Tab", "needs_chromium", "open_tab", "until"]
 
 VIEW = {"width": 800, "height": 480}
 PATIENCE = 180.0  # s, for a busy machine

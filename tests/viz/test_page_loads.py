@@ -1,12 +1,13 @@
 """*What happens*: the page of one model under several loads."""
 
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from browsing import Tab, needs_chromium, open_tab, until
+from browsing import PATIENCE, Tab, needs_chromium, open_tab, until
 
 import odeform
 from odeform.errors import InputError
@@ -39,6 +40,17 @@ def column(pushed: Predictor) -> Column:
 def _shows(app: App, scene: str) -> bool:
     frame = app.presenter.frame
     return frame is not None and bool(frame.columns) and frame.columns[0].motion.schema.scene == scene
+
+
+def test_what_a_page_had_to_do_ends_with_it(serve: Any, column: Column) -> None:
+    app, _ = serve(column)
+    before, done, passed = app.page, [], threading.Event()
+    app.show_load("drop")
+    before.on_event_loop(lambda: done.append("before"))
+    app.page.on_event_loop(lambda: done.append("now"))
+    app.page.on_event_loop(passed.set)
+    assert passed.wait(PATIENCE)
+    assert done == ["now"]
 
 
 def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: Column) -> None:
