@@ -139,10 +139,10 @@ class App:
             self._build(columns, parameters)
 
     def _end_page(self) -> None:
+        self.page.ended = True
         for panel in self.page.panels:
             panel.close()
         self._worker.stop()
-        self.page.ended = True
 
     def _play_first(self) -> None:
         """Play slowly through the first impact, then at the chosen speed."""

@@ -6,13 +6,11 @@ that one is read without the others. `odeform.dataset.body_codec` describes the 
 has one mesh, uncompressed as `common.safetensors`, and no corrections.
 """
 
-import functools
 import hashlib
 import io
 import lzma
 import struct
 import zipfile
-import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -37,7 +35,6 @@ __all__ = ["SUFFIX", "open_packed", "pack"]
 SUFFIX = ".odp"
 INDEX, COMMON, FIRST_COMMON = "dataset.json", "common", "common.safetensors"
 VERSION = 2
-LENGTHS = 26  # bytes into the header of a member, where the lengths of its name and notes are
 
 
 def pack(dataset: Dataset, out: Path, tolerance: float = 2e-5) -> dict[str, Any]:
@@ -116,22 +113,17 @@ def _write_archive(out: Path, members: dict[str, bytes]) -> None:
 def open_packed(path: Path) -> Dataset:
     """Open a packed data set. Raises `InputError` for a missing or damaged file; sequences are checked when read."""
 
-    @functools.cache
-    def directory() -> dict[str, zipfile.ZipInfo]:
-        # read once: where it has a thousand members, that takes longer than to decode one of them
-        with zipfile.ZipFile(path) as file:
-            return {info.filename: info for info in file.infolist()}
-
     def member(name: str) -> bytes:
         try:
-            info = directory()[name]
-            # members are stored uncompressed: sizes are known before anything is decompressed
-            if info.compress_type != zipfile.ZIP_STORED or info.file_size > LIMIT:
-                raise InputError(f"{path}: {name}: expected a stored member, as `odeform pack` writes")
-            return _stored(path, info)
+            with zipfile.ZipFile(path) as file:
+                info = file.getinfo(name)
+                # members are stored uncompressed: sizes are known before anything is decompressed
+                if info.compress_type != zipfile.ZIP_STORED or info.file_size > LIMIT:
+                    raise InputError(f"{path}: {name}: expected a stored member, as `odeform pack` writes")
+                return file.read(name)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}") from None
-        except (zipfile.BadZipFile, struct.error, KeyError, NotImplementedError, RuntimeError, EOFError, ValueError):
+        except (zipfile.BadZipFile, KeyError, NotImplementedError, RuntimeError, EOFError, ValueError):
             raise InputError(f"{path}: not a packed data set, or damaged: no readable {name}") from None
 
     try:
@@ -140,18 +132,6 @@ def open_packed(path: Path) -> Dataset:
         raise
     except (ValueError, IndexError, KeyError, TypeError, SafetensorError, lzma.LZMAError, EOFError) as error:
         raise InputError(f"{path}: damaged: {error}") from None
-
-
-def _stored(path: Path, info: zipfile.ZipInfo) -> bytes:
-    """The bytes of a member that is not compressed. Raises `BadZipFile` for others than were written."""
-    with path.open("rb") as file:
-        file.seek(info.header_offset + LENGTHS)
-        # the name stands before the bytes, and what else was noted of them
-        file.seek(sum(struct.unpack("<2H", file.read(4))), io.SEEK_CUR)
-        data = file.read(info.file_size)
-    if zlib.crc32(data) != info.CRC:
-        raise zipfile.BadZipFile(f"{info.filename}: the checksum does not match")
-    return data
 
 
 def _reader(path: Path, member: Callable[[str], bytes], index: dict[str, Any]) -> Reader:

@@ -51,6 +51,9 @@ def test_what_a_page_had_to_do_ends_with_it(serve: Any, column: Column) -> None:
     app.page.on_event_loop(passed.set)
     assert passed.wait(PATIENCE)
     assert done == ["now"]
+    app.close()
+    app.page.on_event_loop(lambda: done.append("late"))
+    assert done == ["now"], "nor is there an error where the loop is closed"
 
 
 def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: Column) -> None:
