@@ -1,5 +1,6 @@
 """*What happens*: the page of one model under several loads."""
 
+import asyncio
 import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -51,9 +52,17 @@ def test_what_a_page_had_to_do_ends_with_it(serve: Any, column: Column) -> None:
     app.page.on_event_loop(passed.set)
     assert passed.wait(PATIENCE)
     assert done == ["now"]
-    app.close()
-    app.page.on_event_loop(lambda: done.append("late"))
-    assert done == ["now"], "nor is there an error where the loop is closed"
+
+
+def test_what_arrives_after_the_viewer_has_ended_is_no_error(
+    serve: Any, column: Column, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, _ = serve(column)
+    closed = asyncio.new_event_loop()
+    closed.close()
+    with monkeypatch.context() as patch:
+        patch.setattr(app.server, "get_event_loop", lambda: closed)
+        app.page.on_event_loop(pytest.fail)
 
 
 def test_another_load_is_another_scene_with_its_own_sliders(serve: Any, column: Column) -> None:
